@@ -1,0 +1,1 @@
+from tolcontact.assembly import *

@@ -1,0 +1,24 @@
+"""Declare: what the user says, frozen, without numerics."""
+
+from tolcontact.assembly.assembly import Assembly
+from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.geometry import Box, Mesh
+from tolcontact.assembly.locator import Locator, ThreeTwoOne, three_two_one
+from tolcontact.assembly.measure import Measure
+from tolcontact.assembly.part import Face, Part, Point
+from tolcontact.assembly.tolerance import Tolerance
+
+__all__ = [
+    "Assembly",
+    "Box",
+    "ContactPair",
+    "Face",
+    "Locator",
+    "Measure",
+    "Mesh",
+    "Part",
+    "Point",
+    "ThreeTwoOne",
+    "Tolerance",
+    "three_two_one",
+]

@@ -1,0 +1,167 @@
+"""The assembly: collects declarations in the order in which a script makes them."""
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.geometry import Box, Mesh
+from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
+from tolcontact.assembly.measure import Measure
+from tolcontact.assembly.part import Face, Part, Point
+from tolcontact.assembly.tolerance import tolerance as _tolerance
+from tolcontact.assembly.words import direction, script_line, vector
+
+DEFAULT_POINTS = 200
+
+
+class Assembly:
+    """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
+
+    The methods only note what is said; `faults()` lists what is wrong with it, all at once.
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._parts: list[Part] = []
+        self._locations: list[Location] = []
+        self._pairs: list[ContactPair] = []
+        self._measures: list[Measure] = []
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        return tuple(self._parts)
+
+    @property
+    def locations(self) -> tuple[Location, ...]:
+        return tuple(self._locations)
+
+    @property
+    def pairs(self) -> tuple[ContactPair, ...]:
+        return tuple(self._pairs)
+
+    @property
+    def measures(self) -> tuple[Measure, ...]:
+        return tuple(self._measures)
+
+    def part(
+        self, name: str, geometry: Box | Mesh, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
+    ) -> Part:
+        """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
+        part = Part(name, geometry, vector(at), vector(rotation), fixed, script_line())
+        self._parts.append(part)
+        return part
+
+    def locate(
+        self, part: Part, scheme: ThreeTwoOne | Sequence[Locator], *, tolerance: Any = None, on: Part | None = None
+    ) -> None:
+        """Locate a part by six locators, on the ground or `on` another part.
+
+        `tolerance` holds for every locator that has none of its own: the full width of its zone [mm], a Tolerance, or
+        a frozen scipy.stats distribution.
+        """
+        scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
+        common = None if tolerance is None else _tolerance(tolerance)
+        self._locations.append(Location(part, scheme, common, on, script_line()))
+
+    def contact(
+        self,
+        name: str,
+        *,
+        moving: Face,
+        reference: Face,
+        points: int | str | None = None,
+        spacing: float | None = None,
+        within: float | None = None,
+    ) -> None:
+        """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
+        points = DEFAULT_POINTS if points is None and spacing is None else points
+        self._pairs.append(ContactPair(name, moving, reference, points, spacing, within, script_line()))
+
+    def measure(
+        self,
+        name: str,
+        of: Point | Callable[[Any], Any],
+        *,
+        to: Point | None = None,
+        along: Any = None,
+        tolerance: float | None = None,
+        units: str = "mm",
+    ) -> None:
+        """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
+        axis = None if along is None else direction(along)
+        self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line()))
+
+    def location_of(self, part: Part) -> Location | None:
+        """How `part` is located; None where it is not."""
+        return next((location for location in self._locations if location.part is part), None)
+
+    def is_free(self, part: Part) -> bool:
+        """Whether contact may move the part: as declared, else whether it is the moving side of a pair."""
+        return any(pair.moving.part is part for pair in self._pairs) if part.fixed is None else not part.fixed
+
+    def faults(self) -> Iterator[str]:
+        """What is wrong with the declarations themselves, one sentence each, naming the thing at fault."""
+        if not self._parts:
+            yield "it has no parts; declare at least one with assembly.part(name, geometry)"
+        if not self._measures:
+            yield "it measures nothing; declare at least one measure with assembly.measure(...)"
+        kinds = {"part": self._parts, "contact pair": self._pairs, "measure": self._measures}
+        for kind, things in kinds.items():
+            names = [thing.name for thing in things]  # type: ignore[attr-defined]
+            for name in dict.fromkeys(names):
+                if not isinstance(name, str) or not name.strip():
+                    yield f"{kind} {name!r}: a name must be a text that is not empty"
+                elif "/" in name:
+                    yield f'{kind} "{name}": a name must not contain "/", which separates groups in the archive'
+                if names.count(name) > 1:
+                    yield f'{kind} "{name}" is declared {names.count(name)} times; names must differ'
+        for part in self._parts:
+            yield from _named("part", part, part.faults())
+            yield from _named("part", part, self._location_faults(part))
+        for location in self._locations:
+            yield from _named("part", location.part, location.faults(), location.declared_at)
+            yield from self._strangers(f'locators of "{location.part.name}"', location.declared_at, location.part, location.on)
+        for pair in self._pairs:
+            yield from _named("contact pair", pair, pair.faults())
+            yield from self._strangers(
+                f'contact pair "{pair.name}"', pair.declared_at, pair.moving.part, pair.reference.part
+            )
+        for measure in self._measures:
+            yield from _named("measure", measure, measure.faults())
+            yield from self._strangers(
+                f'measure "{measure.name}"', measure.declared_at, *(point.part for point in measure.points)
+            )
+
+    def _location_faults(self, part: Part) -> Iterator[str]:
+        count = sum(location.part is part for location in self._locations)
+        if count > 1:
+            yield f"it is located {count} times; locate it once"
+        if count == 0 and part.fixed is not True:
+            yield "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
+        seen: list[Part] = []
+        below: Part | None = part
+        while below is not None:
+            if below in seen:
+                yield f"it is located on itself, through {' on '.join(p.name for p in seen)}; break the circle"
+                return
+            seen.append(below)
+            location = self.location_of(below)
+            below = location.on if location else None
+
+    def _strangers(self, who: str, line: str, *parts: Part | None) -> Iterator[str]:
+        for part in parts:
+            if part is not None and not any(part is own for own in self._parts):
+                known = ", ".join(own.name for own in self._parts) or "none"
+                yield (
+                    f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of '
+                    f'"{self.name}" are: {known}'
+                )
+
+    def __str__(self) -> str:
+        rows = [*self._parts, *self._locations, *self._pairs, *self._measures]
+        return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
+
+
+def _named(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:
+    where = line or thing.declared_at
+    return (f'{kind} "{thing.name}"{f" ({where})" if where else ""}: {fault}' for fault in faults)

@@ -1,0 +1,53 @@
+"""Small vocabulary of declarations: vectors, directions, and the script line that said them."""
+
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+Vector = tuple[float, float, float]
+
+_PACKAGE = str(Path(__file__).resolve().parents[1])
+_AXES: dict[str, Vector] = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+DIRECTIONS = tuple(sign + axis for axis in _AXES for sign in "+-")
+NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
+
+
+def vector(value: Any) -> Vector:
+    """Three floats; NaN where `value` is no vector, so that the fault is found with all others."""
+    try:
+        x, y, z = (float(component) for component in value)
+    except (TypeError, ValueError):
+        return NOT_A_VECTOR
+    return (x, y, z)
+
+
+def direction(value: Any) -> Vector:
+    """Unit vector of "+x", "-z", "y" or of any three numbers; NaN where `value` gives none."""
+    if isinstance(value, str):
+        sign, axis = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
+        if axis not in _AXES:
+            return NOT_A_VECTOR
+        x, y, z = _AXES[axis]
+        return (sign * x + 0.0, sign * y + 0.0, sign * z + 0.0)
+    x, y, z = vector(value)
+    length = math.hypot(x, y, z)
+    if not (math.isfinite(length) and length > 0):
+        return NOT_A_VECTOR
+    return (x / length, y / length, z / length)
+
+
+def is_finite(value: Vector) -> bool:
+    """Whether all three components are finite numbers."""
+    return all(math.isfinite(component) for component in value)
+
+
+def script_line() -> str:
+    """`file.py:12`, the innermost line outside this package; empty where there is none."""
+    frame = sys._getframe(1)
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if not name.startswith((_PACKAGE, "<")):
+            return f"{Path(name).name}:{frame.f_lineno}"
+        frame = frame.f_back  # type: ignore[assignment]
+    return ""

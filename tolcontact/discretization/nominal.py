@@ -1,0 +1,228 @@
+"""The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
+from tolcontact.discretization.layout import lay_out
+from tolcontact.discretization.projection import project
+from tolcontact.discretization.solids import GeometryFault, field_surface, patch, select, surface
+from tolcontact.discretization.spreading import own_vertices, spread
+from tolcontact.errors import ModelError
+
+CONDITION_LIMIT = 1e8
+DEFAULT_REACH = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class NominalPart:
+    """A part in its nominal place.
+
+    vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
+    labels               "part.locator" of its locators, () if it has none
+    locator_points       (locator, 3) [mm] and `locator_directions` (locator, 3), unit vectors into the part
+    tolerances           one per locator
+    parent               index of the part that it is located on; None for the ground
+    """
+
+    name: str
+    part: Part
+    placement: tuple[np.ndarray, np.ndarray]
+    mesh: trimesh.Trimesh
+    vertices: np.ndarray
+    faces: np.ndarray
+    labels: tuple[str, ...]
+    locator_points: np.ndarray
+    locator_directions: np.ndarray
+    tolerances: tuple[Tolerance, ...]
+    parent: int | None
+    free: bool
+
+    def place(self, p: np.ndarray) -> np.ndarray:
+        """Own coordinates (..., 3) to nominal assembly coordinates (..., 3) [mm]."""
+        R_WP, t_WP = self.placement
+        return p @ R_WP.T + t_WP
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPoints:
+    """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3)."""
+
+    name: str
+    moving: int
+    reference: int
+    P_m: np.ndarray
+    P_r: np.ndarray
+    n_r: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Nominal:
+    """An assembly with numbers: what everything downstream is built from."""
+
+    assembly: Assembly
+    parts: tuple[NominalPart, ...]
+    pairs: tuple[ContactPoints, ...]
+    measures: tuple[Measure, ...]
+
+    @property
+    def locator_labels(self) -> tuple[str, ...]:
+        return tuple(label for part in self.parts for label in part.labels)
+
+    @property
+    def tolerances(self) -> tuple[Tolerance, ...]:
+        return tuple(tolerance for part in self.parts for tolerance in part.tolerances)
+
+    def part_index(self, part: Part) -> int:
+        return self.assembly.parts.index(part)
+
+    def place(self, point: Point) -> np.ndarray:
+        """Nominal assembly coordinates (3,) [mm] of a declared point."""
+        return self.parts[self.part_index(point.part)].place(np.array(point.position))
+
+
+def discretize(assembly: Assembly) -> Nominal:
+    """The nominal model of an assembly.
+
+    Raises ModelError with every fault of the declaration and of its geometry.
+    """
+    faults = list(assembly.faults())
+    clean = not faults
+    meshes = {part: _attempt(faults, _where("part", part), surface, part.geometry) for part in assembly.parts
+              if not any(part.geometry.faults())}
+    parts = [_nominal_part(assembly, part, meshes.get(part), faults) for part in assembly.parts]
+    placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
+    pairs = [_attempt(faults, _where("contact pair", pair), _contact_points, assembly, pair, placed)
+             for pair in assembly.pairs if not any(pair.faults())]
+    if clean:
+        faults.extend(_immovable(assembly))
+    if faults:
+        raise ModelError(assembly.name, list(dict.fromkeys(faults)))
+    return Nominal(
+        assembly, tuple(p for p in parts if p is not None), tuple(p for p in pairs if p is not None), assembly.measures
+    )
+
+
+def _attempt(faults: list[str], where: str, build: Callable[..., Any], *arguments: Any) -> Any:
+    """What `build` gives; None, and a fault noted, where the geometry does not allow it."""
+    try:
+        return build(*arguments)
+    except GeometryFault as fault:
+        faults.append(f"{where}: {fault}")
+        return None
+
+
+def _where(kind: str, thing: Part | ContactPair) -> str:
+    return f'{kind} "{thing.name}" ({thing.declared_at})'
+
+
+def _nominal_part(
+    assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, faults: list[str]
+) -> NominalPart | None:
+    if mesh is None or any(part.faults()):
+        return None
+    R_WP = Rotation.from_rotvec(part.rotation).as_matrix()
+    t_WP = np.array(part.at)
+    vertices, faces = field_surface(mesh)
+    location = assembly.location_of(part)
+    locators: tuple[Locator, ...] = ()
+    if location is not None and not any(location.faults()):
+        if isinstance(location.scheme, ThreeTwoOne):
+            locators = _attempt(faults, _where("part", part), lay_out, mesh, location.scheme) or ()
+        else:
+            locators = location.scheme
+    points = np.array([locator.point for locator in locators]).reshape(-1, 3) @ R_WP.T + t_WP
+    directions = np.array([locator.direction for locator in locators]).reshape(-1, 3) @ R_WP.T
+    if locators:
+        _attempt(faults, _where("part", part), _check_independent, points, directions)
+    common = location.tolerance if location else None
+    parent = location.on if location else None
+    return NominalPart(
+        name=part.name,
+        part=part,
+        placement=(R_WP, t_WP),
+        mesh=mesh,
+        vertices=vertices @ R_WP.T + t_WP,
+        faces=faces,
+        labels=tuple(f"{part.name}.{locator.name}" for locator in locators),
+        locator_points=points,
+        locator_directions=directions,
+        tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in locators),
+        parent=assembly.parts.index(parent) if parent in assembly.parts else None,
+        free=assembly.is_free(part),
+    )
+
+
+def locator_matrix(points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows [n', (p - c) x n)'] of the locator matrix J (6, 6), and the locators' centroid c (3,) that it turns about."""
+    centre = points.mean(axis=0)
+    return np.hstack([directions, np.cross(points - centre, directions)]), centre
+
+
+def _check_independent(points: np.ndarray, directions: np.ndarray) -> None:
+    J, centre = locator_matrix(points, directions)
+    size = np.sqrt(((points - centre) ** 2).sum(axis=1).mean())
+    condition = np.linalg.cond(J / np.array([1, 1, 1, size, size, size])) if size > 0 else np.inf
+    if not condition < CONDITION_LIMIT:
+        raise GeometryFault(
+            f"its six locators do not fix it: the locator matrix has condition number {condition:.1e}, the limit is "
+            f"{CONDITION_LIMIT:.0e}; no three points of the primary face may lie on a line, and the directions "
+            "together must hold all three translations and all three rotations"
+        )
+
+
+def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, NominalPart]) -> ContactPoints | None:
+    if pair.moving.part not in placed or pair.reference.part not in placed:
+        return None
+    moving, reference = placed[pair.moving.part], placed[pair.reference.part]
+    own = patch(moving.mesh, select(moving.mesh, pair.moving))
+    target = _face_in_place(reference, pair.reference)
+    sampled = own_vertices(own) if isinstance(pair.points, str) else spread(own, pair.points, pair.spacing)
+    P_m = moving.place(sampled)
+    P_r, n_r, over = project(P_m, target)
+    reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
+    distance = np.linalg.norm(P_m - P_r, axis=1)
+    kept = over & (distance <= reach)
+    if not kept.any():
+        raise GeometryFault(
+            f"its faces never come within {reach:g} mm of each other; the nearest of {len(P_m)} points is "
+            f"{distance.min():g} mm away" + (" and overhangs the rim" if not over.any() else "")
+            + "; check the placement of the parts and the faces, or raise within="
+        )
+    _, normals, _ = project(P_m[kept], _face_in_place(moving, pair.moving))
+    if ((normals * n_r[kept]).sum(axis=1) > 0).all():
+        raise GeometryFault(
+            f"its faces {pair.moving} and {pair.reference} look the same way, so one cannot rest on the other; "
+            "choose faces that look at each other"
+        )
+    return ContactPoints(
+        pair.name, assembly.parts.index(moving.part), assembly.parts.index(reference.part), P_m[kept], P_r[kept], n_r[kept]
+    )
+
+
+def _face_in_place(part: NominalPart, face: Face) -> trimesh.Trimesh:
+    own = patch(part.mesh, select(part.mesh, face))
+    return trimesh.Trimesh(part.place(np.asarray(own.vertices)), own.faces, process=False)
+
+
+def _immovable(assembly: Assembly) -> list[str]:
+    """Pairs that no free part could ever open."""
+    return [
+        f"{_where('contact pair', pair)}: contact can move neither side against the other; "
+        f'declare part "{pair.moving.part.name}" free (fixed=False)'
+        for pair in assembly.pairs
+        if movers(assembly, pair.moving.part) == movers(assembly, pair.reference.part)
+    ]
+
+
+def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
+    """The free parts whose corrections move `part`: those that it is located on, and itself last."""
+    location = assembly.location_of(part)
+    below = movers(assembly, location.on) if location and location.on else ()
+    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs)
+    return (*below, part) if touches and assembly.is_free(part) else below

@@ -1,0 +1,32 @@
+"""Every error that tolcontact raises on purpose, under one base class.
+
+A message says what was expected, what was got (naming the part, locator, pair, option or file) and what to do.
+"""
+
+from collections.abc import Sequence
+
+
+class TolcontactError(Exception):
+    """Base of all errors that a user can cause and mend."""
+
+
+class ModelError(TolcontactError):
+    """A declared model is wrong. `faults` holds every fault found, not the first one only."""
+
+    def __init__(self, model: str, faults: Sequence[str]) -> None:
+        self.model = model
+        self.faults = tuple(faults)
+        count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
+        super().__init__("\n".join([f'model "{model}" has {count}:', *(f"  - {fault}" for fault in self.faults)]))
+
+
+class ScriptError(TolcontactError):
+    """A model script cannot be read or has no usable `assembly()`."""
+
+
+class OptionError(TolcontactError):
+    """An option of a run (samples, seed, solver, method) has a value that cannot be used."""
+
+
+class ArchiveError(TolcontactError):
+    """An archive cannot be written, or a file is not an archive of tolcontact."""

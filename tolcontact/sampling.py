@@ -1,0 +1,56 @@
+"""Sample: tolerances become deviations of the locators.
+
+The draw of a locator in realization k depends on the seed, the locator's label and k alone: not on blocks, on other
+locators, or on the order in which they were declared.
+"""
+
+import hashlib
+
+import numpy as np
+from scipy import stats
+from scipy.special import ndtri
+
+from tolcontact.assembly import Tolerance
+from tolcontact.discretization import Nominal
+
+STREAM = 4096
+_BITS = 52
+
+
+def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
+    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locator_labels`."""
+    columns = [
+        quantile(tolerance, _uniform(seed, label, start, stop))
+        for label, tolerance in zip(nominal.locator_labels, nominal.tolerances, strict=True)
+    ]
+    return np.stack(columns, axis=1)
+
+
+def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:
+    """The deviation [mm] below which a share `u` (0 < u < 1) of parts lies."""
+    if not isinstance(tolerance.distribution, str):
+        return np.asarray(tolerance.distribution.ppf(u), dtype=float)
+    width = float(tolerance.range or 0.0)
+    if width == 0:
+        return np.zeros_like(u)
+    shape = {
+        "normal": lambda u: ndtri(u) / 6,
+        "uniform": lambda u: u - 0.5,
+        "triangular": stats.triang(0.5, -0.5, 1).ppf,
+        "truncated normal": stats.truncnorm(-3, 3, 0, 1 / 6).ppf,
+    }[tolerance.distribution]
+    return np.asarray(width * shape(u))
+
+
+def _uniform(seed: int, label: str, start: int, stop: int) -> np.ndarray:
+    """Numbers strictly between 0 and 1 for realizations `start` to `stop` of one locator."""
+    key = int.from_bytes(hashlib.blake2b(label.encode(), digest_size=8).digest(), "little")
+    streams = range(start // STREAM, -(-stop // STREAM))
+    drawn = [
+        np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(key, stream)))).integers(
+            0, 1 << _BITS, STREAM
+        )
+        for stream in streams
+    ]
+    first = start - streams.start * STREAM
+    return (np.concatenate(drawn)[first : first + stop - start] + 0.5) * 2.0**-_BITS

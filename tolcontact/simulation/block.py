@@ -1,0 +1,42 @@
+"""What a block of realizations gives, as plain arrays."""
+
+import enum
+from dataclasses import dataclass
+
+import numpy as np
+
+RAW, CORRECTED = 0, 1
+
+
+class Status(enum.IntEnum):
+    """What became of a realization. Archives keep these numbers."""
+
+    UNTOUCHED = 0  # no contact point penetrates: the corrected state is the raw state, to the last bit
+    RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
+    NOT_CONVERGED = 2  # they do not hold, or the rows contradict each other: penetration remains
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Realizations `start` to `start + n`; the first dimension of every array is the realization.
+
+    deviations    (n, locator) [mm]
+    poses         (n, state, part, 12): R row by row, t [mm]
+    measured      (n, state, measure)
+    gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
+    active        (n, pair): number of active contact points in the raw state
+    status        (n,), Status
+    kkt_residual  (n,) [mm], 0 where untouched
+    """
+
+    start: int
+    deviations: np.ndarray
+    poses: np.ndarray
+    measured: np.ndarray
+    gap_min: np.ndarray
+    active: np.ndarray
+    status: np.ndarray
+    kkt_residual: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.status)

@@ -1,0 +1,73 @@
+"""Deviations to corrected poses and measures, block by block."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tolcontact.sampling import draw
+from tolcontact.simulation.block import Block, Status
+from tolcontact.simulation.contact import ContactResolver
+from tolcontact.simulation.scan import pair_scan
+from tolcontact.symbolic import Program
+
+BLOCK = 1000
+
+
+def simulate_blocks(
+    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK
+) -> Iterator[Block]:
+    """Realizations `start` to `samples` in blocks. The realization k is the same in any block and any run."""
+    resolvers = [ContactResolver(program, group) for group in program.groups]
+    for first in range(start, samples, block):
+        deviations = draw(program.nominal, seed=seed, start=first, stop=min(first + block, samples))
+        yield simulate_block(program, deviations, start=first, resolvers=resolvers)
+
+
+def simulate_block(
+    program: Program, deviations: np.ndarray, *, start: int = 0, resolvers: list[ContactResolver] | None = None
+) -> Block:
+    """Raw and corrected states for given deviations (realization, locator) [mm]."""
+    if resolvers is None:
+        resolvers = [ContactResolver(program, group) for group in program.groups]
+    nominal, count = program.nominal, len(deviations)
+    placed, _ = program.place(deviations=deviations)
+    raw = placed["poses"].reshape(count, len(nominal.parts), -1)
+    measured_raw, relative_raw = _observe(program, raw)
+
+    poses = raw.copy()
+    touched, residual, slack = np.zeros(count, dtype=bool), np.zeros(count), np.zeros(count)
+    for resolver in resolvers:
+        found = resolver.resolve(raw, relative_raw)
+        poses[np.ix_(found.rows, resolver.parts)] = found.poses
+        touched[found.rows] = True
+        residual[found.rows] = np.maximum(residual[found.rows], found.residual)
+        slack[found.rows] = np.maximum(slack[found.rows], found.slack)
+    measured, relative = measured_raw.copy(), relative_raw.copy()
+    measured[touched], relative[touched] = _observe(program, poses[touched])
+
+    accuracy = program.plugin.accuracy
+    fine = (residual <= accuracy) & (slack <= accuracy)
+    status = np.where(touched, np.where(fine, Status.RESOLVED, Status.NOT_CONVERGED), Status.UNTOUCHED)
+    gap_min, active = np.empty((count, 2, len(nominal.pairs))), np.empty((count, len(nominal.pairs)), dtype=int)
+    for pair, matrix in enumerate(program.gaps):
+        scan = pair_scan(nominal.pairs[pair], matrix, [], 1)
+        gaps = scan.gaps(relative_raw[:, pair])
+        active[:, pair] = (gaps < program.method.activity).sum(axis=1)
+        gap_min[:, 0, pair] = gaps.min(axis=1)
+        gap_min[:, 1, pair] = scan.gaps(relative[:, pair]).min(axis=1)
+    return Block(
+        start=start,
+        deviations=deviations,
+        poses=np.stack([raw, poses], axis=1),
+        measured=np.stack([measured_raw, measured], axis=1),
+        gap_min=gap_min,
+        active=active,
+        status=status.astype(np.int8),
+        kkt_residual=residual,
+    )
+
+
+def _observe(program: Program, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
+    seen, _ = program.observe(poses=poses)
+    return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), -1)

@@ -1,0 +1,37 @@
+"""Locator deviations to raw poses: q = J^-1 d for each part, on the ground or on the part that it is located on."""
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.discretization.nominal import locator_matrix
+from tolcontact.symbolic.pose import Pose, rotation
+
+
+def raw_poses(nominal: Nominal, deviations: ca.SX) -> list[Pose]:
+    """The raw pose of every part for deviations (locator, 1) [mm] in the order of `nominal.locator_labels`."""
+    columns = np.cumsum([0, *(len(part.labels) for part in nominal.parts)])
+    own = [
+        _on_its_locators(part, deviations[int(start) : int(stop)])
+        for part, start, stop in zip(nominal.parts, columns[:-1], columns[1:], strict=True)
+    ]
+
+    def follow(index: int) -> Pose:
+        parent = nominal.parts[index].parent
+        return own[index] if parent is None else follow(parent) @ own[index]
+
+    return [follow(index) for index in range(len(own))]
+
+
+def _on_its_locators(part: NominalPart, d: ca.SX) -> Pose:
+    """R = exp([theta]x) about the centroid c of the locators, which moves by delta; (delta, theta) = J^-1 d.
+
+    Turning about c, not about the origin, makes the pose the same wherever the assembly stands: the two differ by
+    terms of order theta^2 times the distance of the origin.
+    """
+    if not part.labels:
+        return Pose(ca.SX.eye(3), ca.SX.zeros(3))
+    J, c = locator_matrix(part.locator_points, part.locator_directions)
+    q = ca.DM(np.linalg.inv(J)) @ d
+    R = rotation(q[3:])
+    return Pose(R, q[:3] + c - R @ ca.DM(c))

@@ -1,0 +1,88 @@
+"""The QP solvers that CasADi offers: options, what to expect of each, and which are refused and why."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.errors import OptionError
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A conic plugin of CasADi.
+
+    options     what we ask of it
+    accuracy    residual of the KKT conditions [mm] up to which its answers count as solved
+    """
+
+    name: str
+    options: dict[str, Any] = field(default_factory=dict)
+    accuracy: float = 1e-8
+
+
+PLUGINS = {
+    plugin.name: plugin
+    for plugin in (
+        Plugin("qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}),
+        Plugin("osqp", {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}}, 1e-5),
+        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}),
+        Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}, 1e-5),
+        Plugin("highs", {"highs": {"output_flag": False}}, 1e-6),
+        Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}, 1e-6),
+        Plugin("ipqp", {"print_iter": False, "print_header": False, "print_info": False}, 1e-4),
+        Plugin("gurobi", {}, 1e-5),
+        Plugin("cplex", {}, 1e-5),
+        Plugin("mosek", {}, 1e-5),
+        Plugin("xpress", {}, 1e-5),
+    )
+}
+REFUSED = {
+    "superscs": "it reports success with wrong answers",
+    "fatrop": "its cost output is always 0 and it fails assertions of its own",
+    "hpipm": "it takes problems with the structure of optimal control only",
+    "qrqp": "it gives wrong answers, or hangs, beyond some tens of rows",
+    "clp": "it solves linear programs only",
+    "cbc": "it solves linear programs only",
+    "nlpsol": "it is an adapter for nonlinear solvers, too slow to be of use here",
+}
+
+
+def plugin(name: str) -> Plugin:
+    """The table's entry for `name`, once it has solved a small problem correctly.
+
+    Raises OptionError for a solver that is unknown, refused, not installed, or answers wrongly.
+    """
+    if name in REFUSED:
+        raise OptionError(f'solver "{name}" is refused: {REFUSED[name]}; choose one of: {", ".join(usable_plugins())}')
+    if name not in PLUGINS:
+        raise OptionError(f'unknown solver "{name}"; choose one of: {", ".join(usable_plugins())}')
+    if not is_usable(name):
+        raise OptionError(
+            f'solver "{name}" is not installed with this CasADi, or does not solve a small test problem; '
+            f"choose one of: {', '.join(usable_plugins())}"
+        )
+    return PLUGINS[name]
+
+
+def usable_plugins() -> list[str]:
+    """Names of the plugins that are installed and solve a small problem correctly."""
+    return [name for name in PLUGINS if is_usable(name)]
+
+
+def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
+    """A QP solver for these sparsities that reports failure in its outputs, never by an exception."""
+    return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**plugin.options, "error_on_fail": False})
+
+
+def is_usable(name: str) -> bool:
+    """Whether the plugin loads and finds min x'x/2 subject to x1 + x2 >= 2, that is (1, 1)."""
+    if not ca.has_conic(name):
+        return False
+    try:
+        qp = solver(PLUGINS[name], ca.Sparsity.dense(2, 2), ca.Sparsity.dense(1, 2))
+        x = qp(h=ca.DM.eye(2), g=0, a=ca.DM([[1, 1]]), lba=2, uba=ca.inf, lbx=-ca.inf, ubx=ca.inf)["x"]
+    except RuntimeError:  # CasADi's only exception: a vendor's library is missing, or the plugin fails on construction
+        return False
+    return bool(np.allclose(x.full().ravel(), 1.0, atol=1e-4))

@@ -1,0 +1,54 @@
+"""Symbolic poses X = (R, t): x = R x0 + t, paper (1), with x0 in the nominal assembly frame.
+
+As a vector a pose has 12 entries: R row by row, then t [mm].
+"""
+
+from typing import NamedTuple
+
+import casadi as ca
+
+ENTRIES = 12
+# Keeps sqrt differentiable at rest; its square root is far below any angle, and the series below stay exact with it.
+_TINY = 1e-300
+
+
+class Pose(NamedTuple):
+    """R (3, 3) and t (3, 1) [mm]."""
+
+    R: ca.SX
+    t: ca.SX
+
+    def __matmul__(self, inner: "Pose") -> "Pose":  # type: ignore[override]
+        """Composition: first `inner`, then this pose."""
+        return Pose(self.R @ inner.R, self.R @ inner.t + self.t)
+
+    def place(self, p: ca.SX | ca.DM) -> ca.SX:
+        """Where the point with nominal coordinates `p` (3, 1) [mm] is now."""
+        return self.R @ p + self.t
+
+    def vector(self) -> ca.SX:
+        """The 12 entries."""
+        return ca.vertcat(ca.vec(self.R.T), self.t)
+
+
+def pose_of(vector: ca.SX) -> Pose:
+    """The pose whose 12 entries are `vector`."""
+    return Pose(ca.reshape(vector[:9], 3, 3).T, vector[9:12])
+
+
+def poses_of(vector: ca.SX) -> list[Pose]:
+    """The poses whose entries stand one after the other in `vector`."""
+    return [pose_of(part) for part in ca.vertsplit(vector, ENTRIES)]
+
+
+def rotation(theta: ca.SX) -> ca.SX:
+    """exp([theta]x), Rodrigues' formula; exact and differentiable down to theta = 0 [rad]."""
+    angle = ca.sqrt(ca.dot(theta, theta) + _TINY)
+    half = ca.sin(angle / 2) / (angle / 2)
+    K = ca.skew(theta)
+    return ca.SX.eye(3) + (ca.sin(angle) / angle) * K + (half**2 / 2) * (K @ K)
+
+
+def relative(X_WM: Pose, X_WR: Pose) -> Pose:
+    """X_RM: the pose of the moving part in the frame of the reference part."""
+    return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))

@@ -1,0 +1,87 @@
+"""The compiled model: built once, called by name for blocks of realizations, read by name."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.discretization import Nominal
+from tolcontact.method import Method
+from tolcontact.symbolic.batch import Batch, quiet
+from tolcontact.symbolic.contact_program import SLOTS, Group, contact_groups, contact_program
+from tolcontact.symbolic.gap import gap_matrix
+from tolcontact.symbolic.measure import measured
+from tolcontact.symbolic.placement import raw_poses
+from tolcontact.symbolic.plugins import Plugin, plugin
+from tolcontact.symbolic.pose import ENTRIES, poses_of, relative
+from tolcontact.symbolic.tape import Tape, record
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGroup:
+    """A group of coupled parts and its QP Function (see contact_program)."""
+
+    group: Group
+    solve: Batch
+    slots: int = SLOTS
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
+
+    place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
+    observe      poses -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
+    gaps         one constant matrix (13, point) per pair: gaps = [X_RM, 1] @ matrix
+    groups       the contact QPs
+    nominal_measures  values of the measures in the nominal assembly
+    tapes        the users' own expressions by measure name
+    """
+
+    nominal: Nominal
+    method: Method
+    plugin: Plugin
+    place: Batch
+    observe: Batch
+    gaps: tuple[np.ndarray, ...]
+    groups: tuple[ContactGroup, ...]
+    nominal_measures: np.ndarray
+    tapes: dict[str, Tape]
+
+
+def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
+    """Build all Functions of a model.
+
+    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails.
+    """
+    with quiet():
+        chosen = plugin(solver)
+        d = ca.SX.sym("deviations", len(nominal.locator_labels))
+        raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
+        entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
+        poses = poses_of(entries)
+        values = measured(nominal, poses)
+        X_RM = [relative(poses[pair.moving], poses[pair.reference]).vector() for pair in nominal.pairs]
+        observe = ca.Function(
+            "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
+        )
+        groups = contact_groups(nominal)
+        return Program(
+            nominal=nominal,
+            method=method,
+            plugin=chosen,
+            place=Batch(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
+            observe=Batch(observe),
+            gaps=tuple(gap_matrix(pair) for pair in nominal.pairs),
+            groups=tuple(ContactGroup(g, Batch(contact_program(nominal, g, method, chosen))) for g in groups),
+            nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
+            tapes={
+                measure.name: record(value, entries)
+                for measure, value in zip(nominal.measures, values, strict=True)
+                if not measure.points
+            },
+        )
+
+
+def _at_rest(parts: int) -> np.ndarray:
+    return np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), parts)
