@@ -1,1 +1,31 @@
-from tolcontact.assembly import *
+"""Tolerance analysis of rigid assemblies: Monte-Carlo variation simulation in which contact is resolved.
+
+    declare       Assembly, Box, Mesh, Locator, three_two_one, Tolerance
+    run           run, build, Method
+    look          summarize, open_archive, model_of
+"""
+
+from tolcontact.archive import model_of, open_archive
+from tolcontact.assembly import Assembly, Box, Locator, Mesh, Tolerance, three_two_one
+from tolcontact.cli import main
+from tolcontact.errors import TolcontactError
+from tolcontact.method import Method
+from tolcontact.running import build, run
+from tolcontact.statistics import summarize
+
+__all__ = [
+    "Assembly",
+    "Box",
+    "Locator",
+    "Mesh",
+    "Method",
+    "Tolerance",
+    "TolcontactError",
+    "build",
+    "main",
+    "model_of",
+    "open_archive",
+    "run",
+    "summarize",
+    "three_two_one",
+]

@@ -1,6 +1,6 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from tolcontact.assembly.contact import ContactPair
@@ -20,12 +20,20 @@ class Assembly:
     The methods only note what is said; `faults()` lists what is wrong with it, all at once.
     """
 
-    def __init__(self, name: str) -> None:
+    def __init__(
+        self,
+        name: str,
+        parts: Iterable[Part] = (),
+        locations: Iterable[Location] = (),
+        pairs: Iterable[ContactPair] = (),
+        measures: Iterable[Measure] = (),
+    ) -> None:
+        """Scripts give the name only, and declare the rest by the methods."""
         self.name = name
-        self._parts: list[Part] = []
-        self._locations: list[Location] = []
-        self._pairs: list[ContactPair] = []
-        self._measures: list[Measure] = []
+        self._parts = list(parts)
+        self._locations = list(locations)
+        self._pairs = list(pairs)
+        self._measures = list(measures)
 
     @property
     def parts(self) -> tuple[Part, ...]:

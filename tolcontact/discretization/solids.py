@@ -9,7 +9,7 @@ from tolcontact.assembly import Box, Face, Mesh
 from tolcontact.assembly.words import direction
 
 FACE_ANGLE = np.radians(1.0)
-FIELD_STATIONS = 24
+FIELD_STATIONS = 12
 
 
 class GeometryFault(Exception):

@@ -1,0 +1,312 @@
+"""The netCDF archive: written block by block with the netCDF4 library, read with xarray.
+
+A row is complete once it has a status; whatever kills the writer, complete rows stay, and `resume` goes on after them.
+"""
+
+import datetime
+import json
+import platform
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.assembly import Assembly, Mesh
+from tolcontact.assembly.document import from_document, to_document
+from tolcontact.discretization import Nominal
+from tolcontact.discretization.solids import select
+from tolcontact.errors import ArchiveError
+from tolcontact.simulation import Block
+from tolcontact.statistics import FieldMoments
+from tolcontact.symbolic import Program
+from tolcontact.vocabulary import Variable
+
+ROW_CHUNK = 1000
+_LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
+
+
+class ArchiveWriter:
+    """An archive being written. Use it as a context manager."""
+
+    def __init__(self, path: Path, program: Program, *, seed: int, samples: int) -> None:
+        """Create the file with everything but its rows.
+
+        Raises ArchiveError where it cannot be written.
+        """
+        self._nominal = program.nominal
+        self._file = _opened(path, "w")
+        _write_header(self._file, program, _settings(program, seed, samples))
+        self._file.sync()
+        self.rows = 0
+
+    @classmethod
+    def resume(cls, path: Path, program: Program, *, seed: int, samples: int) -> "ArchiveWriter":
+        """Open an archive to go on after its last complete row.
+
+        Raises ArchiveError where the file is no archive, or holds another model or another run.
+        """
+        writer = cls.__new__(cls)
+        writer._nominal = program.nominal
+        _check_same_run(path, program, _settings(program, seed, samples))
+        writer._file = _opened(path, "r+")
+        status = np.ma.filled(writer._file[words.STATUS.name][:], words.UNFINISHED)
+        unfinished = np.flatnonzero(status == words.UNFINISHED)
+        writer.rows = int(unfinished[0]) if unfinished.size else len(status)
+        writer._file.setncattr("samples", samples)
+        writer._note(f"resumed after {writer.rows} realizations")
+        return writer
+
+    def __enter__(self) -> "ArchiveWriter":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+    def append(self, block: Block) -> None:
+        """Write the rows of a block, and see them to the disk."""
+        rows = slice(block.start, block.start + len(block))
+        R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
+        values = {
+            words.MEASURED: block.measured,
+            words.TRANSLATION: t,
+            words.ROTATION: R,
+            words.GAP_MIN: block.gap_min,
+            words.ACTIVE: block.active,
+            words.KKT_RESIDUAL: block.kkt_residual,
+            words.STATUS: block.status,
+        }
+        self._file[words.REALIZATION][rows] = np.arange(rows.start, rows.stop)
+        self._file["sample"][words.DEVIATION.name][rows] = block.deviations
+        for variable in words.ROWS:
+            if values[variable].size:
+                self._file[variable.name][rows] = values[variable]
+        self._file.sync()
+        self.rows = rows.stop
+
+    def write_fields(self) -> None:
+        """Displacement fields of all parts, from the archived poses."""
+        for index, part in enumerate(self._nominal.parts):
+            group = self._file[f"field/{part.name}"]
+            for state in range(len(words.STATES)):
+                moments = FieldMoments(part.vertices)
+                for R, t in self._poses(state, index):
+                    moments.add(R, t)
+                group[words.FIELD_MEAN.name][state] = moments.mean()
+                group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
+        self._file.sync()
+
+    def _poses(self, state: int, part: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        R, t = self._file[words.ROTATION.name], self._file[words.TRANSLATION.name]
+        for start in range(0, self.rows, ROW_CHUNK):
+            rows = slice(start, min(start + ROW_CHUNK, self.rows))
+            yield np.asarray(R[rows, state, part]), np.asarray(t[rows, state, part])
+
+    def _note(self, what: str) -> None:
+        self._file.setncattr("history", f"{self._file.getncattr('history')}\n{_now()} {what}")
+
+
+def open_archive(path: str | Path) -> xr.DataTree:
+    """An archive as a tree of labelled datasets, read on demand.
+
+    Raises ArchiveError where the file is missing, is not netCDF, or was not written by tolcontact.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    try:
+        tree = xr.open_datatree(path, engine="netcdf4")
+    except (OSError, ValueError) as error:
+        raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
+    missing = [v.name for v in words.ROWS if v.name not in tree.ds] + [g for g in ("model", "sample") if g not in tree.children]
+    if missing:
+        tree.close()
+        raise ArchiveError(f'"{path}" is not an archive of tolcontact: it has no {", ".join(missing)}')
+    return tree
+
+
+def model_of(results: xr.DataTree) -> Assembly:
+    """The declared assembly, rebuilt from an archive."""
+    document = json.loads(str(results["model"][words.DECLARATION.name].values))
+    meshes = {}
+    if "mesh" in results["model"].children:
+        for name, group in results["model/mesh"].children.items():
+            meshes[name] = _Triangles(group[words.MESH_VERTICES.name].values, group[words.MESH_FACES.name].values)
+    return from_document(document, meshes)
+
+
+class _Triangles:
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        self.vertices, self.faces = vertices, faces
+
+
+def _opened(path: Path, mode: str) -> netCDF4.Dataset:
+    try:
+        return netCDF4.Dataset(path, mode, format="NETCDF4")
+    except OSError as error:
+        raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror or error}') from error
+
+
+def _settings(program: Program, seed: int, samples: int) -> dict[str, Any]:
+    """Global attributes that say how the rows came about; a resumed run must agree in all but `samples`."""
+    method = program.method
+    return {
+        "solver": program.plugin.name,
+        "solver_options": json.dumps(program.plugin.options),
+        "solver_accuracy": program.plugin.accuracy,
+        "resolution": "linearized",
+        "weighting": "active points",
+        "regularization": method.regularization,
+        "eta": method.eta,
+        "active_set": method.active_set,
+        "activity": method.activity,
+        "sampler": "monte-carlo",
+        "seed": np.int64(seed),
+        "samples": np.int64(samples),
+    }
+
+
+def _now() -> str:
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _declaration(program: Program) -> str:
+    nominal = program.nominal
+
+    def triangles(face: Any) -> list[int]:
+        return [int(k) for k in select(nominal.parts[nominal.part_index(face.part)].mesh, face)]
+
+    return json.dumps(to_document(nominal.assembly, triangles, program.tapes))
+
+
+def _check_same_run(path: Path, program: Program, settings: Mapping[str, Any]) -> None:
+    with open_archive(path) as there:
+        if str(there["model"][words.DECLARATION.name].values) != _declaration(program):
+            raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
+        for word, value in settings.items():
+            if word != "samples" and there.attrs.get(word) != value:
+                raise ArchiveError(
+                    f'"{path}" was run with {word} = {there.attrs.get(word)}, now it is {value}; '
+                    "resume with the same, or write to a new file"
+                )
+
+
+def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any]) -> None:
+    nominal = program.nominal
+    file.setncatts(
+        {
+            "Conventions": words.CONVENTIONS,
+            "title": f"variation simulation of {nominal.assembly.name}",
+            "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
+            "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
+            "Variation Simulation of Rigid Bodies with Contact Representation",
+            "history": f"{_now()} created",
+            "versions": ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)]),
+            **settings,
+        }
+    )
+    labels = {
+        words.STATE: words.STATES,
+        words.PART: [part.name for part in nominal.parts],
+        words.PAIR: [pair.name for pair in nominal.pairs],
+        words.MEASURE: [measure.name for measure in nominal.measures],
+        words.AXIS: words.AXES,
+        words.BODY_AXIS: words.AXES,
+    }
+    file.createDimension(words.REALIZATION, None)
+    for name, values in labels.items():
+        file.createDimension(name, len(values))
+    for coordinate in words.COORDINATES:
+        _define(file, coordinate)
+        if coordinate.name in labels:
+            _fill(file, coordinate, labels[coordinate.name])
+    for variable in words.ROWS:
+        _define(file, variable)
+    units = [measure.units for measure in nominal.measures]
+    if set(units) != {"mm"}:
+        file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
+    _write(file, words.MEASURE_NOMINAL, program.nominal_measures)
+    _write(file, words.MEASURE_TOLERANCE, [np.nan if m.tolerance is None else m.tolerance for m in nominal.measures])
+    _write(file, words.MEASURE_UNITS, units)
+    _write_model(file.createGroup("model"), nominal, _declaration(program))
+    _write_contact(file.createGroup("contact"), nominal)
+    _write_sample(file.createGroup("sample"), nominal)
+    for part in nominal.parts:
+        group = file.createGroup(f"field/{part.name}")
+        for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
+            group.createDimension(name, size)
+        group.createDimension(words.COMPONENT, len(words.COMPONENTS))
+        _write(group, words.COMPONENT_LABEL, words.COMPONENTS)
+        _write(group, words.FIELD_VERTICES, part.vertices)
+        _write(group, words.FIELD_FACES, part.faces)
+        for variable in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA):
+            _write(group, variable, np.full([len(words.STATES), len(part.vertices), len(words.COMPONENTS)], np.nan))
+
+
+def _write_model(group: netCDF4.Group, nominal: Nominal, declaration: str) -> None:
+    _write(group, words.DECLARATION, declaration)
+    for part in nominal.parts:
+        if isinstance(part.part.geometry, Mesh):
+            mesh = group.createGroup(f"mesh/{part.name}")
+            mesh.createDimension(words.VERTEX, len(part.mesh.vertices))
+            mesh.createDimension(words.FACE, len(part.mesh.faces))
+            mesh.createDimension(words.CORNER, 3)
+            _write(mesh, words.MESH_VERTICES, part.mesh.vertices)
+            _write(mesh, words.MESH_FACES, part.mesh.faces)
+
+
+def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
+    pairs = nominal.pairs
+    group.createDimension(words.POINT, sum(len(pair.P_m) for pair in pairs))
+    _write(group, words.MOVING_PART, [pair.moving for pair in pairs])
+    _write(group, words.REFERENCE_PART, [pair.reference for pair in pairs])
+    if pairs:
+        _write(group, words.PAIR_OF_POINT, np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]))
+        _write(group, words.MOVING_POINT, np.vstack([pair.P_m for pair in pairs]))
+        _write(group, words.REFERENCE_POINT, np.vstack([pair.P_r for pair in pairs]))
+        _write(group, words.REFERENCE_NORMAL, np.vstack([pair.n_r for pair in pairs]))
+
+
+def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
+    group.createDimension(words.LOCATOR, len(nominal.locator_labels))
+    _define(group, words.DEVIATION)
+    _write(group, words.LOCATOR_LABEL, nominal.locator_labels)
+    _write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in nominal.tolerances])
+    _write(
+        group,
+        words.DISTRIBUTION,
+        [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in nominal.tolerances],
+    )
+    _write(group, words.LOCATOR_POINT, np.vstack([part.locator_points for part in nominal.parts]))
+    _write(group, words.LOCATOR_DIRECTION, np.vstack([part.locator_directions for part in nominal.parts]))
+
+
+def _define(group: netCDF4.Group, variable: Variable) -> None:
+    options: dict[str, Any] = {}
+    if words.REALIZATION in variable.dims:
+        # netCDF's own choice, one row per chunk, reads some fifty times slower.
+        sizes = [group.dimensions.get(d) or group.parent.dimensions[d] for d in variable.dims if d != words.REALIZATION]
+        options["chunksizes"] = [ROW_CHUNK, *(max(len(size), 1) for size in sizes)]
+    if variable is words.STATUS:
+        options["fill_value"] = np.int8(words.UNFINISHED)
+    created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
+    attributes = variable.all_attributes
+    if "flag_values" in attributes:
+        attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
+    created.setncatts(attributes)
+
+
+def _fill(group: netCDF4.Group, variable: Variable, values: Any) -> None:
+    if variable.kind is str:
+        values = np.array(values, dtype=object)
+    if np.size(values):
+        group[variable.name][...] = values
+
+
+def _write(group: netCDF4.Group, variable: Variable, values: Any) -> None:
+    _define(group, variable)
+    _fill(group, variable, values)

@@ -1,0 +1,108 @@
+"""The command line. Results on stdout, progress and errors on stderr.
+
+Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad input, one message, nothing written.
+"""
+
+import inspect
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+import xarray as xr
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from tolcontact.archive import open_archive
+from tolcontact.assembly import Assembly
+from tolcontact.errors import TolcontactError
+from tolcontact.report import summary_text
+from tolcontact.running import DEFAULT_SOLVER, build, check_counts, check_writable
+from tolcontact.running import run as run_model
+from tolcontact.script import load_model
+from tolcontact.simulation import Status
+from tolcontact.statistics import summarize
+
+FAILED_SHARE = 0.001
+
+app = typer.Typer(
+    help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
+Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
+
+
+@app.command()
+def run(
+    model: Model,
+    samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
+    solver: Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")] = DEFAULT_SOLVER,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
+) -> None:
+    """Simulate a model with and without contact, and print what happens to its measures.
+
+    Exit code 1 where more than 0.1 % of the realizations did not converge.
+    """
+    check_counts(samples=samples, seed=seed)
+    if out is not None:
+        check_writable(out, overwrite=overwrite, resume=resume)
+    program = build(load_model(model), solver=solver)
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
+        console=Console(stderr=True), transient=True,
+    ) as bar:  # fmt: skip
+        task = bar.add_task(program.nominal.assembly.name, total=samples)
+        results = run_model(
+            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume,
+            progress=lambda done: bar.update(task, completed=done),
+        )  # fmt: skip
+    _print_summary(results)
+    if out is not None:
+        typer.echo(f"\narchive: {out}")
+
+
+@app.command()
+def summary(archive: Archive) -> None:
+    """Print the statistics of an archive."""
+    _print_summary(open_archive(archive))
+
+
+@app.command()
+def check(model: Model) -> None:
+    """Say what is wrong with a model; run nothing."""
+    program = build(load_model(model))
+    typer.echo(program.nominal.assembly)
+    for pair in program.nominal.pairs:
+        typer.echo(f"  contact {pair.name}: {len(pair.P_m)} contact points within reach")
+    typer.echo("no faults found")
+
+
+def main(assembly: Callable[[], Assembly]) -> None:
+    """Run the script that defines `assembly`, with the options of `tolcontact run`."""
+    script = inspect.getsourcefile(assembly)
+    command_line([*(["run", script] if script else []), *sys.argv[1:]])
+
+
+def command_line(arguments: list[str] | None = None) -> None:
+    """The console script: `app`, with errors as one message and exit code 2."""
+    try:
+        app(arguments)
+    except TolcontactError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(2)
+
+
+def _print_summary(results: xr.DataTree) -> None:
+    found = summarize(results)
+    Console(highlight=False).print(summary_text(found))
+    failed = int(found["by_status"][Status.NOT_CONVERGED])
+    if failed > FAILED_SHARE * found.attrs["realizations"]:
+        typer.echo(f"error: {failed} realizations did not converge, more than {FAILED_SHARE:.1%} of all", err=True)
+        raise typer.Exit(1)

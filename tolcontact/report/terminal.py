@@ -1,0 +1,102 @@
+"""The summary as text for a terminal of 80 columns."""
+
+import math
+from collections.abc import Iterator
+
+import xarray as xr
+from rich import box
+from rich.console import Group
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from tolcontact.statistics.summary import OUTSIDE, SHIFT, SPREAD_RATIO, VARIANCE_RATIO
+
+RAW, CORRECTED = "raw", "corrected"
+_CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
+_SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
+MAX_DECIMALS = 6
+
+
+def summary_text(summary: xr.Dataset) -> Group:
+    """A summary (see summarize) as something that rich prints."""
+    return Group(*_sections(summary))
+
+
+def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
+    count = summary.attrs["realizations"]
+    yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
+    yield Text("Estimates with their 95 % confidence intervals; changes from the same realizations.")
+    for measure in summary["measure"].values:
+        yield from _measure_section(summary.sel(measure=measure), str(measure))
+    yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
+    yield _field_table(summary)
+    yield Text("\ncontact", style="bold")
+    for line in _contact_lines(summary, count):
+        yield Padding(Text(line), (0, 0, 0, 2))
+
+
+def _table(*columns: str) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+    for k, column in enumerate(columns):
+        table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0)
+    return table
+
+
+def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
+    units, tolerance = str(of["measure_units"].values), float(of["measure_tolerance"].values)
+    limits = f", tolerance range {tolerance:g} {units}" if math.isfinite(tolerance) else ""
+    yield Text(f"\n{name} ({units}){limits}", style="bold")
+    table = _table("", RAW, CORRECTED, "change")
+    for statistic in of["statistic"].values:
+        values = [of["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
+        if statistic == OUTSIDE:
+            if math.isfinite(tolerance):
+                table.add_row(_SHORT[OUTSIDE], *map(percent, values), "")
+            continue
+        change = ""
+        if statistic in _CHANGE_BESIDE:
+            changed = of["change"].sel(change_of=_CHANGE_BESIDE[statistic]).values
+            change = number(changed, sign=True) if statistic == "mean" else percent(changed - 1, sign=True)
+        table.add_row(_SHORT.get(statistic, statistic), *map(number, values), change)
+    yield table
+
+
+def _field_table(summary: xr.Dataset) -> Table:
+    table = _table("part", "state", "least", "largest")
+    for part in summary["part"].values:
+        for state in (RAW, CORRECTED):
+            of = summary["field_extreme"].sel(part=part, state=state)
+            table.add_row(str(part), state, number(of.sel(extreme="least").values), number(of.sel(extreme="largest").values))
+    return table
+
+
+def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
+    yield f"realizations touched by contact: {percent(summary['touched'].values)}"
+    by_status = ", ".join(f"{int(n)} {m}" for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True))
+    yield f"status: {by_status}"
+    raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
+    yield f"largest true penetration: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
+
+
+def number(values: object, *, sign: bool = False) -> str:
+    """`estimate [lower, upper]`, with as many decimals as the interval's width deserves; "-" where there is none."""
+    estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
+    if not math.isfinite(estimate):
+        return "-"
+    finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
+    width = max(finite, default=0.0)
+    decimals = min(max(1 - math.floor(math.log10(width)), 0), MAX_DECIMALS) if width > 0 else (0 if estimate == 0 else 4)
+    plus = "+" if sign else ""
+    return f"{estimate:{plus}.{decimals}f} [{_bound(lower, decimals)}, {_bound(upper, decimals)}]"
+
+
+def percent(values: object, *, sign: bool = False) -> str:
+    """`number` of shares, in percent."""
+    estimate, lower, upper = (100 * float(v) for v in values)  # type: ignore[attr-defined]
+    text = number((estimate, lower, upper), sign=sign)
+    return text if text == "-" else text.replace(" [", " % [")
+
+
+def _bound(value: float, decimals: int) -> str:
+    return f"{value:.{decimals}f}" if math.isfinite(value) else ("-inf" if value < 0 else "inf")

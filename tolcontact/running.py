@@ -1,0 +1,91 @@
+"""From a declared assembly to an archive: the whole flow in one call."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+from tolcontact.archive import ArchiveWriter, open_archive
+from tolcontact.assembly import Assembly
+from tolcontact.discretization import discretize
+from tolcontact.errors import ArchiveError, OptionError
+from tolcontact.method import Method
+from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.run import BLOCK
+from tolcontact.symbolic import Program, compile_program
+
+DEFAULT_SOLVER = "qpoases"
+Progress = Callable[[int], None]
+
+
+def build(assembly: Assembly, *, solver: str = DEFAULT_SOLVER, method: Method | None = None) -> Program:
+    """Discretize and compile a model.
+
+    Raises ModelError with all its faults, OptionError for a solver that cannot be used.
+    """
+    return compile_program(discretize(assembly), solver, method or Method())
+
+
+def run(
+    assembly: Assembly | Program,
+    *,
+    samples: int = 1000,
+    seed: int = 1,
+    solver: str = DEFAULT_SOLVER,
+    method: Method | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    block: int = BLOCK,
+    progress: Progress | None = None,
+) -> xr.DataTree:
+    """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
+
+    Without `out` the results are kept in memory only. `progress` is called with the number of finished realizations.
+    Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
+    """
+    check_counts(samples=samples, seed=seed, block=block)
+    if out is None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "results.nc"
+            run(assembly, samples=samples, seed=seed, solver=solver, method=method, out=path, block=block, progress=progress)
+            with open_archive(path) as tree:
+                return tree.load()
+    path = Path(out)
+    check_writable(path, overwrite=overwrite, resume=resume)
+    program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
+    start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
+    with start(path, program, seed=seed, samples=samples) as writer:
+        for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows, block=block):
+            writer.append(done)
+            if progress:
+                progress(writer.rows)
+        writer.write_fields()
+    return open_archive(path)
+
+
+def check_counts(**counts: int) -> None:
+    """Raise OptionError for a count that is no whole number, or too small (samples and block 1, seed 0)."""
+    for word, value in counts.items():
+        least = {"samples": 2, "block": 1, "seed": 0}[word]
+        if isinstance(value, bool) or not isinstance(value, int) or value < least:
+            raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above")
+
+
+def check_writable(path: Path, *, overwrite: bool, resume: bool) -> None:
+    """Raise ArchiveError where `path` cannot become an archive, before any work is done."""
+    if path.exists() and not path.is_file():
+        raise ArchiveError(f'archive "{path}" cannot be written: it is not a file')
+    if path.exists() and not (overwrite or resume):
+        raise ArchiveError(f'archive "{path}" exists; choose another name, or ask to overwrite or to resume it')
+    if not path.parent.is_dir():
+        raise ArchiveError(f'archive "{path}" cannot be written: folder "{path.parent}" does not exist; make it first')
+    existed = path.exists()
+    try:
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror}') from error
+    if not existed:
+        path.unlink()

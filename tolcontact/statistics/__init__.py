@@ -1,0 +1,6 @@
+"""Summarize: statistics of measures with their intervals, and displacement fields."""
+
+from tolcontact.statistics.fields import FieldMoments
+from tolcontact.statistics.summary import summarize
+
+__all__ = ["FieldMoments", "summarize"]

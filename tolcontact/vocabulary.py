@@ -1,0 +1,117 @@
+"""Every dimension and variable of an archive: names, units and descriptions, in one place (CF conventions)."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+CONVENTIONS = "CF-1.11"
+STATES = ("raw", "corrected")
+AXES = ("x", "y", "z")
+COMPONENTS = (*AXES, "magnitude")
+
+REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
+AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
+VERTEX, FACE, CORNER, COMPONENT = "vertex", "face", "corner", "component"
+
+STATUS_MEANINGS = ("untouched", "resolved", "not_converged")
+UNFINISHED = -1
+
+
+@dataclass(frozen=True, eq=False)
+class Variable:
+    """A variable of an archive: `kind` is a NumPy type, or str; `units=None` marks labels and texts."""
+
+    name: str
+    dims: tuple[str, ...]
+    kind: Any
+    long_name: str
+    units: str | None = None
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def all_attributes(self) -> dict[str, Any]:
+        units = {} if self.units is None else {"units": self.units}
+        return {"long_name": self.long_name, **units, **self.attributes}
+
+
+def _label(name: str, long_name: str) -> Variable:
+    return Variable(name, (name,), str, long_name)
+
+
+COORDINATES = (
+    Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"}),
+    _label(STATE, "state: raw as located, corrected after contact"),
+    _label(PART, "part"),
+    _label(PAIR, "contact pair"),
+    _label(MEASURE, "measure (key characteristic)"),
+    _label(AXIS, "axis of the nominal assembly frame"),
+    _label(BODY_AXIS, "axis of the part's nominal orientation"),
+)
+
+MEASURED = Variable(
+    "measured",
+    (REALIZATION, STATE, MEASURE),
+    "f8",
+    "value of a measure: displacement of a point, distance of two points, or the user's expression",
+    "mm",
+)
+TRANSLATION = Variable(
+    "translation", (REALIZATION, STATE, PART, AXIS), "f8", "t of the pose x = R x0 + t, x0 in the nominal assembly frame", "mm"
+)
+ROTATION = Variable(
+    "rotation", (REALIZATION, STATE, PART, AXIS, BODY_AXIS), "f8", "R of the pose x = R x0 + t; rows are assembly axes", "1"
+)
+GAP_MIN = Variable(
+    "gap_min", (REALIZATION, STATE, PAIR), "f8", "least gap of all contact points of a pair, negative is penetration", "mm"
+)
+ACTIVE = Variable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
+KKT_RESIDUAL = Variable(
+    "kkt_residual", (REALIZATION,), "f8", "largest residual of the optimality conditions of the contact problem", "mm"
+)
+STATUS = Variable(
+    "status",
+    (REALIZATION,),
+    "i1",
+    "what became of the realization",
+    None,
+    {"flag_values": list(range(len(STATUS_MEANINGS))), "flag_meanings": " ".join(STATUS_MEANINGS)},
+)
+# Written in this order; the status comes last, so that a row that has one is complete.
+ROWS = (MEASURED, TRANSLATION, ROTATION, GAP_MIN, ACTIVE, KKT_RESIDUAL, STATUS)
+
+MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
+MEASURE_TOLERANCE = Variable(
+    "measure_tolerance", (MEASURE,), "f8", "full width of the allowed zone around the nominal value; NaN where none is set"
+)
+MEASURE_UNITS = Variable("measure_units", (MEASURE,), str, "units of the measure")
+
+DECLARATION = Variable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
+MESH_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "vertices of a mesh in its part's own frame", "mm")
+MESH_FACES = Variable("faces", (FACE, CORNER), "i4", "vertex numbers of each triangle, counted from 0")
+
+PAIR_OF_POINT = Variable("pair_of_point", (POINT,), "i4", "number of the pair of each contact point, counted from 0")
+MOVING_PART = Variable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
+REFERENCE_PART = Variable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, counted from 0")
+MOVING_POINT = Variable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
+REFERENCE_POINT = Variable(
+    "reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm"
+)
+REFERENCE_NORMAL = Variable(
+    "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
+)
+
+LOCATOR_LABEL = _label(LOCATOR, "locator, as part.locator")
+DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
+TOLERANCE_RANGE = Variable(
+    "tolerance_range", (LOCATOR,), "f8", "full width of the tolerance zone; NaN where a distribution says everything", "mm"
+)
+DISTRIBUTION = Variable("distribution", (LOCATOR,), str, "distribution of the deviation")
+LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
+LOCATOR_DIRECTION = Variable("locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1")
+
+COMPONENT_LABEL = _label(COMPONENT, "component of the displacement")
+FIELD_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
+FIELD_FACES = MESH_FACES
+FIELD_MEAN = Variable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
+FIELD_SIX_SIGMA = Variable(
+    "six_sigma", (STATE, VERTEX, COMPONENT), "f8", "six standard deviations of the displacement of a surface point", "mm"
+)
