@@ -1,8 +1,8 @@
 """Tolerance analysis of rigid assemblies: Monte-Carlo variation simulation in which contact is resolved.
 
-    declare       Assembly, Box, Mesh, Locator, three_two_one, Tolerance
-    run           run, build, Method
-    look          summarize, open_archive, model_of
+declare       Assembly, Box, Mesh, Locator, three_two_one, Tolerance
+run           run, build, Method
+look          summarize, open_archive, model_of
 """
 
 from tolcontact.archive import model_of, open_archive
@@ -19,8 +19,8 @@ __all__ = [
     "Locator",
     "Mesh",
     "Method",
-    "Tolerance",
     "TolcontactError",
+    "Tolerance",
     "build",
     "main",
     "model_of",

@@ -9,7 +9,7 @@ import platform
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import netCDF4
 import numpy as np
@@ -135,7 +135,8 @@ def model_of(results: xr.DataTree) -> Assembly:
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():
-            meshes[name] = _Triangles(group[words.MESH_VERTICES.name].values, group[words.MESH_FACES.name].values)
+            triangles = group.to_dataset()
+            meshes[name] = _Triangles(triangles[words.MESH_VERTICES.name].values, triangles[words.MESH_FACES.name].values)
     return from_document(document, meshes)
 
 
@@ -144,7 +145,7 @@ class _Triangles:
         self.vertices, self.faces = vertices, faces
 
 
-def _opened(path: Path, mode: str) -> netCDF4.Dataset:
+def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
     try:
         return netCDF4.Dataset(path, mode, format="NETCDF4")
     except OSError as error:
@@ -285,12 +286,12 @@ def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
     _write(group, words.LOCATOR_DIRECTION, np.vstack([part.locator_directions for part in nominal.parts]))
 
 
-def _define(group: netCDF4.Group, variable: Variable) -> None:
+def _define(group: netCDF4.Dataset, variable: Variable) -> None:
     options: dict[str, Any] = {}
     if words.REALIZATION in variable.dims:
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        sizes = [group.dimensions.get(d) or group.parent.dimensions[d] for d in variable.dims if d != words.REALIZATION]
-        options["chunksizes"] = [ROW_CHUNK, *(max(len(size), 1) for size in sizes)]
+        sizes = [len(_dimension(group, d)) for d in variable.dims if d != words.REALIZATION]
+        options["chunksizes"] = [ROW_CHUNK, *(max(size, 1) for size in sizes)]
     if variable is words.STATUS:
         options["fill_value"] = np.int8(words.UNFINISHED)
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
@@ -300,13 +301,20 @@ def _define(group: netCDF4.Group, variable: Variable) -> None:
     created.setncatts(attributes)
 
 
-def _fill(group: netCDF4.Group, variable: Variable, values: Any) -> None:
+def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
+    """A dimension of the group, or of the groups above it."""
+    if name in group.dimensions or group.parent is None:
+        return group.dimensions[name]
+    return _dimension(group.parent, name)
+
+
+def _fill(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
     if variable.kind is str:
         values = np.array(values, dtype=object)
     if np.size(values):
         group[variable.name][...] = values
 
 
-def _write(group: netCDF4.Group, variable: Variable, values: Any) -> None:
+def _write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
     _define(group, variable)
     _fill(group, variable, values)

@@ -49,7 +49,16 @@ def run(
     if out is None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "results.nc"
-            run(assembly, samples=samples, seed=seed, solver=solver, method=method, out=path, block=block, progress=progress)
+            run(
+                assembly,
+                samples=samples,
+                seed=seed,
+                solver=solver,
+                method=method,
+                out=path,
+                block=block,
+                progress=progress,
+            )
             with open_archive(path) as tree:
                 return tree.load()
     path = Path(out)

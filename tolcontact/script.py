@@ -26,7 +26,9 @@ def load_model(path: Path) -> Assembly:
         spec.loader.exec_module(module)
         declare = getattr(module, "assembly", None)
         if not callable(declare):
-            raise ScriptError(f'model script "{path}" has no function assembly(); define one that returns a tolcontact.Assembly')
+            raise ScriptError(
+                f'model script "{path}" has no function assembly(); define one that returns a tolcontact.Assembly'
+            )
         declared = declare()
     except TolcontactError:
         raise

@@ -55,13 +55,25 @@ MEASURED = Variable(
     "mm",
 )
 TRANSLATION = Variable(
-    "translation", (REALIZATION, STATE, PART, AXIS), "f8", "t of the pose x = R x0 + t, x0 in the nominal assembly frame", "mm"
+    "translation",
+    (REALIZATION, STATE, PART, AXIS),
+    "f8",
+    "t of the pose x = R x0 + t, x0 in the nominal assembly frame",
+    "mm",
 )
 ROTATION = Variable(
-    "rotation", (REALIZATION, STATE, PART, AXIS, BODY_AXIS), "f8", "R of the pose x = R x0 + t; rows are assembly axes", "1"
+    "rotation",
+    (REALIZATION, STATE, PART, AXIS, BODY_AXIS),
+    "f8",
+    "R of the pose x = R x0 + t; rows are assembly axes",
+    "1",
 )
 GAP_MIN = Variable(
-    "gap_min", (REALIZATION, STATE, PAIR), "f8", "least gap of all contact points of a pair, negative is penetration", "mm"
+    "gap_min",
+    (REALIZATION, STATE, PAIR),
+    "f8",
+    "least gap of all contact points of a pair, negative is penetration",
+    "mm",
 )
 ACTIVE = Variable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
 KKT_RESIDUAL = Variable(
@@ -80,7 +92,10 @@ ROWS = (MEASURED, TRANSLATION, ROTATION, GAP_MIN, ACTIVE, KKT_RESIDUAL, STATUS)
 
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = Variable(
-    "measure_tolerance", (MEASURE,), "f8", "full width of the allowed zone around the nominal value; NaN where none is set"
+    "measure_tolerance",
+    (MEASURE,),
+    "f8",
+    "full width of the allowed zone around the nominal value; NaN where none is set",
 )
 MEASURE_UNITS = Variable("measure_units", (MEASURE,), str, "units of the measure")
 
@@ -92,9 +107,7 @@ PAIR_OF_POINT = Variable("pair_of_point", (POINT,), "i4", "number of the pair of
 MOVING_PART = Variable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
 REFERENCE_PART = Variable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, counted from 0")
 MOVING_POINT = Variable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
-REFERENCE_POINT = Variable(
-    "reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm"
-)
+REFERENCE_POINT = Variable("reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm")
 REFERENCE_NORMAL = Variable(
     "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
 )
@@ -102,7 +115,11 @@ REFERENCE_NORMAL = Variable(
 LOCATOR_LABEL = _label(LOCATOR, "locator, as part.locator")
 DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
 TOLERANCE_RANGE = Variable(
-    "tolerance_range", (LOCATOR,), "f8", "full width of the tolerance zone; NaN where a distribution says everything", "mm"
+    "tolerance_range",
+    (LOCATOR,),
+    "f8",
+    "full width of the tolerance zone; NaN where a distribution says everything",
+    "mm",
 )
 DISTRIBUTION = Variable("distribution", (LOCATOR,), str, "distribution of the deviation")
 LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
@@ -113,5 +130,9 @@ FIELD_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "surface points of t
 FIELD_FACES = MESH_FACES
 FIELD_MEAN = Variable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
 FIELD_SIX_SIGMA = Variable(
-    "six_sigma", (STATE, VERTEX, COMPONENT), "f8", "six standard deviations of the displacement of a surface point", "mm"
+    "six_sigma",
+    (STATE, VERTEX, COMPONENT),
+    "f8",
+    "six standard deviations of the displacement of a surface point",
+    "mm",
 )

@@ -52,7 +52,13 @@ class Assembly:
         return tuple(self._measures)
 
     def part(
-        self, name: str, geometry: Box | Mesh, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
+        self,
+        name: str,
+        geometry: Box | Mesh,
+        *,
+        at: Any = (0, 0, 0),
+        rotation: Any = (0, 0, 0),
+        fixed: bool | None = None,
     ) -> Part:
         """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
         part = Part(name, geometry, vector(at), vector(rotation), fixed, script_line())
@@ -131,9 +137,7 @@ class Assembly:
             yield from self._strangers(f'locators of "{location.part.name}"', location.declared_at, location.part, location.on)
         for pair in self._pairs:
             yield from _named("contact pair", pair, pair.faults())
-            yield from self._strangers(
-                f'contact pair "{pair.name}"', pair.declared_at, pair.moving.part, pair.reference.part
-            )
+            yield from self._strangers(f'contact pair "{pair.name}"', pair.declared_at, pair.moving.part, pair.reference.part)
         for measure in self._measures:
             yield from _named("measure", measure, measure.faults())
             yield from self._strangers(
@@ -160,10 +164,7 @@ class Assembly:
         for part in parts:
             if part is not None and not any(part is own for own in self._parts):
                 known = ", ".join(own.name for own in self._parts) or "none"
-                yield (
-                    f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of '
-                    f'"{self.name}" are: {known}'
-                )
+                yield (f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {known}')
 
     def __str__(self) -> str:
         rows = [*self._parts, *self._locations, *self._pairs, *self._measures]

@@ -82,7 +82,8 @@ def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
     def location(said: Document) -> Location:
         scheme: ThreeTwoOne | tuple[Locator, ...]
         if isinstance(said["scheme"], dict):
-            scheme = ThreeTwoOne(*(face(f) for f in said["scheme"]["three_two_one"]), inset=said["scheme"]["inset"])
+            primary, secondary, tertiary = map(face, said["scheme"]["three_two_one"])
+            scheme = ThreeTwoOne(primary, secondary, tertiary, said["scheme"]["inset"])
         else:
             scheme = tuple(
                 Locator(one["name"], one["point"], one["direction"], _tolerance_of(one["tolerance"])) for one in said["scheme"]
@@ -132,7 +133,11 @@ def _tolerance(tolerance: Tolerance | None) -> Document | None:
     if isinstance(tolerance.distribution, str):
         return {"range": tolerance.range, "distribution": tolerance.distribution}
     frozen = tolerance.distribution
-    return {"scipy": frozen.dist.name, "args": [float(a) for a in frozen.args], "kwds": {k: float(v) for k, v in frozen.kwds.items()}}
+    return {
+        "scipy": frozen.dist.name,
+        "args": [float(a) for a in frozen.args],
+        "kwds": {k: float(v) for k, v in frozen.kwds.items()},
+    }
 
 
 def _tolerance_of(said: Document | None) -> Tolerance | None:

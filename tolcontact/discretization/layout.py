@@ -18,7 +18,9 @@ def lay_out(mesh: trimesh.Trimesh, scheme: ThreeTwoOne) -> tuple[Locator, ...]:
     corners, normals = zip(*(_frame(mesh, face) for face in scheme.faces), strict=True)
     outward = np.array(normals)
     if abs(np.linalg.det(outward)) < 0.1:
-        raise GeometryFault("the three faces of its 3-2-1 scheme are not independent; choose faces at wide angles to each other")
+        raise GeometryFault(
+            "the three faces of its 3-2-1 scheme are not independent; choose faces at wide angles to each other"
+        )
     # Coordinates a, b, c along edge directions: dual to the normals, so that stepping along one stays on the other two.
     edges = -np.linalg.inv(outward).T
     edges /= np.linalg.norm(edges, axis=1, keepdims=True)
@@ -60,9 +62,7 @@ def _middle(points: np.ndarray, along: np.ndarray) -> float:
     return float(reach.min() + reach.max()) / 2
 
 
-def _place(
-    edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, stations: dict[int, float]
-) -> np.ndarray:
+def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, stations: dict[int, float]) -> np.ndarray:
     """The point on the plane of `face` whose coordinates along the given edges are `stations`."""
     rows = [outward[face], *(edges[axis] for axis in stations)]
     return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *stations.values()]))

@@ -46,7 +46,7 @@ class NominalPart:
     def place(self, p: np.ndarray) -> np.ndarray:
         """Own coordinates (..., 3) to nominal assembly coordinates (..., 3) [mm]."""
         R_WP, t_WP = self.placement
-        return p @ R_WP.T + t_WP
+        return np.asarray(p @ R_WP.T + t_WP)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +93,18 @@ def discretize(assembly: Assembly) -> Nominal:
     """
     faults = list(assembly.faults())
     clean = not faults
-    meshes = {part: _attempt(faults, _where("part", part), surface, part.geometry) for part in assembly.parts
-              if not any(part.geometry.faults())}
+    meshes = {
+        part: _attempt(faults, _where("part", part), surface, part.geometry)
+        for part in assembly.parts
+        if not any(part.geometry.faults())
+    }
     parts = [_nominal_part(assembly, part, meshes.get(part), faults) for part in assembly.parts]
     placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
-    pairs = [_attempt(faults, _where("contact pair", pair), _contact_points, assembly, pair, placed)
-             for pair in assembly.pairs if not any(pair.faults())]
+    pairs = [
+        _attempt(faults, _where("contact pair", pair), _contact_points, assembly, pair, placed)
+        for pair in assembly.pairs
+        if not any(pair.faults())
+    ]
     if clean:
         faults.extend(_immovable(assembly))
     if faults:
@@ -121,9 +127,7 @@ def _where(kind: str, thing: Part | ContactPair) -> str:
     return f'{kind} "{thing.name}" ({thing.declared_at})'
 
 
-def _nominal_part(
-    assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, faults: list[str]
-) -> NominalPart | None:
+def _nominal_part(assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, faults: list[str]) -> NominalPart | None:
     if mesh is None or any(part.faults()):
         return None
     R_WP = Rotation.from_rotvec(part.rotation).as_matrix()
@@ -191,7 +195,8 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
     if not kept.any():
         raise GeometryFault(
             f"its faces never come within {reach:g} mm of each other; the nearest of {len(P_m)} points is "
-            f"{distance.min():g} mm away" + (" and overhangs the rim" if not over.any() else "")
+            f"{distance.min():g} mm away"
+            + (" and overhangs the rim" if not over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
     _, normals, _ = project(P_m[kept], _face_in_place(moving, pair.moving))
@@ -201,7 +206,12 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
             "choose faces that look at each other"
         )
     return ContactPoints(
-        pair.name, assembly.parts.index(moving.part), assembly.parts.index(reference.part), P_m[kept], P_r[kept], n_r[kept]
+        pair.name,
+        assembly.parts.index(moving.part),
+        assembly.parts.index(reference.part),
+        P_m[kept],
+        P_r[kept],
+        n_r[kept],
     )
 
 

@@ -73,7 +73,9 @@ def _field_table(summary: xr.Dataset) -> Table:
 
 def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
-    by_status = ", ".join(f"{int(n)} {m}" for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True))
+    by_status = ", ".join(
+        f"{int(n)} {m}" for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)
+    )
     yield f"status: {by_status}"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
     yield f"largest true penetration: raw {raw:.3g} mm, corrected {corrected:.3g} mm"

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.simulation.scan import PairScan, pair_scan
+from tolcontact.simulation.scan import pair_scan
 from tolcontact.symbolic import ContactGroup, Program
 
 ROUNDS = 60
 KEPT = 8
-PENETRATION = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +58,12 @@ class ContactResolver:
         poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw.
         """
         gaps = [scan.gaps(relative[:, pair]) for scan, pair in zip(self._scans, self.pairs, strict=True)]
-        rows = np.flatnonzero(np.any([gap.min(axis=1) < -PENETRATION for gap in gaps], axis=0))
+        rows = np.flatnonzero(np.any([gap.min(axis=1) < -self._tolerance for gap in gaps], axis=0))
         gaps = [gap[rows] for gap in gaps]
         active = [gap < self._activity for gap in gaps]
         moments = np.concatenate([scan.moments(on) for scan, on in zip(self._scans, active, strict=True)], axis=1)
         may_carry = [np.ones_like(on) if self._closed else on for on in active]
-        result = Resolution(
-            rows, poses[rows][:, self.parts].copy(), np.full(len(rows), np.inf), np.full(len(rows), np.inf)
-        )
+        result = Resolution(rows, poses[rows][:, self.parts].copy(), np.full(len(rows), np.inf), np.full(len(rows), np.inf))
         slots = [Slots.empty(len(rows), self._slots) for _ in self._scans]
         open_ = np.arange(len(rows))
         raw = poses[rows][:, self.parts]

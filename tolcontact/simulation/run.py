@@ -13,9 +13,7 @@ from tolcontact.symbolic import Program
 BLOCK = 1000
 
 
-def simulate_blocks(
-    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK
-) -> Iterator[Block]:
+def simulate_blocks(program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK) -> Iterator[Block]:
     """Realizations `start` to `samples` in blocks. The realization k is the same in any block and any run."""
     resolvers = [ContactResolver(program, group) for group in program.groups]
     for first in range(start, samples, block):

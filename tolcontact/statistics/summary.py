@@ -1,5 +1,6 @@
 """What a run says about each measure, each part and the contact, read from its archive alone."""
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -17,7 +18,7 @@ STATISTICS: dict[str, Callable[[np.ndarray], Estimate]] = {
     "standard deviation": intervals.standard_deviation,
     "6 sigma": lambda x: intervals.standard_deviation(x, times=6),
     "variance": intervals.variance,
-    **{f"{percent:g} %": (lambda x, p=percent: intervals.percentile(x, p)) for percent in PERCENTILES},
+    **{f"{percent:g} %": functools.partial(intervals.percentile, percent=percent) for percent in PERCENTILES},
 }
 OUTSIDE = "outside tolerance"
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
@@ -72,7 +73,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
 
 def finished(results: xr.DataTree) -> np.ndarray:
     """Numbers of the rows that were written completely, (row,)."""
-    status = results[words.STATUS.name].values
+    status = results.to_dataset()[words.STATUS.name].values
     return np.flatnonzero(np.isfinite(status) & (status != words.UNFINISHED))
 
 
@@ -91,7 +92,7 @@ def _change(raw: np.ndarray, corrected: np.ndarray) -> list[Estimate]:
 
 def _field_extremes(results: xr.DataTree, rows: xr.Dataset, part: str) -> list[list[Estimate]]:
     """Interval of 6 sigma of |u| at the points where the archived field is least and largest, per state."""
-    field = results[f"field/{part}"]
+    field = results["field"].children[part].to_dataset()
     extremes = []
     for state in words.STATES:
         chosen = {words.STATE: state, words.PART: part}

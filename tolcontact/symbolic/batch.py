@@ -65,9 +65,9 @@ class _Buffered:
         self._outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
         self.sizes_out = [output.size // width for output in self._outputs]
         for i, array in enumerate(self._inputs):
-            self._buffer.set_arg(i, memoryview(array))
+            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self._outputs):
-            self._buffer.set_res(i, memoryview(array))
+            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         self._fresh = True
 
     def __call__(self, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> bool:

@@ -65,9 +65,7 @@ class Group:
 
 def contact_groups(nominal: Nominal) -> list[Group]:
     """The groups of parts that contact couples: what touches only fixed parts in common stays apart."""
-    chains = [
-        tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts
-    ]
+    chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
         joined = set(chains[pair.moving]) | set(chains[pair.reference])
@@ -80,9 +78,7 @@ def contact_groups(nominal: Nominal) -> list[Group]:
 
 def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...]) -> Group:
     own = [
-        (index, pair)
-        for index, pair in enumerate(nominal.pairs)
-        if {*chains[pair.moving], *chains[pair.reference]} & set(free)
+        (index, pair) for index, pair in enumerate(nominal.pairs) if {*chains[pair.moving], *chains[pair.reference]} & set(free)
     ]
     parts = tuple(sorted({*free, *(part for _, pair in own for part in (pair.moving, pair.reference))}))
     points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
@@ -216,9 +212,7 @@ def _conditioned(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
     factors = [ca.chol(ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS])) for k in movers]
     blocks = [
         [
-            ca.SX.eye(FREEDOMS)
-            if i == j
-            else ca.solve(U_i.T, ca.solve(U_j.T, Q[i : i + FREEDOMS, j : j + FREEDOMS].T).T)
+            ca.SX.eye(FREEDOMS) if i == j else ca.solve(U_i.T, ca.solve(U_j.T, Q[i : i + FREEDOMS, j : j + FREEDOMS].T).T)
             for j, U_j in zip(movers, factors, strict=True)
         ]
         for i, U_i in zip(movers, factors, strict=True)
@@ -227,7 +221,13 @@ def _conditioned(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _objective(
-    group: Group, method: Method, moments: ca.SX, raw: Sequence[Pose], moves: Sequence[Twist], twists: Sequence[Twist], z: ca.SX
+    group: Group,
+    method: Method,
+    moments: ca.SX,
+    raw: Sequence[Pose],
+    moves: Sequence[Twist],
+    twists: Sequence[Twist],
+    z: ca.SX,
 ) -> ca.SX:
     """Q of (11) in the variables z, divided by the number of active points."""
     energy = ca.SX(0)

@@ -40,9 +40,7 @@ class Twist:
 
 def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:
     """The increments of the movers from the QP's variables, all of them in mm: (dt, length * w) for each mover."""
-    return [
-        Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)
-    ]
+    return [Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)]
 
 
 def total(part: Carried, raw: Pose, movers: Sequence[Twist]) -> Twist:

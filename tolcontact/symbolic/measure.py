@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
+import numpy as np
 
 from tolcontact.assembly import Measure, Part, Point
 from tolcontact.discretization import Nominal
@@ -63,7 +64,7 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose]) -> ca
         now = SymbolicPoses(nominal, poses)
         start = ca.DM(nominal.place(measure.of)) if measure.to is None else now.position(measure.of)
         end = now.position(measure.to or measure.of)
-        return ca.dot(ca.DM(measure.along), end - start)
+        return ca.dot(ca.DM(np.array(measure.along)), end - start)
     value: Any = replay(measure.of, poses) if isinstance(measure.of, tuple) else measure.of(SymbolicPoses(nominal, poses))
     expression = ca.SX(value)
     if expression.shape != (1, 1):

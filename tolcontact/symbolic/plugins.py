@@ -26,7 +26,11 @@ PLUGINS = {
     plugin.name: plugin
     for plugin in (
         Plugin("qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}),
-        Plugin("osqp", {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}}, 1e-5),
+        Plugin(
+            "osqp",
+            {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}},
+            1e-5,
+        ),
         Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}, 1e-5),
         Plugin("highs", {"highs": {"output_flag": False}}, 1e-6),

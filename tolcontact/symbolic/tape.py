@@ -60,7 +60,7 @@ def replay(tape: Tape, poses: Sequence[Pose]) -> ca.SX:
     entries = ca.vertcat(*(pose.vector() for pose in poses))
     if entries.numel() != ENTRIES * len(poses):
         raise ValueError("a tape needs 12 entries for each pose")
-    values: list[Any] = []
+    values: list[ca.SX] = []
     for operation, *operands in tape:
         if operation == "input":
             values.append(entries[operands[0]])
