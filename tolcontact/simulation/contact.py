@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.simulation.scan import pair_scan
-from tolcontact.symbolic import ContactGroup, Program
+from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
+CLUSTERS = 6
 KEPT = 8
 
 
@@ -39,6 +40,7 @@ class ContactResolver:
         self.pairs = np.array(group.group.pairs)
         self._slots = group.slots
         self._solve = group.solve
+        self._accuracy = program.plugin.accuracy
         self._tolerance = program.plugin.accuracy / 100
         self._activity = program.method.activity
         self._closed = program.method.active_set == "closed"
@@ -47,7 +49,7 @@ class ContactResolver:
                 program.nominal.pairs[pair],
                 program.gaps[pair],
                 [side.table for side in group.group.sides if side.pair == position],
-                group.slots,
+                CLUSTERS,
             )
             for position, pair in enumerate(group.group.pairs)
         ]
@@ -79,6 +81,21 @@ class ContactResolver:
             gaps, slots = self._solve_round(result, open_, raw, moments, may_carry, slots)
         return result
 
+    def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
+        """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
+
+        qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there.
+        """
+        answer, _ = self._solve(**problems)
+        for k in np.flatnonzero(~(_residual(answer) <= self._accuracy)):
+            one = {name: values[k : k + 1] for name, values in problems.items()}
+            self._solve(**{**one, "filled": np.zeros_like(one["filled"])})
+            again, _ = self._solve(**one)
+            if _residual(again)[0] < _residual(answer)[k]:
+                for name, values in again.items():
+                    answer[name][k] = values[0]
+        return answer
+
     def _solve_round(
         self,
         result: Resolution,
@@ -90,7 +107,7 @@ class ContactResolver:
     ) -> "tuple[list[np.ndarray], list[Slots]]":
         """Solve the QPs of the open realizations, note the answers, and return linearized gaps and slots after it."""
         held = [(scan, s.points) for scan, s in zip(self._scans, slots, strict=True)]
-        answer, failed = self._solve(
+        answer = self._answer(
             poses=raw[open_],
             moments=moments[open_],
             P_m=np.concatenate([scan.P_m[points] for scan, points in held], axis=1),
@@ -98,20 +115,27 @@ class ContactResolver:
             n_r=np.concatenate([scan.n_r[points] for scan, points in held], axis=1),
             filled=np.concatenate([s.filled for s in slots], axis=1),
         )
-        linearized = answer["linearized"].reshape(len(open_), len(self._scans), -1)
+        linearized = answer["linearized"].reshape(len(open_), len(self._scans), ENTRIES)
         gaps = [scan.gaps(linearized[:, k]) for k, scan in enumerate(self._scans)]
         inside = [np.where(may_carry[k][open_], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
         slack = answer["slack"][:, 0]
         # With the rows in conflict every carrying point stays inside by the slack; only what exceeds it is left undone.
         left = np.maximum(np.max(inside, axis=0) - np.maximum(slack, 0), 0)
-        residual = np.maximum.reduce([answer["stationarity"][:, 0], answer["natural_residual"][:, 0], left])
-        solved = ~failed & np.isfinite(answer["corrected"]).all(axis=1)
-        result.poses[open_[solved]] = answer["corrected"].reshape(len(open_), len(self.parts), -1)[solved]
+        residual = np.maximum(_residual(answer), left)
+        solved = np.isfinite(residual)
+        result.poses[open_[solved]] = answer["corrected"].reshape(len(open_), len(self.parts), ENTRIES)[solved]
         result.residual[open_] = np.where(solved, residual, np.inf)
         result.slack[open_] = slack
         multipliers = np.split(answer["multipliers"], len(self._scans), axis=1)
         gaps = [np.where(solved[:, None], gap + np.maximum(slack, 0)[:, None], np.inf) for gap in gaps]
         return gaps, [s.carrying(m) for s, m in zip(slots, multipliers, strict=True)]
+
+
+def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:
+    """KKT residual (row,) [mm]; infinite where the solver gave nothing usable."""
+    residual = np.maximum(answer["stationarity"], answer["natural_residual"])[:, 0]
+    usable = np.isfinite(residual) & np.isfinite(answer["corrected"]).all(axis=1)
+    return np.where(usable, residual, np.inf)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from tolcontact.sampling import draw
 from tolcontact.simulation.block import Block, Status
 from tolcontact.simulation.contact import ContactResolver
 from tolcontact.simulation.scan import pair_scan
-from tolcontact.symbolic import Program
+from tolcontact.symbolic import ENTRIES, Program
 
 BLOCK = 1000
 
@@ -29,7 +29,7 @@ def simulate_block(
         resolvers = [ContactResolver(program, group) for group in program.groups]
     nominal, count = program.nominal, len(deviations)
     placed, _ = program.place(deviations=deviations)
-    raw = placed["poses"].reshape(count, len(nominal.parts), -1)
+    raw = placed["poses"].reshape(count, len(nominal.parts), ENTRIES)
     measured_raw, relative_raw = _observe(program, raw)
 
     poses = raw.copy()
@@ -68,4 +68,4 @@ def simulate_block(
 def _observe(program: Program, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
     seen, _ = program.observe(poses=poses)
-    return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), -1)
+    return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

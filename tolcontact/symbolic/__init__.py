@@ -1,6 +1,7 @@
 """Compile: poses, gaps and measures as CasADi expressions, and the one QP Function. CasADi stays in this folder."""
 
 from tolcontact.symbolic.plugins import usable_plugins
+from tolcontact.symbolic.pose import ENTRIES
 from tolcontact.symbolic.program import ContactGroup, Program, compile_program
 
-__all__ = ["ContactGroup", "Program", "compile_program", "usable_plugins"]
+__all__ = ["ENTRIES", "ContactGroup", "Program", "compile_program", "usable_plugins"]

@@ -24,6 +24,7 @@ class Batch:
     """
 
     def __init__(self, function: ca.Function) -> None:
+        function = _dense(function)
         self._names = function.name_in()
         self._results = function.name_out()
         self._many = _Buffered(function.map(WIDTH), WIDTH)
@@ -36,7 +37,10 @@ class Batch:
         (realization, entry), and `failed` (realization,): those whose evaluation gave up; their outputs are NaN.
         """
         count = len(next(iter(arrays.values())))
-        flat = [np.ascontiguousarray(arrays[name], dtype=float).reshape(count, -1) for name in self._names]
+        flat = [
+            np.ascontiguousarray(arrays[name], dtype=float).reshape(count, size)
+            for name, size in zip(self._names, self._one.sizes_in, strict=True)
+        ]
         results = [np.empty((count, size)) for size in self._one.sizes_out]
         failed = np.zeros(count, dtype=bool)
         start = 0
@@ -56,6 +60,13 @@ class Batch:
         return dict(zip(self._results, results, strict=True)), failed
 
 
+def _dense(function: ca.Function) -> ca.Function:
+    """The same Function with dense outputs: buffers hold stored entries only, and a structural zero is not one."""
+    inputs = [ca.MX.sym(name, *function.size_in(name)) for name in function.name_in()]
+    outputs = [ca.densify(output) for output in function.call(inputs)]
+    return ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out())
+
+
 class _Buffered:
     """One Function with arrays that stay where they are."""
 
@@ -63,6 +74,7 @@ class _Buffered:
         self._buffer, self._evaluate = function.buffer()
         self._inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
         self._outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
+        self.sizes_in = [array.size // width for array in self._inputs]
         self.sizes_out = [output.size // width for output in self._outputs]
         for i, array in enumerate(self._inputs):
             self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]

@@ -25,6 +25,7 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 
 SLOTS = 12
 SLACK = 1e-3
+FAR = 1e3
 INPUTS = ("poses", "moments", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "multipliers", "stationarity", "natural_residual", "slack")
 
@@ -80,15 +81,14 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     own = [
         (index, pair) for index, pair in enumerate(nominal.pairs) if {*chains[pair.moving], *chains[pair.reference]} & set(free)
     ]
-    parts = tuple(sorted({*free, *(part for _, pair in own for part in (pair.moving, pair.reference))}))
+    moved = {part for part, chain in enumerate(chains) if {*chain} & {*free}}
+    parts = tuple(sorted(moved.union(*((pair.moving, pair.reference) for _, pair in own))))
     points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
     for _, pair in own:
         points[pair.moving].append(pair.P_m)
         points[pair.reference].append(pair.P_r)
-    # A mover without contact points of its own turns about those of the parts that it carries.
-    for part in free:
-        points[part] = points[part] or [p for other in parts if part in chains[other] for p in points[other]]
-    centre = {part: np.vstack(points[part]).mean(axis=0) for part in parts}
+    # A part without contact points of its own turns about those of the last part that moves it.
+    centre = {part: np.vstack(points[part] or points[chains[part][-1]]).mean(axis=0) for part in parts}
     references = {pair.reference for _, pair in own}
     sides = [
         Side(position, parts.index(part), P, centre[part])
@@ -177,10 +177,10 @@ def _around_the_solver(
             rows.append(ca.substitute(ca.jacobian(g, X), X, now) @ by_z)
             constants.append(ca.substitute(g, X, now))
     H, U = _conditioned(_objective(group, method, moments, raw, moves, twists, z))
-    # An empty slot is the row 0 >= -1: never binding, and free of the infinities that some plugins dislike.
-    A = ca.solve(U.T, ca.vertcat(*rows).T).T
-    A = ca.horzcat(A, ca.SX(SLACK * ca.DM.ones(len(rows)))) * ca.repmat(filled, 1, z.numel() + 1)
-    lower = -filled * ca.vertcat(*constants) - (1 - filled)
+    A = ca.horzcat(ca.solve(U.T, ca.vertcat(*rows).T).T, ca.DM(np.full(len(rows), SLACK)))
+    idle, far = _idle_rows(*A.shape), -FAR * group.length
+    A = ca.if_else(ca.repmat(filled, 1, A.size2()), A, idle)
+    lower = ca.if_else(filled, -ca.vertcat(*constants), far)
     H = ca.diagcat(H, 1)
     assemble = ca.Function("assemble", inputs, [H, A, lower, U], list(INPUTS), ["h", "a", "lower", "u"])
 
@@ -191,7 +191,7 @@ def _around_the_solver(
     lower_in = ca.SX.sym("lower", len(rows))
     price = ca.vertcat(ca.SX.zeros(z.numel()), group.length)
     stationarity = ca.norm_inf(H_in @ x + price + A_in.T @ lam_a + lam_x)
-    natural = ca.norm_inf(ca.fmin(A_in @ x - lower_in, -lam_a) * filled)
+    natural = ca.norm_inf(ca.fmin(A_in @ x - lower_in, -lam_a))
     results = [
         ca.vertcat(*(pose.vector() for pose in poses)),
         ca.vertcat(*linearized),
@@ -204,6 +204,17 @@ def _around_the_solver(
     results = [ca.substitute(result, z, step) for result in results]
     finish = ca.Function("finish", [*inputs, H_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
     return assemble, finish
+
+
+def _idle_rows(rows: int, columns: int) -> ca.DM:
+    """Rows for empty slots, in general position; with a bound far away they never bind.
+
+    Rows of zeros would do for other plugins, but qpOASES starts from the rows that carried in the previous problem, and
+    fails where one of those has become zero.
+    """
+    directions = np.random.default_rng(0).normal(size=(rows, columns))
+    directions[:, -1] = 0
+    return ca.DM(directions / np.linalg.norm(directions, axis=1, keepdims=True))
 
 
 def _conditioned(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
