@@ -185,13 +185,15 @@ def _declaration(program: Program) -> str:
 
 
 def _check_same_run(path: Path, program: Program, settings: Mapping[str, Any]) -> None:
-    with open_archive(path) as there:
-        if str(there["model"][words.DECLARATION.name].values) != _declaration(program):
+    open_archive(path).close()
+    with netCDF4.Dataset(path) as there:
+        if there["model"][words.DECLARATION.name][...] != _declaration(program):
             raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
         for word, value in settings.items():
-            if word != "samples" and there.attrs.get(word) != value:
+            was = getattr(there, word, None)
+            if word != "samples" and was != value:
                 raise ArchiveError(
-                    f'"{path}" was run with {word} = {there.attrs.get(word)}, now it is {value}; '
+                    f'"{path}" was run with {word} = {was}, now it is {value}; '
                     "resume with the same, or write to a new file"
                 )
 

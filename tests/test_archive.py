@@ -1,0 +1,178 @@
+"""The archive alone: what it holds, recomputes, rebuilds, and survives."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import cf_xarray  # noqa: F401
+import netCDF4
+import numpy as np
+import pytest
+import trimesh
+import xarray as xr
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tolcontact.errors import ArchiveError
+
+DATA = ("measured", "translation", "rotation", "gap_min", "active", "status", "kkt_residual")
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    path = tmp_path_factory.mktemp("archive") / "stack.nc"
+    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path).close()
+    return path
+
+
+def rows(path):
+    with xr.open_dataset(path) as root, xr.open_dataset(path, group="sample") as sample:
+        return {name: root[name].values for name in DATA} | {"deviation": sample["deviation"].values}
+
+
+def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(archive):
+    root, contact = xr.open_dataset(archive), xr.open_dataset(archive, group="contact")
+    for pair in range(root.sizes["pair"]):
+        points = contact.isel(point=np.flatnonzero(contact.pair_of_point == pair))
+        moving, reference = int(contact.moving_part[pair]), int(contact.reference_part[pair])
+        where = [
+            root.rotation.isel(part=part).values @ p.values.T + root.translation.isel(part=part).values[..., None]
+            for part, p in ((moving, points.moving_point), (reference, points.reference_point))
+        ]
+        n = root.rotation.isel(part=reference).values @ points.reference_normal.values.T
+        n /= np.linalg.norm(n, axis=2, keepdims=True)
+        gaps = ((where[0] - where[1]) * n).sum(axis=2)
+        assert np.abs(gaps.min(axis=2) - root.gap_min.isel(pair=pair).values).max() < 1e-9
+
+
+def test_it_recomputes_its_own_measures(archive):
+    root = xr.open_dataset(archive)
+    corner = np.array([15.0, 15, 30])
+    moved = root.rotation.sel(part="upper").values @ corner + root.translation.sel(part="upper").values
+    assert np.abs(moved[..., 2] - 30 - root.measured.sel(measure="top").values).max() < 1e-12
+
+
+def test_it_follows_the_cf_conventions(archive):
+    root = xr.open_dataset(archive)
+    assert root.attrs["Conventions"].startswith("CF-1.")
+    assert {"title", "history", "source", "references", "solver", "seed", "eta", "regularization"} <= set(root.attrs)
+    assert root.realization.attrs["standard_name"] == "realization"
+    assert (root.status.cf == "resolved").sum() > 100
+    with netCDF4.Dataset(archive) as file:
+        assert file.dimensions["realization"].isunlimited()
+        assert file["rotation"].chunking()[0] == 1000
+        groups = [file, *file.groups.values(), *file["field"].groups.values()]
+        for variable in (v for group in groups for v in group.variables.values()):
+            assert variable.long_name
+            is_label = variable.dtype is str or variable.name in ("faces", "status") or "part" in variable.name
+            assert is_label or variable.name in ("pair_of_point",) or "measure_" in variable.name or variable.units
+
+
+def test_fields_are_those_of_the_archived_poses(archive):
+    tree = xr.open_datatree(archive)
+    field = tree["field/upper"].to_dataset()
+    for state in ("raw", "corrected"):
+        R, t = (tree[name].sel(part="upper", state=state).values for name in ("rotation", "translation"))
+        v = field.vertices.values[:7]
+        u = np.einsum("kij,vj->kvi", R, v) + t[:, None] - v
+        u = np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
+        assert np.abs(field["mean"].sel(state=state).values[:7] - u.mean(axis=0)).max() < 1e-12
+        assert np.abs(field.six_sigma.sel(state=state).values[:7] - 6 * u.std(axis=0, ddof=1)).max() < 1e-11
+
+
+def with_everything(tmp_path):
+    """A model that uses every way to declare a thing."""
+    wedge = trimesh.creation.box(bounds=[[0, 0, 0], [30, 20, 8]])
+    wedge.export(tmp_path / "block.stl")
+    a = tc.Assembly("everything")
+    base = a.part("base part", tc.Mesh(trimesh.creation.box(bounds=[[0, 0, 0], [60, 40, 10]])), fixed=True)
+    block = a.part("block", tc.Mesh(tmp_path / "block.stl"), at=(10, 10, 10), rotation=(0, 0, 0.1))
+    frozen = {"Z": stats.gamma(2, scale=0.02, loc=-0.04), "Y2": stats.norm(0, 0.1)}
+    scheme = [tc.Locator(one.name, one.point, one.direction, frozen.get(one.name, 0.5)) for one in cases.translating(0)]
+    a.locate(block, scheme)
+    upward = base.face(lambda centres, normals: (normals[:, 2] > 0.9) & (centres[:, 2] > 9))
+    a.contact("joint", moving=block.face("-z"), reference=upward, spacing=6.0, within=2.0)
+    a.contact("corners", moving=block.face([*range(12)]), reference=base.face("+z"), points="vertices", within=1.0)
+    a.measure("height", block.point(0, 0, 8), along=(0, 0.6, 0.8), tolerance=1)
+    a.measure("gap", base.point(0, 0, 10), to=block.point(0, 0, 0), along="z")
+    a.measure("tilt", lambda poses: poses.rotation(block)[2, 0] * 2 + 1, units="rad")
+    return a
+
+
+def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
+    first = tc.run(with_everything(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc")
+    (tmp_path / "block.stl").unlink()
+    rebuilt = tc.model_of(tc.open_archive(tmp_path / "first.nc"))
+    second = tc.run(rebuilt, samples=200, seed=2, solver="daqp")
+    for name in DATA:
+        assert (first[name].values == second[name].values).all(), name
+    assert json.loads(str(first["model"]["declaration"].values)) == json.loads(str(second["model"]["declaration"].values)) | {
+        "pairs": json.loads(str(first["model"]["declaration"].values))["pairs"]
+    } | {"parts": json.loads(str(first["model"]["declaration"].values))["parts"]}
+    assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
+
+
+def test_a_run_in_memory_is_the_same_as_its_archive(archive):
+    tree = tc.run(cases.stack(), samples=300, seed=3, solver="daqp")
+    for name, values in rows(archive).items():
+        there = tree["sample"][name] if name == "deviation" else tree[name]
+        assert (there.values == values).all()
+
+
+def test_resume_gives_the_same_data_as_an_undisturbed_run(archive, tmp_path):
+    path = tmp_path / "grown.nc"
+    for samples in (70, 131, 300):
+        tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True, block=50).close()
+    for name, values in rows(path).items():
+        assert (values == rows(archive)[name]).all(), name
+    fields = [xr.open_dataset(p, group="field/middle") for p in (path, archive)]
+    assert (fields[0].six_sigma.values == fields[1].six_sigma.values).all()
+
+
+SCRIPT = """
+import sys
+from tests import cases
+import tolcontact as tc
+tc.run(cases.stack(), samples=20000, seed=3, solver="daqp", out=sys.argv[1], block=100)
+"""
+
+
+@pytest.mark.parametrize("after", [6, 15])
+def test_a_killed_run_keeps_its_rows_and_goes_on(after, tmp_path):
+    path = tmp_path / "killed.nc"
+    environment = {**os.environ, "HDF5_USE_FILE_LOCKING": "FALSE"}
+    run = subprocess.Popen([sys.executable, "-c", SCRIPT, path], env=environment)
+    # Wait for the first rows by the file's growth alone, then let it run for some more blocks.
+    size, deadline = 0, time.monotonic() + 60
+    grown = 0
+    while grown < after and time.monotonic() < deadline:
+        time.sleep(0.02)
+        now = path.stat().st_size if path.exists() else 0
+        grown, size = grown + (now > size), max(now, size)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    with netCDF4.Dataset(path) as file:
+        status = file["status"][:]
+    written = int((~np.ma.getmaskarray(status)).sum())
+    assert 0 < written < 20_000
+    samples = written + 150
+    tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True).close()
+    whole = tmp_path / "whole.nc"
+    tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=whole).close()
+    for name, values in rows(whole).items():
+        assert (rows(path)[name][:samples] == values).all(), name
+
+
+def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(archive):
+    before = archive.read_bytes()
+    with pytest.raises(ArchiveError, match="seed = 3, now it is 4"):
+        tc.run(cases.stack(), samples=300, seed=4, solver="daqp", out=archive, resume=True)
+    with pytest.raises(ArchiveError, match="another model"):
+        tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
+    with pytest.raises(ArchiveError, match="exists"):
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
+    assert archive.read_bytes() == before

@@ -1,0 +1,63 @@
+"""Intervals that cover, fields that equal the plain sums."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.spatial.transform import Rotation
+
+from tolcontact.statistics import FieldMoments, intervals
+
+SAMPLES, REPEATS = 1000, 1000
+
+
+def cut(rng, size):
+    """What contact does to a normal variable: max(0, g). And g."""
+    g = rng.normal(size=size)
+    return np.maximum(g, 0), g
+
+
+TRUTH = {
+    "mean": (lambda x, g: intervals.mean(x), 0.398942),
+    "variance": (lambda x, g: intervals.variance(x), 0.340845),
+    "6 sigma": (lambda x, g: intervals.standard_deviation(x, times=6), 6 * np.sqrt(0.340845)),
+    "95 %": (lambda x, g: intervals.percentile(x, 95), stats.norm.ppf(0.95)),
+    "share": (lambda x, g: intervals.share(x > 1), stats.norm.sf(1)),
+    "variance ratio": (lambda x, g: intervals.variance_ratio(x, g), 0.340845),
+    "shift": (lambda x, g: intervals.mean(x - g), 0.398942),
+}
+
+
+@pytest.mark.parametrize("name", TRUTH)
+def test_intervals_cover_the_truth_in_95_of_100(name):
+    estimate, truth = TRUTH[name]
+    rng = np.random.default_rng(11)
+    found = np.array([estimate(*cut(rng, SAMPLES)) for _ in range(REPEATS)])
+    covered = ((found[:, 1] <= truth) & (truth <= found[:, 2])).mean()
+    # 3.3 standard errors of the coverage itself, and 1 % for the asymptotics at N = 1000.
+    assert 0.95 - 0.033 < covered < 0.95 + 0.023 + 0.01
+    assert (found[:, 1] <= found[:, 0]).all() and (found[:, 0] <= found[:, 2]).all()
+
+
+def test_a_percentile_beyond_the_sample_has_no_bound():
+    _, lower, upper = intervals.percentile(np.random.default_rng(0).normal(size=1000), 0.135)
+    assert lower == -np.inf and np.isfinite(upper)
+
+
+def test_a_constant_has_no_spread():
+    x = np.full(100, 3.0)
+    assert intervals.variance(x) == (0, 0, 0)
+    assert np.isnan(intervals.variance_ratio(x, x)).all()
+
+
+def test_fields_equal_the_plain_sums_over_realizations():
+    rng = np.random.default_rng(2)
+    v = rng.normal(size=(30, 3)) * 50 + [1000, 0, 0]
+    R = Rotation.from_rotvec(rng.normal(size=(700, 3)) * 0.05).as_matrix()
+    t = rng.normal(size=(700, 3))
+    moments = FieldMoments(v)
+    for part in (slice(0, 1), slice(1, 400), slice(400, 700)):
+        moments.add(R[part], t[part])
+    u = np.einsum("kij,vj->kvi", R - np.eye(3), v) + t[:, None]
+    u = np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
+    assert np.abs(moments.mean() - u.mean(axis=0)).max() < 1e-10
+    assert np.abs(moments.six_sigma() - 6 * u.std(axis=0, ddof=1)).max() < 1e-9

@@ -1,0 +1,70 @@
+"""The walls of the house, read from the imports: one direction, and libraries kept in their rooms."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
+FILES = sorted(PACKAGE.rglob("*.py"))
+
+# Who may import a library: folders and files, relative to the package.
+ROOMS = {
+    "casadi": ("symbolic/",),
+    "matplotlib": ("report/",),
+    "plotly": ("report/",),
+    "pyvista": ("report/",),
+    "numba": (),
+    "netCDF4": ("archive.py",),
+    "typer": ("cli.py",),
+    "trimesh": ("discretization/",),
+}
+NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
+# From the top of the flow to its end; a room imports from rooms that stand before it.
+ORDER = (
+    "errors", "vocabulary", "method", "assembly", "discretization", "symbolic", "sampling", "simulation", "statistics",
+    "archive", "running", "report", "script", "cli", "__init__",
+)  # fmt: skip
+
+
+def imports(file: Path) -> set[str]:
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{file}: relative import"
+            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    return names
+
+
+def room(name: str) -> str:
+    return name.split("/", maxsplit=1)[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
+def test_imports_keep_to_the_walls(file):
+    where = str(file.relative_to(PACKAGE))
+    own = ORDER.index(room(where))
+    for name in imports(file):
+        library = name.split(".")[0]
+        if library in ROOMS:
+            assert where.startswith(ROOMS[library]) if ROOMS[library] else False, f"{where} imports {library}"
+        if library in NOT_IN:
+            assert not where.startswith(NOT_IN[library]), f"{where} imports {library}"
+        if library == "tolcontact" and name != "tolcontact":
+            other = name.split(".")[1]
+            if other in ORDER:
+                assert ORDER.index(other) <= own, f"{where} imports {name}, which stands below it"
+
+
+def test_every_room_is_in_the_order():
+    assert {room(str(f.relative_to(PACKAGE))) for f in FILES} == set(ORDER)
+
+
+def test_no_import_is_hidden_in_a_function():
+    for file in FILES:
+        for function in ast.walk(ast.parse(file.read_text())):
+            if isinstance(function, ast.FunctionDef):
+                hidden = [n for n in ast.walk(function) if isinstance(n, ast.Import | ast.ImportFrom)]
+                assert not hidden, f"{file}: {function.name}"
