@@ -193,8 +193,7 @@ def _check_same_run(path: Path, program: Program, settings: Mapping[str, Any]) -
             was = getattr(there, word, None)
             if word != "samples" and was != value:
                 raise ArchiveError(
-                    f'"{path}" was run with {word} = {was}, now it is {value}; '
-                    "resume with the same, or write to a new file"
+                    f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
                 )
 
 

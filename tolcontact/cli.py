@@ -63,7 +63,8 @@ def run(
             program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume,
             progress=lambda done: bar.update(task, completed=done),
         )  # fmt: skip
-    _print_summary(results)
+    with results:
+        _print_summary(results)
     if out is not None:
         typer.echo(f"\narchive: {out}")
 
@@ -71,7 +72,8 @@ def run(
 @app.command()
 def summary(archive: Archive) -> None:
     """Print the statistics of an archive."""
-    _print_summary(open_archive(archive))
+    with open_archive(archive) as results:
+        _print_summary(results)
 
 
 @app.command()

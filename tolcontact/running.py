@@ -64,6 +64,8 @@ def run(
     path = Path(out)
     check_writable(path, overwrite=overwrite, resume=resume)
     program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
+    if overwrite and not resume:
+        path.unlink(missing_ok=True)  # whoever still reads the old file keeps it
     start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
     with start(path, program, seed=seed, samples=samples) as writer:
         for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows, block=block):

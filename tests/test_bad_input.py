@@ -1,0 +1,208 @@
+"""Each mistake gets one message that names the thing at fault, exit code 2, and leaves files alone."""
+
+import contextlib
+import io
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import pytest
+
+import tolcontact as tc
+from tolcontact.cli import command_line
+
+HEADER = """
+import math
+import tolcontact as tc
+
+def assembly():
+    a = tc.Assembly("A")
+    base = a.part("base", tc.Box(100, 50, 10))
+    top = a.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    held = tc.three_two_one(base.face("-z"), base.face("-y"), base.face("-x"), inset=5)
+    scheme = tc.three_two_one(top.face("-z"), top.face("+y"), top.face("-x"), inset=5)
+"""
+GOOD = {
+    "base": "    a.locate(base, held, tolerance=10)\n",
+    "top": "    a.locate(top, scheme, tolerance=10)\n",
+    "contact": "    a.contact('interface', moving=top.face('-z'), reference=base.face('+z'), points=20)\n",
+    "measure": "    a.measure('height', top.point(50, 0, 10), along='z', tolerance=1)\n",
+    "end": "    return a\n",
+}
+COLLINEAR = (
+    "    points = [(5, 5, 0), (25, 5, 0), (45, 5, 0), (5, 0, 5), (45, 0, 5), (0, 10, 5)]\n"
+    "    a.locate(top, [tc.Locator(f'L{k}', p, n, 1) for k, (p, n) in enumerate(zip(points, 'zzzyyx'))])\n"
+)
+
+MODELS = {
+    "locators that do not fix the part": ({"top": COLLINEAR}, ['part "top"', "do not fix it", "condition number"]),
+    "five locators": ({"top": COLLINEAR.replace(", (0, 10, 5)", "")}, ['part "top"', "5 locators", "exactly 6"]),
+    "negative tolerance": ({"top": GOOD["top"].replace("10", "-10")}, ['part "top"', "-10", "0 or above"]),
+    "tolerance NaN": ({"top": GOOD["top"].replace("10", "math.nan")}, ['part "top"', "nan"]),
+    "surfaces apart": (
+        {"contact": GOOD["contact"].replace("'-z'", "'+z'").replace("points", "within=1.5, points")},
+        ['contact pair "interface"', "1.5 mm", "10 mm away"],
+    ),
+    "surfaces that look the same way": (
+        {"contact": GOOD["contact"].replace("'-z'", "'+z'").replace("points", "within=15, points")},
+        ['contact pair "interface"', "look the same way"],
+    ),
+    "unknown face": ({"contact": GOOD["contact"].replace("'+z'", "'up'")}, ['"up"', 'part "base"', "+x, -x"]),
+    "measure on an unknown part": (
+        {"measure": "    a.measure('height', tc.Assembly('B').part('lid', tc.Box(1, 1, 1)).point(0, 0, 0), along='z')\n"},
+        ['measure "height"', 'unknown part "lid"', "base, top"],
+    ),
+    "part that is not located": ({"top": ""}, ['part "top"', "not located"]),
+    "mesh file that is missing": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('nowhere.stl'), fixed=True)\n"},
+        ['part "extra"', "nowhere.stl", "does not exist"],
+    ),
+    "mesh file that is empty": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('empty.stl'), fixed=True)\n"},
+        ['part "extra"', "empty.stl"],
+    ),
+    "file that is not a mesh": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('notes.obj'), fixed=True)\n"},
+        ['part "extra"', "notes.obj"],
+    ),
+    "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measure "height"', "2 times"]),
+    "no measure": ({"measure": ""}, ["measures nothing"]),
+    "no assembly() at all": ({"whole": "x = 1\n"}, ["model.py", "no function assembly()"]),
+    "assembly() returns something else": ({"whole": "def assembly():\n    return 3\n"}, ["returned a int"]),
+    "script that fails": ({"whole": "def assembly():\n    return 1 / 0\n"}, ["line 2", "ZeroDivisionError"]),
+    "script that is no Python": ({"whole": "def assembly(:\n"}, ["line 1", "SyntaxError"]),
+}
+
+
+def script(folder, changes):
+    (folder / "empty.stl").write_bytes(b"")
+    (folder / "notes.obj").write_text("these are notes\n")
+    path = folder / "model.py"
+    path.write_text(changes.get("whole") or HEADER + "".join({**GOOD, **changes}.values()))
+    return path
+
+
+@dataclass
+class Done:
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def call(folder, *arguments):
+    """The command line in this process, started in `folder`."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            command_line([str(argument) for argument in arguments])
+        except SystemExit as ended:
+            return Done(ended.code, out.getvalue(), err.getvalue())
+    raise AssertionError("the command line ended without an exit code")
+
+
+@pytest.mark.parametrize("mistake", MODELS)
+def test_a_wrong_model_is_refused(mistake, tmp_path):
+    changes, expected = MODELS[mistake]
+    for verb in ("check", "run"):
+        out = () if verb == "check" else ("--out", "out.nc")
+        done = call(tmp_path, verb, script(tmp_path, changes), *out)
+        assert done.returncode == 2, done.stderr
+        assert "Traceback" not in done.stderr
+        assert done.stdout == ""
+        for words in expected:
+            assert words in done.stderr, done.stderr
+        assert not (tmp_path / "out.nc").exists()
+
+
+def test_all_faults_of_a_model_are_reported_at_once(tmp_path):
+    changes = {name: MODELS[mistake][0][name] for mistake, name in [("five locators", "top"), ("unknown face", "contact")]}
+    done = call(tmp_path, "check", script(tmp_path, changes | MODELS["measure on an unknown part"][0]))
+    assert "3 faults" in done.stderr
+    for words in ("exactly 6", '"up"', '"lid"'):
+        assert words in done.stderr
+
+
+OPTIONS = {
+    "unknown solver": (["--solver", "simplex"], ["simplex", "qpoases"]),
+    "refused solver": (["--solver", "superscs"], ["refused", "wrong answers", "daqp"]),
+    "too few samples": (["--samples", "0"], ["samples is 0"]),
+    "negative seed": (["--seed", "-1"], ["seed is -1"]),
+    "output in a folder that does not exist": (["--out", "nowhere/out.nc"], ["nowhere", "does not exist"]),
+    "output that is a folder": (["--out", "."], ["not a file"]),
+    "output on a device that is no disk": (["--out", "/proc/out.nc"], ["/proc/out.nc", "cannot be written"]),
+}
+
+
+@pytest.mark.parametrize("mistake", OPTIONS)
+def test_a_wrong_option_is_refused_before_the_run(mistake, tmp_path):
+    options, expected = OPTIONS[mistake]
+    done = call(tmp_path, "run", script(tmp_path, {}), *options)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    for words in expected:
+        assert words in done.stderr, done.stderr
+
+
+def test_an_existing_archive_is_not_overwritten_without_being_asked(tmp_path):
+    model, out = script(tmp_path, {}), ("--out", "out.nc", "--samples", "20")
+    assert call(tmp_path, "run", model, *out).returncode == 0
+    before = (tmp_path / "out.nc").read_bytes()
+    again = call(tmp_path, "run", model, *out)
+    assert again.returncode == 2 and "exists" in again.stderr
+    assert (tmp_path / "out.nc").read_bytes() == before
+    assert call(tmp_path, "run", model, *out, "--seed", "9", "--overwrite").returncode == 0
+    assert (tmp_path / "out.nc").read_bytes() != before
+
+
+def test_a_file_that_is_no_archive_is_refused(tmp_path):
+    (tmp_path / "notes.nc").write_text("these are notes\n")
+    for name in ("notes.nc", "nowhere.nc"):
+        done = call(tmp_path, "summary", name)
+        assert done.returncode == 2 and name in done.stderr and "Traceback" not in done.stderr
+    done = call(tmp_path, "run", script(tmp_path, {}), "--out", "notes.nc", "--resume")
+    assert done.returncode == 2
+    assert (tmp_path / "notes.nc").read_text() == "these are notes\n"
+
+
+def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
+    ran = call(tmp_path, "run", script(tmp_path, {}), "--samples", "200", "--out", "out.nc")
+    told = call(tmp_path, "summary", "out.nc")
+    assert ran.returncode == told.returncode == 0
+    assert ran.stdout.startswith(told.stdout)
+    assert max(map(len, told.stdout.splitlines())) <= 80
+    for words in ("6 sigma", "variance", "outside", "touched by contact", "largest true penetration"):
+        assert words in told.stdout
+
+
+def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
+    """A tab wider than its slot."""
+    model = script(tmp_path, {"whole": """
+import tolcontact as tc
+
+def assembly():
+    a = tc.Assembly("slot")
+    left = a.part("left", tc.Box(10, 10, 10), at=(-10, 0, 0), fixed=True)
+    right = a.part("right", tc.Box(10, 10, 10), at=(9.9, 0, 0), fixed=True)
+    tab = a.part("tab", tc.Box(10, 10, 10))
+    a.locate(tab, tc.three_two_one(tab.face("-z"), tab.face("-y"), tab.face("-x"), inset=1), tolerance=0.01)
+    a.contact("left side", moving=tab.face("-x"), reference=left.face("+x"), points=9)
+    a.contact("right side", moving=tab.face("+x"), reference=right.face("-x"), points=9)
+    a.measure("side", tab.point(5, 5, 5), along="x")
+    return a
+"""})  # fmt: skip
+    done = call(tmp_path, "run", model, "--samples", "50")
+    assert done.returncode == 1
+    assert "50 realizations" in done.stderr
+
+
+def test_a_model_script_runs_by_itself(tmp_path):
+    model = script(tmp_path, {})
+    model.write_text(model.read_text() + "\nif __name__ == '__main__':\n    tc.main(assembly)\n")
+    done = subprocess.run([sys.executable, model, "--samples", "50"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0 and "height" in done.stdout
+
+
+def test_a_method_that_does_not_exist_is_refused():
+    for wrong in ({"regularization": "ridge"}, {"active_set": "some"}, {"eta": 0.0}, {"activity": -1.0}):
+        with pytest.raises(tc.TolcontactError, match=next(iter(wrong))):
+            tc.Method(**wrong)
