@@ -1,11 +1,8 @@
 """The archive alone: what it holds, recomputes, rebuilds, and survives."""
 
-import json
-import os
 import signal
 import subprocess
 import sys
-import time
 
 import cf_xarray  # noqa: F401
 import netCDF4
@@ -30,12 +27,12 @@ def archive(tmp_path_factory):
 
 
 def rows(path):
-    with xr.open_dataset(path) as root, xr.open_dataset(path, group="sample") as sample:
-        return {name: root[name].values for name in DATA} | {"deviation": sample["deviation"].values}
+    root, sample = xr.load_dataset(path), xr.load_dataset(path, group="sample")
+    return {name: root[name].values for name in DATA} | {"deviation": sample["deviation"].values}
 
 
 def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(archive):
-    root, contact = xr.open_dataset(archive), xr.open_dataset(archive, group="contact")
+    root, contact = xr.load_dataset(archive), xr.load_dataset(archive, group="contact")
     for pair in range(root.sizes["pair"]):
         points = contact.isel(point=np.flatnonzero(contact.pair_of_point == pair))
         moving, reference = int(contact.moving_part[pair]), int(contact.reference_part[pair])
@@ -50,14 +47,14 @@ def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(archive):
 
 
 def test_it_recomputes_its_own_measures(archive):
-    root = xr.open_dataset(archive)
+    root = xr.load_dataset(archive)
     corner = np.array([15.0, 15, 30])
     moved = root.rotation.sel(part="upper").values @ corner + root.translation.sel(part="upper").values
     assert np.abs(moved[..., 2] - 30 - root.measured.sel(measure="top").values).max() < 1e-12
 
 
 def test_it_follows_the_cf_conventions(archive):
-    root = xr.open_dataset(archive)
+    root = xr.load_dataset(archive)
     assert root.attrs["Conventions"].startswith("CF-1.")
     assert {"title", "history", "source", "references", "solver", "seed", "eta", "regularization"} <= set(root.attrs)
     assert root.realization.attrs["standard_name"] == "realization"
@@ -73,7 +70,7 @@ def test_it_follows_the_cf_conventions(archive):
 
 
 def test_fields_are_those_of_the_archived_poses(archive):
-    tree = xr.open_datatree(archive)
+    tree = xr.load_datatree(archive)
     field = tree["field/upper"].to_dataset()
     for state in ("raw", "corrected"):
         R, t = (tree[name].sel(part="upper", state=state).values for name in ("rotation", "translation"))
@@ -104,15 +101,14 @@ def with_everything(tmp_path):
 
 
 def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
-    first = tc.run(with_everything(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc")
+    tc.run(with_everything(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
     (tmp_path / "block.stl").unlink()
-    rebuilt = tc.model_of(tc.open_archive(tmp_path / "first.nc"))
+    with tc.open_archive(tmp_path / "first.nc") as archive:
+        first = archive.load()
+    rebuilt = tc.model_of(first)
     second = tc.run(rebuilt, samples=200, seed=2, solver="daqp")
     for name in DATA:
         assert (first[name].values == second[name].values).all(), name
-    assert json.loads(str(first["model"]["declaration"].values)) == json.loads(str(second["model"]["declaration"].values)) | {
-        "pairs": json.loads(str(first["model"]["declaration"].values))["pairs"]
-    } | {"parts": json.loads(str(first["model"]["declaration"].values))["parts"]}
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
 
 
@@ -129,7 +125,7 @@ def test_resume_gives_the_same_data_as_an_undisturbed_run(archive, tmp_path):
         tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True, block=50).close()
     for name, values in rows(path).items():
         assert (values == rows(archive)[name]).all(), name
-    fields = [xr.open_dataset(p, group="field/middle") for p in (path, archive)]
+    fields = [xr.load_dataset(p, group="field/middle") for p in (path, archive)]
     assert (fields[0].six_sigma.values == fields[1].six_sigma.values).all()
 
 
@@ -137,28 +133,23 @@ SCRIPT = """
 import sys
 from tests import cases
 import tolcontact as tc
-tc.run(cases.stack(), samples=20000, seed=3, solver="daqp", out=sys.argv[1], block=100)
+tc.run(cases.stack(), samples=20000, seed=3, solver="daqp", out=sys.argv[1], block=100,
+       progress=lambda rows: print(rows, flush=True))
 """
 
 
-@pytest.mark.parametrize("after", [6, 15])
+@pytest.mark.parametrize("after", [100, 1700])
 def test_a_killed_run_keeps_its_rows_and_goes_on(after, tmp_path):
     path = tmp_path / "killed.nc"
-    environment = {**os.environ, "HDF5_USE_FILE_LOCKING": "FALSE"}
-    run = subprocess.Popen([sys.executable, "-c", SCRIPT, path], env=environment)
-    # Wait for the first rows by the file's growth alone, then let it run for some more blocks.
-    size, deadline = 0, time.monotonic() + 60
-    grown = 0
-    while grown < after and time.monotonic() < deadline:
-        time.sleep(0.02)
-        now = path.stat().st_size if path.exists() else 0
-        grown, size = grown + (now > size), max(now, size)
-    run.send_signal(signal.SIGKILL)
-    run.wait()
+    with subprocess.Popen([sys.executable, "-c", SCRIPT, path], stdout=subprocess.PIPE, text=True) as run:
+        for line in run.stdout:
+            if int(line) >= after:
+                break
+        run.send_signal(signal.SIGKILL)
     with netCDF4.Dataset(path) as file:
         status = file["status"][:]
     written = int((~np.ma.getmaskarray(status)).sum())
-    assert 0 < written < 20_000
+    assert after <= written < 20_000
     samples = written + 150
     tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True).close()
     whole = tmp_path / "whole.nc"

@@ -1,0 +1,89 @@
+"""Contact points, locators and faces in the nominal assembly."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import tolcontact as tc
+from tests import cases
+from tolcontact.discretization import discretize
+from tolcontact.discretization.projection import project
+from tolcontact.discretization.spreading import spread
+
+
+def face(width, height):
+    return trimesh.Trimesh([[0, 0, 0], [width, 0, 0], [width, height, 0], [0, height, 0]], [[0, 1, 2], [0, 2, 3]])
+
+
+@pytest.mark.parametrize("count", [1, 4, 202, 1000])
+def test_points_are_as_many_as_asked_and_spread_evenly(count):
+    points = spread(face(50, 25), count, None)
+    assert points.shape == (count, 3)
+    assert ((points >= 0) & (points <= [50, 25, 0])).all()
+    if count >= 202:
+        # Each cell of area 1/count of the face holds about one point: no hole and no heap.
+        radius = np.sqrt(50 * 25 / count)
+        spots = np.random.default_rng(0).uniform([0, 0, 0], [50, 25, 0], (2000, 3))
+        apart = np.linalg.norm(points[:, None] - points, axis=2) + np.eye(count) * 99
+        assert np.linalg.norm(spots[:, None] - points, axis=2).min(axis=1).max() < 1.1 * radius
+        assert apart.min() > 0.5 * radius
+        for corner in ((0, 0), (50, 0), (0, 25), (50, 25)):
+            assert np.abs(points[:, :2] - corner).max(axis=1).min() == 0
+
+
+def test_a_spacing_is_kept_everywhere():
+    points = spread(face(50, 25), None, 4.0)
+    spots = np.random.default_rng(0).uniform([0, 0, 0], [50, 25, 0], (2000, 3))
+    assert np.linalg.norm(spots[:, None] - points, axis=2).min(axis=1).max() <= 4.0 + 1.0
+
+
+def test_ra1_has_the_papers_202_points_on_its_interface():
+    (pair,) = discretize(cases.model("ra1")).pairs
+    assert pair.P_m.shape == (202, 3)
+    assert (pair.P_m == pair.P_r).all()
+    assert (pair.n_r == [0, 0, 1]).all()
+    assert (pair.P_m.min(axis=0) == [50, 12.5, 10]).all() and (pair.P_m.max(axis=0) == [100, 37.5, 10]).all()
+
+
+def test_points_that_overhang_the_rim_do_not_take_part():
+    a = tc.Assembly("overhang")
+    table = a.part("table", tc.Box(10, 10, 10), at=(0, 0, -10), fixed=True)
+    plate = a.part("plate", tc.Box(30, 10, 2), at=(-10, 0, 0.5))
+    a.locate(plate, tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=1), tolerance=1)
+    a.contact("rest", moving=plate.face("-z"), reference=table.face("+z"), spacing=1.0)
+    a.measure("height", plate.point(0, 0, 0), along="z")
+    (pair,) = discretize(a).pairs
+    assert pair.P_m[:, 0].min() >= 0 and pair.P_m[:, 0].max() <= 10
+    assert np.allclose(pair.P_m[:, 2] - pair.P_r[:, 2], 0.5)
+
+
+@pytest.mark.parametrize("solid", [trimesh.creation.icosphere(4, 10), trimesh.creation.cylinder(10, 40, sections=96)])
+def test_projections_on_curved_faces_lie_on_them_with_normals_outward(solid):
+    rng = np.random.default_rng(1)
+    direction = rng.normal(size=(200, 3))
+    if len(solid.vertices) < 1000:  # the cylinder's barrel
+        direction[:, 2] = 0
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    nearest, normals, over = project(direction * 11, solid)
+    chord = 10 * (1 - np.cos(np.pi / 48))
+    assert over.all()
+    assert np.abs(np.linalg.norm(nearest, axis=1) - 10).max() < chord
+    assert ((normals * direction).sum(axis=1) > 0.99).all()
+
+
+def test_a_three_two_one_scheme_stands_inside_the_edges_of_its_faces():
+    base, top = discretize(cases.model("ra1")).parts
+    assert base.locator_points.tolist() == [[5, 5, 0], [95, 5, 0], [50, 45, 0], [5, 0, 5], [95, 0, 5], [0, 25, 5]]
+    assert top.locator_points[:3, :2].tolist() == [[55, 32.5], [95, 32.5], [75, 17.5]]
+    assert base.locator_directions.tolist() == [[0, 0, 1]] * 3 + [[0, 1, 0]] * 2 + [[1, 0, 0]]
+
+
+def test_every_declared_thing_prints_as_one_row_and_remembers_its_line():
+    a = cases.model("ra1")
+    rows = str(a).splitlines()
+    assert len(rows) == 1 + 2 + 2 + 1 + 1
+    assert "202 points" in rows[5] and "top -z (moving) against base +z (reference)" in rows[5]
+    assert a.parts[0].declared_at == "ra1.py:11"
+    assert a.measures[0].declared_at == "ra1.py:16"
+    with pytest.raises(AttributeError):
+        a.parts[0].name = "other"
