@@ -32,6 +32,8 @@ def load_model(path: Path) -> Assembly:
         declared = declare()
     except TolcontactError:
         raise
+    except SystemExit as ended:
+        raise ScriptError(f'model script "{path}" ended the program with sys.exit({ended.code!r})') from ended
     except Exception as error:  # a user's script may raise anything
         raise ScriptError(f'model script "{path}" failed{_line_of(error, path)}: {type(error).__name__}: {error}') from error
     finally:

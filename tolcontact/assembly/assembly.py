@@ -1,5 +1,6 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
@@ -12,6 +13,7 @@ from tolcontact.assembly.tolerance import tolerance as _tolerance
 from tolcontact.assembly.words import direction, script_line, vector
 
 DEFAULT_POINTS = 200
+_NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\s\x00-\x1f\x7f])?")
 
 
 class Assembly:
@@ -61,6 +63,8 @@ class Assembly:
         fixed: bool | None = None,
     ) -> Part:
         """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
+        _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
+        _expect(f'part "{name}": fixed', fixed, bool | None, "True, False, or nothing")
         part = Part(name, geometry, vector(at), vector(rotation), fixed, script_line())
         self._parts.append(part)
         return part
@@ -73,7 +77,11 @@ class Assembly:
         `tolerance` holds for every locator that has none of its own: the full width of its zone [mm], a Tolerance, or
         a frozen scipy.stats distribution.
         """
+        _expect("locate: the first argument", part, Part, "a part")
+        _expect(f'locate "{part.name}": on', on, Part | None, "a part, or nothing for the ground")
         scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
+        for locator in scheme if isinstance(scheme, tuple) else ():
+            _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
         common = None if tolerance is None else _tolerance(tolerance)
         self._locations.append(Location(part, scheme, common, on, script_line()))
 
@@ -88,6 +96,8 @@ class Assembly:
         within: float | None = None,
     ) -> None:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
+        for side, face in (("moving", moving), ("reference", reference)):
+            _expect(f'contact "{name}": {side}', face, Face, 'part.face("+z")')
         points = DEFAULT_POINTS if points is None and spacing is None else points
         self._pairs.append(ContactPair(name, moving, reference, points, spacing, within, script_line()))
 
@@ -123,10 +133,11 @@ class Assembly:
         for kind, things in kinds.items():
             names = [thing.name for thing in things]  # type: ignore[attr-defined]
             for name in dict.fromkeys(names):
-                if not isinstance(name, str) or not name.strip():
-                    yield f"{kind} {name!r}: a name must be a text that is not empty"
-                elif "/" in name:
-                    yield f'{kind} "{name}": a name must not contain "/", which separates groups in the archive'
+                if not (isinstance(name, str) and _NAME.fullmatch(name)):
+                    yield (
+                        f"{kind} {name!r}: a name must be a text that starts with a letter, digit or underscore, holds "
+                        'no "/" or control character, and does not end in a space (the archive uses it)'
+                    )
                 if names.count(name) > 1:
                     yield f'{kind} "{name}" is declared {names.count(name)} times; names must differ'
         for part in self._parts:
@@ -169,6 +180,12 @@ class Assembly:
     def __str__(self) -> str:
         rows = [*self._parts, *self._locations, *self._pairs, *self._measures]
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
+
+
+def _expect(what: str, value: Any, kind: Any, wanted: str) -> None:
+    """Raise TypeError at the script's own line where an argument is of a kind that no other check could read."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{what} is a {type(value).__name__}; expected {wanted}")
 
 
 def _named(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:

@@ -31,10 +31,8 @@ class ContactPair:
         yield from self.reference.faults()
         if self.moving.part is self.reference.part:
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
-        if isinstance(self.points, str) and self.points != VERTICES:
-            yield f'points is "{self.points}"; expected a number, or "{VERTICES}"'
-        if isinstance(self.points, int) and self.points < 1:
-            yield f"points is {self.points}; expected 1 or more"
+        if self.points not in (None, VERTICES) and not (type(self.points) is int and self.points >= 1):
+            yield f'points is {self.points!r}; expected a whole number, 1 or above, or "{VERTICES}"'
         for word in ("spacing", "within"):
             length = getattr(self, word)
             if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):

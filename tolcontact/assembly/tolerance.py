@@ -33,7 +33,10 @@ class Tolerance:
                 )
             if not (isinstance(self.range, int | float) and math.isfinite(self.range) and self.range >= 0):
                 yield f"tolerance range is {self.range!r}; expected the full width of the zone in mm, 0 or above"
-        elif not (hasattr(self.distribution, "ppf") and hasattr(getattr(self.distribution, "dist", None), "name")):
+        elif not (
+            hasattr(getattr(self.distribution, "dist", None), "pdf")
+            and hasattr(getattr(self.distribution, "dist", None), "name")
+        ):
             yield (
                 f"distribution is a {type(self.distribution).__name__}; expected one of {', '.join(SHAPES)}, "
                 "or a frozen continuous distribution such as scipy.stats.norm(0, 0.1)"

@@ -107,6 +107,12 @@ def discretize(assembly: Assembly) -> Nominal:
     ]
     if clean:
         faults.extend(_immovable(assembly))
+    labels = [label for nominal in placed.values() for label in nominal.labels]
+    faults.extend(
+        f'locator "{label}" is declared {labels.count(label)} times; its draws would be the same, so rename part or locator'
+        for label in dict.fromkeys(labels)
+        if labels.count(label) > 1 and clean
+    )
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     return Nominal(

@@ -63,7 +63,10 @@ def select(mesh: trimesh.Trimesh, face: Face) -> np.ndarray:
             raise GeometryFault(f"face {face}: triangle indices must lie between 0 and {len(mesh.faces) - 1}")
         chosen = np.isin(np.arange(len(mesh.faces)), indices)
     else:
-        chosen = np.asarray(face.selection(mesh.triangles_center, mesh.face_normals))
+        try:
+            chosen = np.asarray(face.selection(mesh.triangles_center, mesh.face_normals))
+        except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
+            raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
         if chosen.shape != (len(mesh.faces),) or chosen.dtype != bool:
             raise GeometryFault(
                 f"face {face}: its function gave an array of shape {chosen.shape} and type {chosen.dtype}; "

@@ -1,7 +1,7 @@
 """The summary as text for a terminal of 80 columns."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import xarray as xr
 from rich import box
@@ -16,6 +16,7 @@ RAW, CORRECTED = "raw", "corrected"
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
 MAX_DECIMALS = 6
+WIDTH = 80
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -36,10 +37,16 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
         yield Padding(Text(line), (0, 0, 0, 2))
 
 
-def _table(*columns: str) -> Table:
+def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """Columns as wide as their cells; where they need more than WIDTH, each interval goes below its estimate."""
+    widths = [max(len(row[k]) for row in [columns, *rows]) for k in range(len(columns))]
+    if sum(widths) + 2 * len(widths) > WIDTH:
+        rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for k, column in enumerate(columns):
         table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0)
+    for row in rows:
+        table.add_row(*row)
     return table
 
 
@@ -47,28 +54,29 @@ def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
     units, tolerance = str(of["measure_units"].values), float(of["measure_tolerance"].values)
     limits = f", tolerance range {tolerance:g} {units}" if math.isfinite(tolerance) else ""
     yield Text(f"\n{name} ({units}){limits}", style="bold")
-    table = _table("", RAW, CORRECTED, "change")
+    rows = []
     for statistic in of["statistic"].values:
         values = [of["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
         if statistic == OUTSIDE:
             if math.isfinite(tolerance):
-                table.add_row(_SHORT[OUTSIDE], *map(percent, values), "")
+                rows.append([_SHORT[OUTSIDE], *map(percent, values), ""])
             continue
         change = ""
         if statistic in _CHANGE_BESIDE:
             changed = of["change"].sel(change_of=_CHANGE_BESIDE[statistic]).values
             change = number(changed, sign=True) if statistic == "mean" else percent(changed - 1, sign=True)
-        table.add_row(_SHORT.get(statistic, statistic), *map(number, values), change)
-    yield table
+        rows.append([_SHORT.get(statistic, statistic), *map(number, values), change])
+    yield _table(["", RAW, CORRECTED, "change"], rows)
 
 
 def _field_table(summary: xr.Dataset) -> Table:
-    table = _table("part", "state", "least", "largest")
+    rows = []
     for part in summary["part"].values:
         for state in (RAW, CORRECTED):
             of = summary["field_extreme"].sel(part=part, state=state)
-            table.add_row(str(part), state, number(of.sel(extreme="least").values), number(of.sel(extreme="largest").values))
-    return table
+            extremes = [number(of.sel(extreme=extreme).values) for extreme in ("least", "largest")]
+            rows.append([str(part), state, *extremes])
+    return _table(["part", "state", "least", "largest"], rows)
 
 
 def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
@@ -88,9 +96,16 @@ def number(values: object, *, sign: bool = False) -> str:
         return "-"
     finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
     width = max(finite, default=0.0)
-    decimals = min(max(1 - math.floor(math.log10(width)), 0), MAX_DECIMALS) if width > 0 else (0 if estimate == 0 else 4)
+    decimals = (
+        min(max(_digits(width) - math.floor(math.log10(width)), 0), MAX_DECIMALS) if width > 0 else (0 if estimate == 0 else 4)
+    )
     plus = "+" if sign else ""
     return f"{estimate:{plus}.{decimals}f} [{_bound(lower, decimals)}, {_bound(upper, decimals)}]"
+
+
+def _digits(width: float) -> int:
+    """One more digit where the first one of the half width is 1 or 2, so that rounding stays below a fifth of it."""
+    return 1 if width / 10 ** math.floor(math.log10(width)) < 3 else 0
 
 
 def percent(values: object, *, sign: bool = False) -> str:
