@@ -147,8 +147,7 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, tmp_path):
                 break
         run.send_signal(signal.SIGKILL)
     with netCDF4.Dataset(path) as file:
-        status = file["status"][:]
-    written = int((~np.ma.getmaskarray(status)).sum())
+        written = int((file["status"][:] != -1).sum())
     assert after <= written < 20_000
     samples = written + 150
     tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True).close()

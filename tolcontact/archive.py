@@ -1,11 +1,16 @@
 """The netCDF archive: written block by block with the netCDF4 library, read with xarray.
 
-A row is complete once it has a status; whatever kills the writer, complete rows stay, and `resume` goes on after them.
+A file that is being extended breaks when its writer is killed at the wrong moment. So everything is laid out first, under
+another name: header, and room for all rows, each with the status "unfinished". Once the file stands under its own name,
+bytes are only overwritten in place, the status of a row after its data; whatever kills the writer, the file opens,
+finished rows stay, and `resume` goes on after them.
 """
 
+import contextlib
 import datetime
 import json
 import platform
+import shutil
 from collections.abc import Iterator, Mapping
 from importlib.metadata import version
 from pathlib import Path
@@ -39,26 +44,32 @@ class ArchiveWriter:
         Raises ArchiveError where it cannot be written.
         """
         self._nominal = program.nominal
-        self._file = _opened(path, "w")
-        _write_header(self._file, program, _settings(program, seed, samples))
-        self._file.sync()
+        with _replacing(path) as part, _opened(part, "w") as file:
+            _write_header(file, program, _settings(program, seed, samples))
+            _make_room(file, 0, samples)
+        self._file = _opened(path, "r+")
         self.rows = 0
 
     @classmethod
     def resume(cls, path: Path, program: Program, *, seed: int, samples: int) -> "ArchiveWriter":
-        """Open an archive to go on after its last complete row.
+        """Open an archive to go on after its last finished row, up to `samples`.
 
         Raises ArchiveError where the file is no archive, or holds another model or another run.
         """
         writer = cls.__new__(cls)
         writer._nominal = program.nominal
         _check_same_run(path, program, _settings(program, seed, samples))
+        with netCDF4.Dataset(path) as there:
+            unfinished = np.flatnonzero(there[words.STATUS.name][:] == words.UNFINISHED)
+            length = len(there.dimensions[words.REALIZATION])
+        writer.rows = int(unfinished[0]) if unfinished.size else length
+        with _replacing(path) as part:
+            shutil.copyfile(path, part)
+            with _opened(part, "r+") as file:
+                _make_room(file, length, samples)
+                file.setncattr("samples", np.int64(max(samples, length)))
+                file.setncattr("history", f"{file.history}\n{_now()} resumed after {writer.rows} realizations")
         writer._file = _opened(path, "r+")
-        status = np.ma.filled(writer._file[words.STATUS.name][:], words.UNFINISHED)
-        unfinished = np.flatnonzero(status == words.UNFINISHED)
-        writer.rows = int(unfinished[0]) if unfinished.size else len(status)
-        writer._file.setncattr("samples", samples)
-        writer._note(f"resumed after {writer.rows} realizations")
         return writer
 
     def __enter__(self) -> "ArchiveWriter":
@@ -78,13 +89,13 @@ class ArchiveWriter:
             words.GAP_MIN: block.gap_min,
             words.ACTIVE: block.active,
             words.KKT_RESIDUAL: block.kkt_residual,
-            words.STATUS: block.status,
         }
-        self._file[words.REALIZATION][rows] = np.arange(rows.start, rows.stop)
         self._file["sample"][words.DEVIATION.name][rows] = block.deviations
-        for variable in words.ROWS:
-            if values[variable].size:
-                self._file[variable.name][rows] = values[variable]
+        for variable, data in values.items():
+            if data.size:
+                self._file[variable.name][rows] = data
+        self._file.sync()
+        self._file[words.STATUS.name][rows] = block.status
         self._file.sync()
         self.rows = rows.stop
 
@@ -105,9 +116,6 @@ class ArchiveWriter:
         for start in range(0, self.rows, ROW_CHUNK):
             rows = slice(start, min(start + ROW_CHUNK, self.rows))
             yield np.asarray(R[rows, state, part]), np.asarray(t[rows, state, part])
-
-    def _note(self, what: str) -> None:
-        self._file.setncattr("history", f"{self._file.getncattr('history')}\n{_now()} {what}")
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -143,6 +151,30 @@ def model_of(results: xr.DataTree) -> Assembly:
 class _Triangles:
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
         self.vertices, self.faces = vertices, faces
+
+
+@contextlib.contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
+    part = path.with_name(path.name + ".part")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
+    """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
+    room = {words.STATUS: words.UNFINISHED, words.ACTIVE: -1, words.DEVIATION: np.nan}
+    for variable in (*words.ROWS, words.DEVIATION):
+        stored = (file["sample"] if variable is words.DEVIATION else file)[variable.name]
+        for first in range(start, stop, ROW_CHUNK):
+            rows = min(ROW_CHUNK, stop - first)
+            if 0 not in stored.shape[1:]:
+                stored[first : first + rows] = np.full((rows, *stored.shape[1:]), room.get(variable, np.nan))
+    if start < stop:
+        file[words.REALIZATION][start:stop] = np.arange(start, stop)
 
 
 def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
@@ -293,8 +325,6 @@ def _define(group: netCDF4.Dataset, variable: Variable) -> None:
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
         sizes = [len(_dimension(group, d)) for d in variable.dims if d != words.REALIZATION]
         options["chunksizes"] = [ROW_CHUNK, *(max(size, 1) for size in sizes)]
-    if variable is words.STATUS:
-        options["fill_value"] = np.int8(words.UNFINISHED)
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     attributes = variable.all_attributes
     if "flag_values" in attributes:

@@ -85,9 +85,11 @@ STATUS = Variable(
     "i1",
     "what became of the realization",
     None,
-    {"flag_values": list(range(len(STATUS_MEANINGS))), "flag_meanings": " ".join(STATUS_MEANINGS)},
+    {
+        "flag_values": [UNFINISHED, *range(len(STATUS_MEANINGS))],
+        "flag_meanings": " ".join(["unfinished", *STATUS_MEANINGS]),
+    },
 )
-# Written in this order; the status comes last, so that a row that has one is complete.
 ROWS = (MEASURED, TRANSLATION, ROTATION, GAP_MIN, ACTIVE, KKT_RESIDUAL, STATUS)
 
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")

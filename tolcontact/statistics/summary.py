@@ -74,7 +74,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
 def finished(results: xr.DataTree) -> np.ndarray:
     """Numbers of the rows that were written completely, (row,)."""
     status = results.to_dataset()[words.STATUS.name].values
-    return np.flatnonzero(np.isfinite(status) & (status != words.UNFINISHED))
+    return np.flatnonzero(status != words.UNFINISHED)
 
 
 def _of_sample(x: np.ndarray, rows: xr.Dataset, measure: int) -> list[Estimate]:
