@@ -99,6 +99,9 @@ def command_line(arguments: list[str] | None = None) -> None:
     except TolcontactError as error:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
+    except OSError as error:
+        typer.echo(f"error: the system refused: {error}; an archive that was begun goes on with --resume", err=True)
+        sys.exit(2)
 
 
 def _print_summary(results: xr.DataTree) -> None:
