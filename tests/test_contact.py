@@ -38,7 +38,7 @@ def test_poses_agree_with_a_plain_qp_of_all_rows_in_another_library(case, regula
 
 
 @pytest.mark.parametrize("case", [cases.ra1, cases.stack], ids=["ra1", "stack"])
-@pytest.mark.parametrize("solver", ["qpoases", "osqp", "piqp", "highs", "proxqp", "ipqp"])
+@pytest.mark.parametrize("solver", ["qpoases", "osqp", "piqp", "highs", "proxqp"])
 def test_solvers_agree_on_the_same_draws(case, solver):
     """Freedoms that only eta = 1e-6 holds enlarge an error of the QP by up to 1e3 / (share of active points)."""
     if solver not in usable_plugins():
@@ -51,9 +51,14 @@ def test_solvers_agree_on_the_same_draws(case, solver):
     elif solver == "osqp":  # asked for 1e-10 in scaled terms
         assert apart.max() < 1e-5
         assert np.median(apart) < 1e-9
+    elif solver == "piqp":  # interior-point: what it did not solve well enough must say so
+        resolved = run["status"] == Status.RESOLVED
+        assert resolved.sum() > 200
+        assert apart[resolved].max() < 1e-4
+        return
     else:
-        assert np.median(apart) < 1e-6
-    assert (run["status"] == reference["status"]).mean() > 0.98
+        assert apart.max() < 1e-7
+    assert (run["status"] == reference["status"]).all()
 
 
 @pytest.mark.parametrize(

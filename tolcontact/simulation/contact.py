@@ -14,6 +14,7 @@ from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 CLUSTERS = 6
+PENETRATION = 1e-10
 KEPT = 8
 
 
@@ -41,7 +42,7 @@ class ContactResolver:
         self._slots = group.slots
         self._solve = group.solve
         self._accuracy = program.plugin.accuracy
-        self._tolerance = program.plugin.accuracy / 100
+        self._tolerance = max(program.plugin.accuracy / 100, PENETRATION)
         self._activity = program.method.activity
         self._closed = program.method.active_set == "closed"
         self._scans = [
