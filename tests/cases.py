@@ -51,7 +51,7 @@ def ra1(frame: Frame = STILL, points=202) -> tc.Assembly:
     return a
 
 
-def translating(tolerance: float, axis: str = "z") -> list[tc.Locator]:
+def translating(tolerance) -> list[tc.Locator]:
     """Six locators of which one varies, and moves the part along z without turning it."""
     return [
         tc.Locator("Z", (5, 5, 0), "z", tolerance),
