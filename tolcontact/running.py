@@ -64,8 +64,6 @@ def run(
     path = Path(out)
     check_writable(path, overwrite=overwrite, resume=resume)
     program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
-    if overwrite and not resume:
-        path.unlink(missing_ok=True)  # whoever still reads the old file keeps it
     start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
     with start(path, program, seed=seed, samples=samples) as writer:
         for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows, block=block):
@@ -80,8 +78,8 @@ def check_counts(**counts: int) -> None:
     """Raise OptionError for a count that is no whole number, or too small (samples and block 1, seed 0)."""
     for word, value in counts.items():
         least = {"samples": 2, "block": 1, "seed": 0}[word]
-        if isinstance(value, bool) or not isinstance(value, int) or value < least:
-            raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above")
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
+            raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above and below 2^63")
 
 
 def check_writable(path: Path, *, overwrite: bool, resume: bool) -> None:

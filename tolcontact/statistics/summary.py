@@ -80,7 +80,8 @@ def finished(results: xr.DataTree) -> np.ndarray:
 def _of_sample(x: np.ndarray, rows: xr.Dataset, measure: int) -> list[Estimate]:
     tolerance = float(rows[words.MEASURE_TOLERANCE.name][measure])
     nominal = float(rows[words.MEASURE_NOMINAL.name][measure])
-    outside = intervals.share(np.abs(x - nominal) > tolerance / 2) if np.isfinite(tolerance) else (np.nan,) * 3
+    known = np.isfinite(tolerance) and np.isfinite(x).all()
+    outside = intervals.share(np.abs(x - nominal) > tolerance / 2) if known else (np.nan,) * 3
     return [*(statistic(x) for statistic in STATISTICS.values()), outside]
 
 
