@@ -25,6 +25,7 @@ def solve(nominal, R, t, *, eta=1e-6, regularization="points", rows="closed", ac
     every = np.vstack([pair.P_m for pair in nominal.pairs])
     centre, length = every.mean(axis=0), every.std()
     scale = np.array([1, 1, 1, 1 / length, 1 / length, 1 / length])
+    radius = 0.01 * np.sqrt(((every - centre) ** 2).sum(axis=1).mean())  # of the ball that a contact point stands for
 
     def displacement(part, x):
         B = np.zeros((3, 6 * len(free)))
@@ -47,7 +48,9 @@ def solve(nominal, R, t, *, eta=1e-6, regularization="points", rows="closed", ac
                 if part in position:
                     active_points += gap < activity
                     Q = Q + B.T @ B * (gap < activity)
-                    reg = reg + eta * B.T @ B
+                    W = np.zeros((3, 6 * len(free)))
+                    W[:, position[part] + 3 : position[part] + 6] = np.eye(3) / length
+                    reg = reg + eta * (B.T @ B + 2 * radius**2 * W.T @ W)
             if rows == "closed" or gap < activity:
                 A.append(row)
                 b.append(gap)

@@ -13,7 +13,18 @@ def simulate(assembly, samples=200, seed=1, block=1000, **options):
     """Blocks joined to one: arrays by name, and the program."""
     program = tc.build(assembly, **options)
     blocks = list(simulate_blocks(program, samples=samples, seed=seed, block=block))
-    names = ("deviations", "poses", "measured", "gap_min", "active", "status", "kkt_residual")
+    names = (
+        "deviations",
+        "poses",
+        "measured",
+        "gap_min",
+        "active",
+        "carrying",
+        "reaction",
+        "status",
+        "kkt_residual",
+        "iterations",
+    )
     return program, {name: np.concatenate([getattr(b, name) for b in blocks]) for name in names}
 
 

@@ -88,7 +88,10 @@ class ArchiveWriter:
             words.ROTATION: R,
             words.GAP_MIN: block.gap_min,
             words.ACTIVE: block.active,
+            words.CARRYING: block.carrying,
+            words.REACTION: block.reaction,
             words.KKT_RESIDUAL: block.kkt_residual,
+            words.ITERATIONS: block.iterations,
         }
         self._file["sample"][words.DEVIATION.name][rows] = block.deviations
         for variable, data in values.items():
@@ -166,7 +169,8 @@ def _replacing(path: Path) -> Iterator[Path]:
 
 def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
     """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
-    room = {words.STATUS: words.UNFINISHED, words.ACTIVE: -1, words.DEVIATION: np.nan}
+    counts = (words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS)
+    room: dict[Variable, float] = dict.fromkeys(counts, words.UNFINISHED)
     for variable in (*words.ROWS, words.DEVIATION):
         stored = (file["sample"] if variable is words.DEVIATION else file)[variable.name]
         for first in range(start, stop, ROW_CHUNK):
@@ -191,12 +195,14 @@ def _settings(program: Program, seed: int, samples: int) -> dict[str, Any]:
         "solver": program.plugin.name,
         "solver_options": json.dumps(program.plugin.options),
         "solver_accuracy": program.plugin.accuracy,
-        "resolution": "linearized",
-        "weighting": "active points",
+        "resolution": method.resolution,
+        "objective": method.objective,
+        "weighting": method.objective if method.objective.endswith("points") else "none",
         "regularization": method.regularization,
         "eta": method.eta,
         "active_set": method.active_set,
         "activity": method.activity,
+        "search": method.search,
         "sampler": "monte-carlo",
         "seed": np.int64(seed),
         "samples": np.int64(samples),
@@ -260,6 +266,7 @@ def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str
             _fill(file, coordinate, labels[coordinate.name])
     for variable in words.ROWS:
         _define(file, variable)
+    file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
     units = [measure.units for measure in nominal.measures]
     if set(units) != {"mm"}:
         file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
@@ -297,12 +304,14 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
     pairs = nominal.pairs
     group.createDimension(words.POINT, sum(len(pair.P_m) for pair in pairs))
     _write(group, words.MOVING_PART, [pair.moving for pair in pairs])
-    _write(group, words.REFERENCE_PART, [pair.reference for pair in pairs])
+    _write(group, words.REFERENCE_PART, [-1 if pair.reference is None else pair.reference for pair in pairs])
     if pairs:
         _write(group, words.PAIR_OF_POINT, np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]))
         _write(group, words.MOVING_POINT, np.vstack([pair.P_m for pair in pairs]))
         _write(group, words.REFERENCE_POINT, np.vstack([pair.P_r for pair in pairs]))
         _write(group, words.REFERENCE_NORMAL, np.vstack([pair.n_r for pair in pairs]))
+        none = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
+        _write(group, words.LOCATOR_OF_POINT, np.concatenate(none))
 
 
 def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
@@ -315,6 +324,8 @@ def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
         words.DISTRIBUTION,
         [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in nominal.tolerances],
     )
+    _write(group, words.STIFFNESS, np.concatenate([part.stiffness for part in nominal.parts]))
+    _write(group, words.ONE_SIDED, np.concatenate([part.one_sided for part in nominal.parts]))
     _write(group, words.LOCATOR_POINT, np.vstack([part.locator_points for part in nominal.parts]))
     _write(group, words.LOCATOR_DIRECTION, np.vstack([part.locator_directions for part in nominal.parts]))
 

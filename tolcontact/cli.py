@@ -17,6 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from tolcontact.archive import open_archive
 from tolcontact.assembly import Assembly
 from tolcontact.errors import TolcontactError
+from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
 from tolcontact.report import summary_text
 from tolcontact.running import DEFAULT_SOLVER, build, check_counts, check_writable
 from tolcontact.running import run as run_model
@@ -32,6 +33,12 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _or(names: tuple[str, ...]) -> str:
+    return ", ".join(f'"{name}"' if " " in name else name for name in names)
+
+
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 
@@ -42,18 +49,23 @@ def run(
     samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
     solver: Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")] = DEFAULT_SOLVER,
+    resolution: Annotated[
+        str, typer.Option(help=f"One linear step, or as many as it takes: {_or(RESOLUTIONS)}.")
+    ] = "linearized",
+    objective: Annotated[str, typer.Option(help=f"What the corrected pose minimizes: {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
-    Exit code 1 where more than 0.1 % of the realizations did not converge.
+    Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, or not assemblable.
     """
     check_counts(samples=samples, seed=seed)
     if out is not None:
         check_writable(out, overwrite=overwrite, resume=resume)
-    program = build(load_model(model), solver=solver)
+    method = Method(resolution=resolution, objective=objective)
+    program = build(load_model(model), solver=solver, method=method)
     with Progress(
         TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
         console=Console(stderr=True), transient=True,
@@ -107,7 +119,7 @@ def command_line(arguments: list[str] | None = None) -> None:
 def _print_summary(results: xr.DataTree) -> None:
     found = summarize(results)
     Console(highlight=False).print(summary_text(found))
-    failed = int(found["by_status"][Status.NOT_CONVERGED])
+    failed = int(found["by_status"][Status.NOT_CONVERGED] + found["by_status"][Status.NOT_ASSEMBLABLE])
     if failed > FAILED_SHARE * found.attrs["realizations"]:
-        typer.echo(f"error: {failed} realizations did not converge, more than {FAILED_SHARE:.1%} of all", err=True)
+        typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
         raise typer.Exit(1)

@@ -4,32 +4,56 @@ from dataclasses import dataclass
 
 from tolcontact.errors import OptionError
 
+RESOLUTIONS = ("linearized", "exact")
+OBJECTIVES = ("active points", "all points", "locator stiffness", "seating")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
+SEARCHES = ("fixed", "iterated")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Method:
     """How contact is resolved: paper (9) to (12), with its free choices named.
 
-    regularization  "points": eta times the squared displacements of all candidate points, the same in every frame;
-                    "identity": the paper's eta I, which mixes mm and rad and so depends on where the origin is
+    resolution      "linearized": one linear step (12), as in the paper; "exact": steps are repeated, with proper rotations,
+                    until the true gaps (5) are open and the objective is least
+    objective       what the corrected pose minimizes. "active points": half the sum of squared displacements, from the raw
+                    state, of the contact points that are active there (the paper's); "all points": of all contact points;
+                    "locator stiffness": the energy of the two-sided locators, each a spring; "seating": the potential of
+                    the declared forces, with two-sided locators held
+    regularization  what holds the freedoms that the objective leaves open. "points": eta times the squared displacements of
+                    all contact points, the same in every frame; "identity": the paper's eta I, which mixes mm and
+                    rad and so depends on where the origin is
     eta             weight of the regularization, dimensionless (with "identity": mm^2 per rad^2, 1 per mm^2)
     active_set      "initial": only points below `activity` in the raw state are constrained (the paper's set);
                     "closed": points that the correction itself drives into contact are constrained too
     activity        a contact point counts as active below this gap [mm]
+    search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected again
+                    at the corrected pose until they stay (paper, 2.2)
     """
 
+    resolution: str = "linearized"
+    objective: str = "active points"
     regularization: str = "points"
     eta: float = 1e-6
     active_set: str = "closed"
     activity: float = 1e-9
+    search: str = "fixed"
 
     def __post_init__(self) -> None:
-        for word, choices in (("regularization", REGULARIZATIONS), ("active_set", ACTIVE_SETS)):
-            if getattr(self, word) not in choices:
-                raise OptionError(f"{word} is {getattr(self, word)!r}; expected one of: {', '.join(choices)}")
+        choices = {
+            "resolution": RESOLUTIONS,
+            "objective": OBJECTIVES,
+            "regularization": REGULARIZATIONS,
+            "active_set": ACTIVE_SETS,
+            "search": SEARCHES,
+        }
+        for word, known in choices.items():
+            if getattr(self, word) not in known:
+                raise OptionError(f"{word} is {getattr(self, word)!r}; expected one of: {', '.join(known)}")
         if not 0 < self.eta < 1:
             raise OptionError(f"eta is {self.eta!r}; expected a small number between 0 and 1")
         if not 0 <= self.activity < float("inf"):
             raise OptionError(f"activity is {self.activity!r}; expected a gap in mm, 0 or above")
+        if self.search == "iterated" and self.resolution != "exact":
+            raise OptionError('search is "iterated" with a linearized resolution; it needs resolution "exact"')

@@ -12,7 +12,7 @@ REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT = "vertex", "face", "corner", "component"
 
-STATUS_MEANINGS = ("untouched", "resolved", "not_converged")
+STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable")
 UNFINISHED = -1
 
 
@@ -76,9 +76,16 @@ GAP_MIN = Variable(
     "mm",
 )
 ACTIVE = Variable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
+CARRYING = Variable("carrying", (REALIZATION, PAIR), "i4", "number of contact points that carry in the corrected state", "1")
+REACTION = Variable("reaction", (REALIZATION, PAIR), "f8", "sum of the reactions of the contact points of a pair")
 KKT_RESIDUAL = Variable(
-    "kkt_residual", (REALIZATION,), "f8", "largest residual of the optimality conditions of the contact problem", "mm"
+    "kkt_residual",
+    (REALIZATION,),
+    "f8",
+    "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
+    "mm",
 )
+ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "linear steps that the contact problem took", "1")
 STATUS = Variable(
     "status",
     (REALIZATION,),
@@ -90,7 +97,18 @@ STATUS = Variable(
         "flag_meanings": " ".join(["unfinished", *STATUS_MEANINGS]),
     },
 )
-ROWS = (MEASURED, TRANSLATION, ROTATION, GAP_MIN, ACTIVE, KKT_RESIDUAL, STATUS)
+ROWS = (
+    MEASURED,
+    TRANSLATION,
+    ROTATION,
+    GAP_MIN,
+    ACTIVE,
+    CARRYING,
+    REACTION,
+    KKT_RESIDUAL,
+    ITERATIONS,
+    STATUS,
+)
 
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = Variable(
@@ -107,11 +125,18 @@ MESH_FACES = Variable("faces", (FACE, CORNER), "i4", "vertex numbers of each tri
 
 PAIR_OF_POINT = Variable("pair_of_point", (POINT,), "i4", "number of the pair of each contact point, counted from 0")
 MOVING_PART = Variable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
-REFERENCE_PART = Variable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, counted from 0")
+REFERENCE_PART = Variable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, -1: the ground")
 MOVING_POINT = Variable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
 REFERENCE_POINT = Variable("reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm")
 REFERENCE_NORMAL = Variable(
     "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
+)
+
+LOCATOR_OF_POINT = Variable(
+    "locator_of_point",
+    (POINT,),
+    "i4",
+    "number of the one-sided locator that a contact point stands for: its gap is less by the locator's deviation; -1: none",
 )
 
 LOCATOR_LABEL = _label(LOCATOR, "locator, as part.locator")
@@ -124,6 +149,8 @@ TOLERANCE_RANGE = Variable(
     "mm",
 )
 DISTRIBUTION = Variable("distribution", (LOCATOR,), str, "distribution of the deviation")
+STIFFNESS = Variable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")
+ONE_SIDED = Variable("one_sided", (LOCATOR,), "i1", "1: a support that the part may lift off, 0: held both ways")
 LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
 LOCATOR_DIRECTION = Variable("locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1")
 

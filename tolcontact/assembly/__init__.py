@@ -2,6 +2,7 @@
 
 from tolcontact.assembly.assembly import Assembly
 from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.force import Force
 from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.assembly.measure import Measure
@@ -13,6 +14,7 @@ __all__ = [
     "Box",
     "ContactPair",
     "Face",
+    "Force",
     "Locator",
     "Measure",
     "Mesh",

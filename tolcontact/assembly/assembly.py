@@ -5,12 +5,14 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
 from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.force import Force
 from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
 from tolcontact.assembly.measure import Measure
 from tolcontact.assembly.part import Face, Part, Point
 from tolcontact.assembly.tolerance import tolerance as _tolerance
-from tolcontact.assembly.words import direction, script_line, vector
+from tolcontact.assembly.words import direction, script_line
+from tolcontact.assembly.words import vector as _vector
 
 DEFAULT_POINTS = 200
 _NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\s\x00-\x1f\x7f])?")
@@ -29,6 +31,7 @@ class Assembly:
         locations: Iterable[Location] = (),
         pairs: Iterable[ContactPair] = (),
         measures: Iterable[Measure] = (),
+        forces: Iterable[Force] = (),
     ) -> None:
         """Scripts give the name only, and declare the rest by the methods."""
         self.name = name
@@ -36,6 +39,7 @@ class Assembly:
         self._locations = list(locations)
         self._pairs = list(pairs)
         self._measures = list(measures)
+        self._forces = list(forces)
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -53,6 +57,10 @@ class Assembly:
     def measures(self) -> tuple[Measure, ...]:
         return tuple(self._measures)
 
+    @property
+    def forces(self) -> tuple[Force, ...]:
+        return tuple(self._forces)
+
     def part(
         self,
         name: str,
@@ -65,7 +73,7 @@ class Assembly:
         """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
         _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
         _expect(f'part "{name}": fixed', fixed, bool | None, "True, False, or nothing")
-        part = Part(name, geometry, vector(at), vector(rotation), fixed, script_line())
+        part = Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line())
         self._parts.append(part)
         return part
 
@@ -101,6 +109,11 @@ class Assembly:
         points = DEFAULT_POINTS if points is None and spacing is None else points
         self._pairs.append(ContactPair(name, moving, reference, points, spacing, within, script_line()))
 
+    def force(self, name: str, *, at: Point, vector: Any) -> None:
+        """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
+        _expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
+        self._forces.append(Force(name, at, _vector(vector), script_line()))
+
     def measure(
         self,
         name: str,
@@ -120,8 +133,16 @@ class Assembly:
         return next((location for location in self._locations if location.part is part), None)
 
     def is_free(self, part: Part) -> bool:
-        """Whether contact may move the part: as declared, else whether it is the moving side of a pair."""
-        return any(pair.moving.part is part for pair in self._pairs) if part.fixed is None else not part.fixed
+        """Whether contact may move the part: as declared, else whether it is a moving side or has one-sided locators."""
+        if part.fixed is not None:
+            return not part.fixed
+        return any(pair.moving.part is part for pair in self._pairs) or bool(self.supports_of(part))
+
+    def supports_of(self, part: Part) -> tuple[int, ...]:
+        """Positions of the one-sided ones among the locators of `part`."""
+        location = self.location_of(part)
+        scheme = location.scheme if location and isinstance(location.scheme, tuple) else ()
+        return tuple(k for k, locator in enumerate(scheme) if locator.one_sided)
 
     def faults(self) -> Iterator[str]:
         """What is wrong with the declarations themselves, one sentence each, naming the thing at fault."""
@@ -129,7 +150,7 @@ class Assembly:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         if not self._measures:
             yield "it measures nothing; declare at least one measure with assembly.measure(...)"
-        kinds = {"part": self._parts, "contact pair": self._pairs, "measure": self._measures}
+        kinds = {"part": self._parts, "contact pair": self._pairs, "measure": self._measures, "force": self._forces}
         for kind, things in kinds.items():
             names = [thing.name for thing in things]  # type: ignore[attr-defined]
             for name in dict.fromkeys(names):
@@ -149,6 +170,9 @@ class Assembly:
         for pair in self._pairs:
             yield from _named("contact pair", pair, pair.faults())
             yield from self._strangers(f'contact pair "{pair.name}"', pair.declared_at, pair.moving.part, pair.reference.part)
+        for force in self._forces:
+            yield from _named("force", force, force.faults())
+            yield from self._strangers(f'force "{force.name}"', force.declared_at, force.at.part)
         for measure in self._measures:
             yield from _named("measure", measure, measure.faults())
             yield from self._strangers(
@@ -178,7 +202,7 @@ class Assembly:
                 yield (f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {known}')
 
     def __str__(self) -> str:
-        rows = [*self._parts, *self._locations, *self._pairs, *self._measures]
+        rows = [*self._parts, *self._locations, *self._pairs, *self._forces, *self._measures]
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 

@@ -7,6 +7,7 @@ from scipy import stats
 
 from tolcontact.assembly.assembly import Assembly
 from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.force import Force
 from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
 from tolcontact.assembly.measure import Measure
@@ -49,7 +50,10 @@ def to_document(
                     {"three_two_one": [face(f) for f in location.scheme.faces], "inset": location.scheme.inset}
                     if isinstance(location.scheme, ThreeTwoOne)
                     else [
-                        {**_plain(locator, "name", "point", "direction"), "tolerance": _tolerance(locator.tolerance)}
+                        {
+                            **_plain(locator, "name", "point", "direction", "one_sided", "stiffness"),
+                            "tolerance": _tolerance(locator.tolerance),
+                        }
                         for locator in location.scheme
                     ]
                 ),
@@ -66,6 +70,7 @@ def to_document(
             for pair in assembly.pairs
         ],
         "measures": [measure(m) for m in assembly.measures],
+        "forces": [{"at": _point(f.at), **_plain(f, "name", "vector", "declared_at")} for f in assembly.forces],
     }
 
 
@@ -86,7 +91,15 @@ def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
             scheme = ThreeTwoOne(primary, secondary, tertiary, said["scheme"]["inset"])
         else:
             scheme = tuple(
-                Locator(one["name"], one["point"], one["direction"], _tolerance_of(one["tolerance"])) for one in said["scheme"]
+                Locator(
+                    one["name"],
+                    one["point"],
+                    one["direction"],
+                    _tolerance_of(one["tolerance"]),
+                    one_sided=one["one_sided"],
+                    stiffness=one["stiffness"],
+                )
+                for one in said["scheme"]
             )
         on = None if said["on"] is None else parts[said["on"]]
         return Location(parts[said["part"]], scheme, _tolerance_of(said["tolerance"]), on, said["declared_at"])
@@ -102,6 +115,9 @@ def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
         rest = [said[word] for word in ("tolerance", "units", "declared_at")]
         return Measure(said["name"], of, to, along, *rest)
 
+    def force(said: Document) -> Force:
+        return Force(said["name"], point(said["at"]), tuple(said["vector"]), said["declared_at"])
+
     for said in document["parts"]:
         geometry = Box(*said["geometry"]["box"]) if "box" in said["geometry"] else Mesh(meshes[said["name"]])
         rest = [said[word] for word in ("fixed", "declared_at")]
@@ -112,6 +128,7 @@ def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
         map(location, document["locations"]),
         map(pair, document["pairs"]),
         map(measure, document["measures"]),
+        map(force, document["forces"]),
     )
 
 

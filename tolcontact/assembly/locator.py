@@ -1,6 +1,5 @@
 """Locators: where a part is held, in which direction, and how much that varies."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +7,7 @@ from typing import Any
 from tolcontact.assembly.part import Face, Part
 from tolcontact.assembly.tolerance import Tolerance
 from tolcontact.assembly.tolerance import tolerance as _tolerance
-from tolcontact.assembly.words import Vector, is_finite
+from tolcontact.assembly.words import Vector, is_finite, is_length
 from tolcontact.assembly.words import direction as _direction
 from tolcontact.assembly.words import vector as _vector
 
@@ -17,19 +16,34 @@ from tolcontact.assembly.words import vector as _vector
 class Locator:
     """A point of a part [mm], a direction into the part, and the deviation along it; in the part's own frame.
 
-    A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call.
+    A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
+    `one_sided` locator is a support: the part may lift off it along `direction`, and may not pass through it.
+    `stiffness` [N/mm] counts in the objective "locator stiffness".
     """
 
     name: str
     point: Vector
     direction: Vector
     tolerance: Tolerance | None
+    one_sided: bool
+    stiffness: float
 
-    def __init__(self, name: str, point: Any, direction: Any, tolerance: Any = None) -> None:
+    def __init__(
+        self,
+        name: str,
+        point: Any,
+        direction: Any,
+        tolerance: Any = None,
+        *,
+        one_sided: bool = False,
+        stiffness: float = 1.0,
+    ) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "point", _vector(point))
         object.__setattr__(self, "direction", _direction(direction))
         object.__setattr__(self, "tolerance", None if tolerance is None else _tolerance(tolerance))
+        object.__setattr__(self, "one_sided", one_sided)
+        object.__setattr__(self, "stiffness", stiffness)
 
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
@@ -38,10 +52,15 @@ class Locator:
             yield 'direction is neither "+x" to "-z" nor a vector of three finite numbers other than zero'
         if self.tolerance is not None:
             yield from self.tolerance.faults()
+        if not isinstance(self.one_sided, bool):
+            yield f"one_sided is {self.one_sided!r}; expected True or False"
+        if not (is_length(self.stiffness) and self.stiffness > 0):
+            yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
 
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
-        return f"locator {self.name}: ({point}) along ({along}), {self.tolerance}"
+        kind = "one-sided locator" if self.one_sided else "locator"
+        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +83,7 @@ class ThreeTwoOne:
     def faults(self) -> Iterator[str]:
         for face in self.faces:
             yield from face.faults()
-        if not (isinstance(self.inset, int | float) and math.isfinite(self.inset) and self.inset >= 0):
+        if not (is_length(self.inset) and self.inset >= 0):
             yield f"inset is {self.inset!r}; expected a length in mm, 0 or above"
 
     def __str__(self) -> str:
@@ -100,10 +119,11 @@ class Location:
                     yield f'locator "{locator.name}" has no tolerance; give it one, or the locate call'
             for name in sorted({name for name in names if names.count(name) > 1}):
                 yield f'locator "{name}" is declared {names.count(name)} times; names must differ'
-            if len(self.scheme) != 6:
+            two_sided = sum(locator.one_sided is False for locator in self.scheme)
+            if len(self.scheme) < 6 or two_sided > 6:
                 yield (
-                    f"it has {len(self.scheme)} locators; a rigid part is held by exactly 6 "
-                    "(3-2-1 or any six independent directions)"
+                    f"it has {len(self.scheme)} locators; a rigid part is held by exactly 6 (3-2-1 or any six independent "
+                    "directions), or by more when no more than six of them are two-sided"
                 )
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())

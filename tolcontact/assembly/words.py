@@ -1,6 +1,7 @@
 """Small vocabulary of declarations: vectors, directions, and the script line that said them."""
 
 import math
+import numbers
 import sys
 from pathlib import Path
 from typing import Any
@@ -40,6 +41,11 @@ def direction(value: Any) -> Vector:
 def is_finite(value: Vector) -> bool:
     """Whether all three components are finite numbers."""
     return all(math.isfinite(component) for component in value)
+
+
+def is_length(value: Any) -> bool:
+    """Whether `value` is a finite number (True and False are none)."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def script_line() -> str:

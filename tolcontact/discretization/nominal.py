@@ -1,6 +1,6 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +27,8 @@ class NominalPart:
     labels               "part.locator" of its locators, () if it has none
     locator_points       (locator, 3) [mm] and `locator_directions` (locator, 3), unit vectors into the part
     tolerances           one per locator
+    stiffness            (locator,) [N/mm]
+    one_sided            (locator,) bool: supports that the part may lift off
     parent               index of the part that it is located on; None for the ground
     """
 
@@ -40,6 +42,8 @@ class NominalPart:
     locator_points: np.ndarray
     locator_directions: np.ndarray
     tolerances: tuple[Tolerance, ...]
+    stiffness: np.ndarray
+    one_sided: np.ndarray
     parent: int | None
     free: bool
 
@@ -51,14 +55,20 @@ class NominalPart:
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
-    """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3)."""
+    """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3).
+
+    One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
+    `locators` holds the column of the deviation of each such point, by which the support stands out along n^r; it is
+    None for a pair of faces.
+    """
 
     name: str
     moving: int
-    reference: int
+    reference: int | None
     P_m: np.ndarray
     P_r: np.ndarray
     n_r: np.ndarray
+    locators: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +123,30 @@ def discretize(assembly: Assembly) -> Nominal:
         for label in dict.fromkeys(labels)
         if labels.count(label) > 1 and clean
     )
+    faults.extend(
+        f"{_where('contact pair', pair)}: its name is that of the one-sided locators of a part; rename it"
+        for pair in assembly.pairs
+        if any(pair.name == _supports(part) for part in assembly.parts if assembly.supports_of(part))
+    )
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
-    return Nominal(
-        assembly, tuple(p for p in parts if p is not None), tuple(p for p in pairs if p is not None), assembly.measures
-    )
+    found = tuple(part for part in parts if part is not None)
+    return Nominal(assembly, found, (*(pair for pair in pairs if pair is not None), *_support_pairs(found)), assembly.measures)
+
+
+def _supports(part: Part) -> str:
+    return f"supports of {part.name}"
+
+
+def _support_pairs(parts: tuple[NominalPart, ...]) -> Iterator[ContactPoints]:
+    """The one-sided locators of each free part, as a contact pair."""
+    first = 0
+    for index, part in enumerate(parts):
+        own = np.flatnonzero(part.one_sided)
+        if part.free and own.size:
+            P, n = part.locator_points[own], part.locator_directions[own]
+            yield ContactPoints(_supports(part.part), index, part.parent, P, P, n, first + own)
+        first += len(part.labels)
 
 
 def _attempt(faults: list[str], where: str, build: Callable[..., Any], *arguments: Any) -> Any:
@@ -148,8 +177,9 @@ def _nominal_part(assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, 
             locators = location.scheme
     points = np.array([locator.point for locator in locators]).reshape(-1, 3) @ R_WP.T + t_WP
     directions = np.array([locator.direction for locator in locators]).reshape(-1, 3) @ R_WP.T
+    one_sided = np.array([locator.one_sided for locator in locators], dtype=bool)
     if locators:
-        _attempt(faults, _where("part", part), _check_independent, points, directions)
+        _attempt(faults, _where("part", part), _check_independent, points, directions, one_sided)
     common = location.tolerance if location else None
     parent = location.on if location else None
     return NominalPart(
@@ -163,24 +193,44 @@ def _nominal_part(assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, 
         locator_points=points,
         locator_directions=directions,
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in locators),
+        stiffness=np.array([float(locator.stiffness) for locator in locators]),
+        one_sided=one_sided,
         parent=assembly.parts.index(parent) if parent in assembly.parts else None,
         free=assembly.is_free(part),
     )
 
 
 def locator_matrix(points: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows [n', (p - c) x n)'] of the locator matrix J (6, 6), and the locators' centroid c (3,) that it turns about."""
+    """Rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and the locators' centroid c (3,) that it turns about."""
     centre = points.mean(axis=0)
     return np.hstack([directions, np.cross(points - centre, directions)]), centre
 
 
-def _check_independent(points: np.ndarray, directions: np.ndarray) -> None:
+def placing_matrix(part: NominalPart) -> tuple[np.ndarray, np.ndarray]:
+    """The matrix M (6, locator) of q = M d, and the centroid c (3,) about which the part turns.
+
+    Six locators give M = J^-1. Of more than six the two-sided ones are kept exactly, and the one-sided ones as well as
+    it goes, in the sense of least squares.
+    """
+    J, centre = locator_matrix(part.locator_points, part.locator_directions)
+    if len(J) == 6:
+        return np.linalg.inv(J), centre
+    held, supports = J[~part.one_sided], J[part.one_sided]
+    kkt = np.block([[supports.T @ supports, held.T], [held, np.zeros((len(held), len(held)))]])
+    M = np.zeros((6, len(J)))
+    inverse = np.linalg.inv(kkt)[:6]
+    M[:, part.one_sided], M[:, ~part.one_sided] = inverse[:, :6] @ supports.T, inverse[:, 6:]
+    return M, centre
+
+
+def _check_independent(points: np.ndarray, directions: np.ndarray, one_sided: np.ndarray) -> None:
     J, centre = locator_matrix(points, directions)
     size = np.sqrt(((points - centre) ** 2).sum(axis=1).mean())
-    condition = np.linalg.cond(J / np.array([1, 1, 1, size, size, size])) if size > 0 else np.inf
+    scaled = J / np.array([1, 1, 1, size, size, size]) if size > 0 else np.zeros_like(J)
+    condition = max(np.linalg.cond(scaled), np.linalg.cond(scaled[~one_sided]) if not one_sided.all() else 0.0)
     if not condition < CONDITION_LIMIT:
         raise GeometryFault(
-            f"its six locators do not fix it: the locator matrix has condition number {condition:.1e}, the limit is "
+            f"its {len(J)} locators do not fix it: the locator matrix has condition number {condition:.1e}, the limit is "
             f"{CONDITION_LIMIT:.0e}; no three points of the primary face may lie on a line, and the directions "
             "together must hold all three translations and all three rotations"
         )
@@ -240,5 +290,5 @@ def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
     """The free parts whose corrections move `part`: those that it is located on, and itself last."""
     location = assembly.location_of(part)
     below = movers(assembly, location.on) if location and location.on else ()
-    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs)
+    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or assembly.supports_of(part)
     return (*below, part) if touches and assembly.is_free(part) else below

@@ -16,6 +16,7 @@ RAW, CORRECTED = "raw", "corrected"
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
 MAX_DECIMALS = 6
+ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
 WIDTH = 80
 
 
@@ -85,8 +86,26 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
         f"{int(n)} {m}" for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)
     )
     yield f"status: {by_status}"
+    stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
+    if stuck:
+        yield f"not assemblable: {percent(summary['not_assemblable'].values)}"
+        yield f"pairs in conflict there: {', '.join(stuck)}"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
+    median, largest = summary["iterations"].values
+    steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
+    yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     yield f"largest true penetration: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
+    yield from _advice(summary, corrected)
+
+
+def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
+    """What to do about penetration that a linear step, or the paper's set of active points, has left."""
+    limit = ADVISED * summary.attrs["smallest_range"]
+    by_status = dict(zip(summary["status_meaning"].values, summary["by_status"].values, strict=True))
+    if penetration > limit and summary.attrs["active_set"] == "initial":
+        yield f"advice: points that were not active at first penetrate by up to {penetration:.3g} mm; use the closed active set"
+    elif summary.attrs["resolution"] == "linearized" and (penetration > limit or by_status["not_converged"]):
+        yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, or not converged; use --resolution exact"
 
 
 def number(values: object, *, sign: bool = False) -> str:

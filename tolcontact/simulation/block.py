@@ -13,7 +13,8 @@ class Status(enum.IntEnum):
 
     UNTOUCHED = 0  # no contact point penetrates: the corrected state is the raw state, to the last bit
     RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
-    NOT_CONVERGED = 2  # they do not hold, or the rows contradict each other: penetration remains
+    NOT_CONVERGED = 2  # they do not hold, or one linear step cannot open all gaps: penetration remains
+    NOT_ASSEMBLABLE = 3  # no pose without penetration was found near; the pose is the one of least penetration
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +26,11 @@ class Block:
     measured      (n, state, measure)
     gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
     active        (n, pair): number of active contact points in the raw state
+    carrying      (n, pair): number of contact points that carry in the corrected state: with more than 1e-4 of the largest reaction
+    reaction      (n, pair): sum of their reactions, in the units of the objective
     status        (n,), Status
     kkt_residual  (n,) [mm], 0 where untouched
+    iterations    (n,): linear steps taken, 0 where untouched
     """
 
     start: int
@@ -35,8 +39,11 @@ class Block:
     measured: np.ndarray
     gap_min: np.ndarray
     active: np.ndarray
+    carrying: np.ndarray
+    reaction: np.ndarray
     status: np.ndarray
     kkt_residual: np.ndarray
+    iterations: np.ndarray
 
     def __len__(self) -> int:
         return len(self.status)

@@ -1,36 +1,72 @@
-"""Resolve contact: constraint generation around the compiled QP of a group.
+"""Resolve contact: constraint generation around the compiled QP of a group, step by step.
 
 The QP has a few slots for rows. All gaps are scanned, the deepest point of each cluster gets a slot, the QP is solved, and
 realizations in which another point is still inside enter again with their carrying points kept. Each round raises the
-optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row.
+optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row: one linear step.
+The linearized resolution takes one. The exact one goes on from the poses reached, with their true gaps, until they stay.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.simulation.scan import pair_scan
+from tolcontact.simulation.scan import PairScan, pair_scan
+from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
+STEPS = 60
 CLUSTERS = 6
 PENETRATION = 1e-10
-KEPT = 8
+AT_REST = 1e-9
+CARRIES = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class Resolution:
-    """Corrections of the realizations `rows` of a block.
+    """What became of the realizations `rows` of a block, as far as one group is concerned.
 
-    poses       (row, part of the group, 12)
-    residual    (row,) [mm]: KKT residual, and any linearized penetration left
+    poses       (row, part of the group, 12), corrected
+    relative    (row, pair of the group, 12): X_RM, corrected
+    residual    (row,) [mm]: KKT residual, any penetration left undone, and in the exact resolution the last step
     slack       (row,) [mm]: penetration that no increment could remove
+    iterations  (row,): linear steps taken
+    slots       which points carry, and their reactions; one for each pair of the group
     """
 
     rows: np.ndarray
     poses: np.ndarray
+    relative: np.ndarray
     residual: np.ndarray
     slack: np.ndarray
+    iterations: np.ndarray
+    slots: list[Slots]
+
+    def reactions(self) -> np.ndarray:
+        """Sum of the reactions of each pair, (row, pair)."""
+        return np.stack([slots.reactions.sum(axis=1) for slots in self.slots], axis=1)
+
+    def carrying(self) -> np.ndarray:
+        """Number of carrying points of each pair, (row, pair); smaller reactions only oppose the regularization."""
+        least = CARRIES * np.max([slots.reactions.max(axis=1) for slots in self.slots], axis=0)
+        return np.stack([(slots.reactions > least[:, None]).sum(axis=1) for slots in self.slots], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What stays the same while the realizations `rows` are resolved; first dimension: the row.
+
+    raw          (row, part of the group, 12)
+    deviations   (row, locator) [mm]
+    moments      (row, side, moment) of the points that count in the objective
+    may_carry    (row, point) for each pair of the group
+    """
+
+    rows: np.ndarray
+    raw: np.ndarray
+    deviations: np.ndarray
+    moments: np.ndarray
+    may_carry: list[np.ndarray]
 
 
 class ContactResolver:
@@ -43,8 +79,8 @@ class ContactResolver:
         self._solve = group.solve
         self._accuracy = program.plugin.accuracy
         self._tolerance = max(program.plugin.accuracy / 100, PENETRATION)
-        self._activity = program.method.activity
-        self._closed = program.method.active_set == "closed"
+        self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
+        self._method = program.method
         self._scans = [
             pair_scan(
                 program.nominal.pairs[pair],
@@ -55,32 +91,108 @@ class ContactResolver:
             for position, pair in enumerate(group.group.pairs)
         ]
 
-    def resolve(self, poses: np.ndarray, relative: np.ndarray) -> Resolution:
-        """Correct the realizations of a block in which a point of this group is inside.
+    def resolve(self, poses: np.ndarray, relative: np.ndarray, deviations: np.ndarray) -> Resolution:
+        """Correct the realizations of a block that this group does not leave as they are.
 
-        poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw.
+        poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw; deviations
+        (realization, locator) [mm]. Forces move every realization, else contact those in which a point is inside.
         """
-        gaps = [scan.gaps(relative[:, pair]) for scan, pair in zip(self._scans, self.pairs, strict=True)]
-        rows = np.flatnonzero(np.any([gap.min(axis=1) < -self._tolerance for gap in gaps], axis=0))
-        gaps = [gap[rows] for gap in gaps]
-        active = [gap < self._activity for gap in gaps]
-        moments = np.concatenate([scan.moments(on) for scan, on in zip(self._scans, active, strict=True)], axis=1)
-        may_carry = [np.ones_like(on) if self._closed else on for on in active]
-        result = Resolution(rows, poses[rows][:, self.parts].copy(), np.full(len(rows), np.inf), np.full(len(rows), np.inf))
-        slots = [Slots.empty(len(rows), self._slots) for _ in self._scans]
-        open_ = np.arange(len(rows))
-        raw = poses[rows][:, self.parts]
-        for _ in range(ROUNDS):
-            more = np.zeros(len(open_), dtype=bool)
+        gaps = [scan.gaps(relative[:, pair], deviations) for scan, pair in zip(self._scans, self.pairs, strict=True)]
+        inside = np.any([gap.min(axis=1) < -self._tolerance for gap in gaps], axis=0)
+        rows = np.arange(len(poses)) if self._method.objective == "seating" else np.flatnonzero(inside)
+        task = self._task(rows, poses[rows][:, self.parts], deviations[rows], [gap[rows] for gap in gaps])
+        result = Resolution(
+            rows=rows,
+            poses=task.raw.copy(),
+            relative=relative[rows][:, self.pairs],
+            residual=np.full(len(rows), np.inf),
+            slack=np.full(len(rows), np.inf),
+            iterations=np.zeros(len(rows), dtype=int),
+            slots=[Slots.empty(len(rows), self._slots) for _ in self._scans],
+        )
+        moving = np.arange(len(rows))
+        for _ in range(STEPS if self._method.resolution == "exact" else 1):
+            if not moving.size:
+                break
+            step = self._step(task, result, moving)
+            if self._method.resolution == "exact":
+                result.residual[moving] = np.maximum(result.residual[moving], step)
+            moving = moving[step > self._at_rest]
+        return result
+
+    def _task(self, rows: np.ndarray, raw: np.ndarray, deviations: np.ndarray, gaps: list[np.ndarray]) -> Task:
+        active = [gap < self._method.activity for gap in gaps]
+        counts = [self._counts(scan, on) for scan, on in zip(self._scans, active, strict=True)]
+        return Task(
+            rows=rows,
+            raw=raw,
+            deviations=deviations,
+            moments=np.concatenate([scan.moments(on) for scan, on in zip(self._scans, counts, strict=True)], axis=1),
+            may_carry=[
+                np.ones_like(on) if self._method.active_set == "closed" or scan.locators is not None else on
+                for scan, on in zip(self._scans, active, strict=True)
+            ],
+        )
+
+    def _counts(self, scan: PairScan, active: np.ndarray) -> np.ndarray:
+        """Which points (row, point) count in the objective. Supports are not among the paper's contact points."""
+        if scan.locators is not None:
+            return np.zeros_like(active)
+        return np.ones_like(active) if self._method.objective == "all points" else active
+
+    def _step(self, task: Task, result: Resolution, moving: np.ndarray) -> np.ndarray:
+        """One linear step of the rows `moving`, and (row,) its size [mm]: the QP in which every point has its row."""
+        now = result.poses[moving]
+        gaps = [scan.gaps(result.relative[moving, k], task.deviations[moving]) for k, scan in enumerate(self._scans)]
+        slots = [s.take(moving) for s in result.slots]
+        step = np.zeros(len(moving))
+        open_ = np.arange(len(moving))
+        for number in range(ROUNDS):
+            more = np.full(len(open_), number == 0)
             for k, scan in enumerate(self._scans):
-                inside = np.where(may_carry[k][open_], gaps[k], np.inf)
-                slots[k], grown = slots[k].with_deepest(*scan.deepest(inside), self._tolerance)
+                candidates = np.where(task.may_carry[k][moving[open_]], gaps[k], np.inf)
+                slots[k], grown = slots[k].with_deepest(*scan.deepest(candidates), self._tolerance)
                 more |= grown
-            open_, gaps, slots = open_[more], [g[more] for g in gaps], [s.take(more) for s in slots]
+            open_, gaps, slots = open_[more], [gap[more] for gap in gaps], [s.take(more) for s in slots]
             if not open_.size:
                 break
-            gaps, slots = self._solve_round(result, open_, raw, moments, may_carry, slots)
-        return result
+            gaps, slots, step[open_] = self._solve_round(task, result, moving[open_], now[open_], slots)
+        result.iterations[moving] += 1
+        return step
+
+    def _solve_round(
+        self, task: Task, result: Resolution, rows: np.ndarray, now: np.ndarray, slots: list[Slots]
+    ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
+        """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
+        held = [(scan, scan.deviated(task.deviations[rows], s.points), s) for scan, s in zip(self._scans, slots, strict=True)]
+        answer = self._answer(
+            poses=now,
+            raw=task.raw[rows],
+            moments=task.moments[rows],
+            deviations=task.deviations[rows],
+            damping=np.zeros(len(rows)),
+            P_m=np.concatenate([scan.P_m[s.points] for scan, _, s in held], axis=1),
+            P_r=np.concatenate([P_r for _, P_r, _ in held], axis=1),
+            n_r=np.concatenate([scan.n_r[s.points] for scan, _, s in held], axis=1),
+            filled=np.concatenate([s.filled for s in slots], axis=1),
+        )
+        linearized = answer["linearized"].reshape(len(rows), len(self._scans), ENTRIES)
+        gaps = [scan.gaps(linearized[:, k], task.deviations[rows]) for k, scan in enumerate(self._scans)]
+        inside = [np.where(task.may_carry[k][rows], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
+        slack = answer["slack"][:, 0]
+        # With the rows in conflict every carrying point stays inside by the slack; only what exceeds it is left undone.
+        left = np.maximum(np.max(inside, axis=0) - np.maximum(slack, 0), 0)
+        residual = np.maximum(_residual(answer), left)
+        solved = np.isfinite(residual)
+        result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), len(self.parts), ENTRIES)[solved]
+        result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
+        result.residual[rows] = np.where(solved, residual, np.inf)
+        result.slack[rows] = slack
+        slots = [s.carrying(m) for s, m in zip(slots, np.split(answer["multipliers"], len(slots), axis=1), strict=True)]
+        for kept, s in zip(result.slots, slots, strict=True):
+            kept.put(rows, s)
+        gaps = [np.where(solved[:, None], gap + np.maximum(slack, 0)[:, None], np.inf) for gap in gaps]
+        return gaps, slots, np.where(solved, answer["step"][:, 0], 0.0)
 
     def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
         """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
@@ -97,80 +209,9 @@ class ContactResolver:
                     answer[name][k] = values[0]
         return answer
 
-    def _solve_round(
-        self,
-        result: Resolution,
-        open_: np.ndarray,
-        raw: np.ndarray,
-        moments: np.ndarray,
-        may_carry: list[np.ndarray],
-        slots: "list[Slots]",
-    ) -> "tuple[list[np.ndarray], list[Slots]]":
-        """Solve the QPs of the open realizations, note the answers, and return linearized gaps and slots after it."""
-        held = [(scan, s.points) for scan, s in zip(self._scans, slots, strict=True)]
-        answer = self._answer(
-            poses=raw[open_],
-            moments=moments[open_],
-            P_m=np.concatenate([scan.P_m[points] for scan, points in held], axis=1),
-            P_r=np.concatenate([scan.P_r[points] for scan, points in held], axis=1),
-            n_r=np.concatenate([scan.n_r[points] for scan, points in held], axis=1),
-            filled=np.concatenate([s.filled for s in slots], axis=1),
-        )
-        linearized = answer["linearized"].reshape(len(open_), len(self._scans), ENTRIES)
-        gaps = [scan.gaps(linearized[:, k]) for k, scan in enumerate(self._scans)]
-        inside = [np.where(may_carry[k][open_], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
-        slack = answer["slack"][:, 0]
-        # With the rows in conflict every carrying point stays inside by the slack; only what exceeds it is left undone.
-        left = np.maximum(np.max(inside, axis=0) - np.maximum(slack, 0), 0)
-        residual = np.maximum(_residual(answer), left)
-        solved = np.isfinite(residual)
-        result.poses[open_[solved]] = answer["corrected"].reshape(len(open_), len(self.parts), ENTRIES)[solved]
-        result.residual[open_] = np.where(solved, residual, np.inf)
-        result.slack[open_] = slack
-        multipliers = np.split(answer["multipliers"], len(self._scans), axis=1)
-        gaps = [np.where(solved[:, None], gap + np.maximum(slack, 0)[:, None], np.inf) for gap in gaps]
-        return gaps, [s.carrying(m) for s, m in zip(slots, multipliers, strict=True)]
-
 
 def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:
     """KKT residual (row,) [mm]; infinite where the solver gave nothing usable."""
     residual = np.maximum(answer["stationarity"], answer["natural_residual"])[:, 0]
     usable = np.isfinite(residual) & np.isfinite(answer["corrected"]).all(axis=1)
     return np.where(usable, residual, np.inf)
-
-
-@dataclass(frozen=True, eq=False)
-class Slots:
-    """Which contact points of a pair have a row: points (row, slot), and which slots are in use (row, slot)."""
-
-    points: np.ndarray
-    filled: np.ndarray
-
-    @classmethod
-    def empty(cls, rows: int, slots: int) -> "Slots":
-        return cls(np.zeros((rows, slots), dtype=int), np.zeros((rows, slots), dtype=bool))
-
-    def take(self, rows: np.ndarray) -> "Slots":
-        return Slots(self.points[rows], self.filled[rows])
-
-    def carrying(self, multipliers: np.ndarray) -> "Slots":
-        """Only the slots whose rows carry, at most KEPT of them, largest multipliers first."""
-        largest = np.where(self.filled, multipliers, 0.0)
-        order = np.argsort(-largest, axis=1, kind="stable")
-        sorted_ = np.take_along_axis(largest, order, axis=1)
-        carries = sorted_ > 1e-9 * np.maximum(sorted_[:, :1], 1e-9)
-        carries[:, KEPT:] = False
-        return Slots(np.take_along_axis(self.points, order, axis=1), carries)
-
-    def with_deepest(self, points: np.ndarray, depth: np.ndarray, tolerance: float) -> "tuple[Slots, np.ndarray]":
-        """Fill the free slots with the deepest of the candidate `points` (row, cluster) that are inside.
-
-        Returns the new slots, and (row,) whether any candidate was new.
-        """
-        known = ((points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]).any(axis=2)
-        new = (depth > tolerance) & ~known
-        urgency = np.hstack([np.where(self.filled, np.inf, -np.inf), np.where(new, depth, -np.inf)])
-        order = np.argsort(-urgency, axis=1, kind="stable")[:, : self.points.shape[1]]
-        every = np.hstack([self.points, points])
-        filled = np.take_along_axis(urgency, order, axis=1) > -np.inf
-        return Slots(np.take_along_axis(every, order, axis=1), filled), new.any(axis=1)

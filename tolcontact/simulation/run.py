@@ -34,25 +34,32 @@ def simulate_block(
 
     poses = raw.copy()
     touched, residual, slack = np.zeros(count, dtype=bool), np.zeros(count), np.zeros(count)
+    iterations, carrying = np.zeros(count, dtype=int), np.zeros((count, len(nominal.pairs)), dtype=int)
+    reaction = np.zeros((count, len(nominal.pairs)))
     for resolver in resolvers:
-        found = resolver.resolve(raw, relative_raw)
+        found = resolver.resolve(raw, relative_raw, deviations)
         poses[np.ix_(found.rows, resolver.parts)] = found.poses
         touched[found.rows] = True
         residual[found.rows] = np.maximum(residual[found.rows], found.residual)
         slack[found.rows] = np.maximum(slack[found.rows], found.slack)
+        iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
+        carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying()
+        reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions()
     measured, relative = measured_raw.copy(), relative_raw.copy()
     measured[touched], relative[touched] = _observe(program, poses[touched])
 
     accuracy = program.plugin.accuracy
-    fine = (residual <= accuracy) & (slack <= accuracy)
-    status = np.where(touched, np.where(fine, Status.RESOLVED, Status.NOT_CONVERGED), Status.UNTOUCHED)
+    stuck = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
+    status = np.where(slack <= accuracy, Status.RESOLVED, stuck)
+    status = np.where(residual <= accuracy, status, Status.NOT_CONVERGED)
+    status = np.where(touched, status, Status.UNTOUCHED)
     gap_min, active = np.empty((count, 2, len(nominal.pairs))), np.empty((count, len(nominal.pairs)), dtype=int)
     for pair, matrix in enumerate(program.gaps):
         scan = pair_scan(nominal.pairs[pair], matrix, [], 1)
-        gaps = scan.gaps(relative_raw[:, pair])
+        gaps = scan.gaps(relative_raw[:, pair], deviations)
         active[:, pair] = (gaps < program.method.activity).sum(axis=1)
         gap_min[:, 0, pair] = gaps.min(axis=1)
-        gap_min[:, 1, pair] = scan.gaps(relative[:, pair]).min(axis=1)
+        gap_min[:, 1, pair] = scan.gaps(relative[:, pair], deviations).min(axis=1)
     return Block(
         start=start,
         deviations=deviations,
@@ -60,8 +67,11 @@ def simulate_block(
         measured=np.stack([measured_raw, measured], axis=1),
         gap_min=gap_min,
         active=active,
+        carrying=carrying,
+        reaction=reaction,
         status=status.astype(np.int8),
         kkt_residual=residual,
+        iterations=iterations,
     )
 
 

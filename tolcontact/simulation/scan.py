@@ -19,6 +19,7 @@ class PairScan:
     matrix             (13, point): gaps [mm] = [X_RM, 1] @ matrix
     tables             moment tables (moment, point) of the sides that enter the objective
     P_m, P_r, n_r      (point, 3)
+    locators           columns of the deviations by which points stand out, (point,); None where none does
     clusters           slices of points that are neighbours
     """
 
@@ -27,15 +28,24 @@ class PairScan:
     P_m: np.ndarray
     P_r: np.ndarray
     n_r: np.ndarray
+    locators: np.ndarray | None
     clusters: tuple[slice, ...]
 
-    def gaps(self, relative: np.ndarray) -> np.ndarray:
-        """Gaps (realization, point) [mm] for entries (realization, 12) of X_RM."""
+    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
         result = np.repeat(self.matrix[-1:], len(relative), axis=0)
         term = np.empty_like(result)
         for entry, row in zip(relative.T, self.matrix, strict=False):
             result += np.multiply(entry[:, None], row, out=term)
-        return result
+        return result if self.locators is None else result - deviations[:, self.locators]
+
+    def deviated(self, deviations: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """P^r (realization, slot, 3) of some `points` (realization, slot), standing out by their deviations along n^r."""
+        P_r = np.asarray(self.P_r[points])
+        if self.locators is None:
+            return P_r
+        height = np.take_along_axis(deviations, self.locators[points], axis=1)
+        return np.asarray(P_r + height[..., None] * self.n_r[points])
 
     def moments(self, active: np.ndarray) -> np.ndarray:
         """Moments (realization, side, moment) of the points where `active` (realization, point)."""
@@ -49,8 +59,8 @@ class PairScan:
 
 
 def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray], clusters: int) -> PairScan:
-    """Sort the points of a pair into at most `clusters` clusters of neighbours."""
-    label = _cluster(pair.P_m, clusters)
+    """Sort the points of a pair into at most `clusters` clusters of neighbours; supports all have one of their own."""
+    label = _cluster(pair.P_m, clusters if pair.locators is None else len(pair.P_m))
     order = np.argsort(label, kind="stable")
     ends = np.cumsum(np.bincount(label))
     slices = tuple(slice(int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
@@ -60,6 +70,7 @@ def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray],
         P_m=pair.P_m[order],
         P_r=pair.P_r[order],
         n_r=pair.n_r[order],
+        locators=None if pair.locators is None else pair.locators[order],
         clusters=slices,
     )
 

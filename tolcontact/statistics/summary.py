@@ -21,6 +21,8 @@ STATISTICS: dict[str, Callable[[np.ndarray], Estimate]] = {
     **{f"{percent:g} %": functools.partial(intervals.percentile, percent=percent) for percent in PERCENTILES},
 }
 OUTSIDE = "outside tolerance"
+NOT_ASSEMBLABLE = words.STATUS_MEANINGS.index("not_assemblable")
+CONFLICT = 1e-3
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
 
 
@@ -31,7 +33,10 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     change          (measure, change_of, bound)          corrected against raw, from the same realizations
     touched         (bound)                              share of realizations that contact touched
     by_status       (status_meaning)                     number of realizations
+    not_assemblable (bound)                              share of realizations without a pose free of penetration
+    conflicts       (pair)                               in how many of these a pair is among those in conflict
     penetration     (state)                              largest true penetration of any contact point [mm]
+    iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
     """
     rows = results.to_dataset().isel({words.REALIZATION: finished(results)})
@@ -48,6 +53,9 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
             "change": ((words.MEASURE, "change_of", "bound"), changes),
             "touched": (("bound",), np.array(intervals.share(status != 0))),
             "by_status": (("status_meaning",), np.bincount(status.astype(int), minlength=len(words.STATUS_MEANINGS))),
+            "not_assemblable": (("bound",), np.array(intervals.share(status == NOT_ASSEMBLABLE))),
+            "conflicts": ((words.PAIR,), in_conflict(rows).sum(axis=0)),
+            "iterations": (("of_iterations",), _iterations(rows, status)),
             "penetration": ((words.STATE,), np.maximum(deepest, 0), {"units": "mm"}),
             "field_extreme": (
                 (words.PART, words.STATE, "extreme", "bound"),
@@ -63,12 +71,44 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
             "change_of": [SHIFT, SPREAD_RATIO, VARIANCE_RATIO],
             "status_meaning": list(words.STATUS_MEANINGS),
             words.PART: parts,
+            words.PAIR: rows[words.PAIR].values,
+            "of_iterations": ["median", "largest"],
             "extreme": ["least", "largest"],
             "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),
             "measure_tolerance": (words.MEASURE, rows[words.MEASURE_TOLERANCE.name].values),
         },
-        attrs={"title": results.attrs.get("title", ""), "realizations": len(status)},
+        attrs={
+            "title": results.attrs.get("title", ""),
+            "realizations": len(status),
+            **{word: results.attrs[word] for word in ("resolution", "objective", "active_set")},
+            "smallest_range": _smallest_range(results, rows),
+        },
     )
+
+
+def in_conflict(rows: xr.Dataset) -> np.ndarray:
+    """Which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
+
+    The reactions of the rows in conflict grow until their sum pays for the penetration, a thousand times and more the
+    reactions of a pair that merely rests.
+    """
+    reaction = rows[words.REACTION.name].transpose(words.REALIZATION, words.PAIR).values
+    stuck = rows[words.STATUS.name].values == NOT_ASSEMBLABLE
+    return np.asarray(stuck[:, None] & (reaction > CONFLICT * reaction.sum(axis=1, keepdims=True)))
+
+
+def _iterations(rows: xr.Dataset, status: np.ndarray) -> list[float]:
+    taken = rows[words.ITERATIONS.name].values[status != 0]
+    return [float(np.median(taken)), float(taken.max())] if taken.size else [0.0, 0.0]
+
+
+def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
+    """The smallest tolerance range above 0 of any locator or measure [mm]; infinite where there is none."""
+    locators = results["sample"].to_dataset()[words.TOLERANCE_RANGE.name].values
+    ranges = np.concatenate(
+        [locators, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
+    )
+    return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 
 def finished(results: xr.DataTree) -> np.ndarray:

@@ -1,220 +1,171 @@
 """The contact QP of one group of parts, as one CasADi Function, paper (9) to (12).
 
-min 1/2 y'Hy + L s + 1/2 s^2   subject to   g_i + A_i y + SLACK s >= 0,  s >= 0
+min 1/2 y'Hy + f'y + L s + 1/2 s^2   subject to   g_i + A_i y + SLACK s >= 0,  h_j + B_j y = 0,  s >= 0
 
 The increments z = (dt, L w) of a mover, all in mm (L is a length of the group's size), are z = U^-1 y, where U'U is the
 mover's own block of (11): H then has unit blocks on its diagonal, and the few freedoms that only the regularization holds
 are as well conditioned as the others. s makes the problem solvable whatever the gaps are; its price is so high that
-it stays zero unless the rows contradict each other (an exact penalty).
+it stays zero unless the rows contradict each other (an exact penalty). f, the pull of the objective at the present poses,
+is zero in the raw state but for forces; h are the two-sided locators, where the objective holds them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.discretization.nominal import movers
+from tolcontact.discretization import Nominal
 from tolcontact.method import Method
-from tolcontact.symbolic.correction import FREEDOMS, Carried, Twist, corrected, increments, total
+from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, rigid
+from tolcontact.symbolic.criterion import criterion, proximity, two_sided
 from tolcontact.symbolic.gap import gap
-from tolcontact.symbolic.objective import MOMENTS, displacement_energy, moment_table
+from tolcontact.symbolic.groups import Group
+from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import Plugin, solver
 from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "moments", "P_m", "P_r", "n_r", "filled")
-OUTPUTS = ("corrected", "linearized", "multipliers", "stationarity", "natural_residual", "slack")
-
-
-@dataclass(frozen=True, eq=False)
-class Side:
-    """One side of a pair whose points can be displaced: where they are, and the part that they belong to."""
-
-    pair: int
-    part: int
-    points: np.ndarray
-    centre: np.ndarray
-
-    @property
-    def table(self) -> np.ndarray:
-        """Shape (moment, point)."""
-        return moment_table(self.points, self.centre)
-
-
-@dataclass(frozen=True, eq=False)
-class Group:
-    """Parts that contact couples to each other, and the fixed parts that they touch.
-
-    parts, pairs     indices into the nominal model's
-    free             indices of the movers among all parts
-    carried          one per part of `parts`
-    sides            sides of pairs that enter the objective, in the order of the Function's moments
-    length           root mean square distance of the contact points from their centroid [mm]
-    """
-
-    parts: tuple[int, ...]
-    pairs: tuple[int, ...]
-    free: tuple[int, ...]
-    carried: tuple[Carried, ...]
-    sides: tuple[Side, ...]
-    length: float
-
-
-def contact_groups(nominal: Nominal) -> list[Group]:
-    """The groups of parts that contact couples: what touches only fixed parts in common stays apart."""
-    chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
-    clusters: list[set[int]] = []
-    for pair in nominal.pairs:
-        joined = set(chains[pair.moving]) | set(chains[pair.reference])
-        for cluster in [c for c in clusters if c & joined]:
-            clusters.remove(cluster)
-            joined |= cluster
-        clusters.append(joined)
-    return [_group(nominal, chains, tuple(sorted(cluster))) for cluster in clusters]
-
-
-def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...]) -> Group:
-    own = [
-        (index, pair) for index, pair in enumerate(nominal.pairs) if {*chains[pair.moving], *chains[pair.reference]} & set(free)
-    ]
-    moved = {part for part, chain in enumerate(chains) if {*chain} & {*free}}
-    parts = tuple(sorted(moved.union(*((pair.moving, pair.reference) for _, pair in own))))
-    points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
-    for _, pair in own:
-        points[pair.moving].append(pair.P_m)
-        points[pair.reference].append(pair.P_r)
-    # A part without contact points of its own turns about those of the last part that moves it.
-    centre = {part: np.vstack(points[part] or points[chains[part][-1]]).mean(axis=0) for part in parts}
-    references = {pair.reference for _, pair in own}
-    sides = [
-        Side(position, parts.index(part), P, centre[part])
-        for position, (_, pair) in enumerate(own)
-        for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
-        if chains[part]
-    ]
-    every = np.vstack([pair.P_m for _, pair in own])
-    length = float(np.sqrt(((every - every.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    return Group(
-        parts=parts,
-        pairs=tuple(index for index, _ in own),
-        free=free,
-        carried=tuple(
-            Carried(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
-        ),
-        sides=tuple(sides),
-        length=length or 1.0,
-    )
+INPUTS = ("poses", "raw", "moments", "deviations", "damping", "P_m", "P_r", "n_r", "filled")
+OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
 def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plugin) -> ca.Function:
     """The Function of a group; named inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` = q * SLOTS rows.
 
-    poses (12 p)         raw poses of the group's parts
-    moments (10, sides)  moments of the active points of each side
+    poses (12 p)         poses of the group's parts about which the gaps are linearized
+    raw (12 p)           their raw poses, from which displacements count
+    moments (10, sides)  moments of the points of each side that count in the objective
+    deviations (l)       of all locators of the model [mm]
+    damping              weight of staying near `poses`, 0 for none
     P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
     filled (k)           1 where a slot holds a point, 0 where it is empty
 
     corrected (12 p)     poses after the correction
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
-    multipliers (k)      of the rows, >= 0 [mm]
-    stationarity, natural_residual   KKT residuals [mm]: max |Hz + f - A'lambda| and max |min(row, lambda)|
+    relative (12 q)      X_RM of every pair at `corrected`
+    multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
+    stationarity, natural_residual   KKT residuals [mm]: max |Hy + f - A'lambda| and max |min(row, lambda)|
     slack                penetration that no increment could remove, to first order [mm]
+    step                 largest increment (dt, L w) of a mover [mm]
     """
-    pairs = [nominal.pairs[index] for index in group.pairs]
-    rows = SLOTS * len(pairs)
+    rows = SLOTS * len(group.pairs)
     inputs = [
         ca.SX.sym("poses", ENTRIES * len(group.parts)),
+        ca.SX.sym("raw", ENTRIES * len(group.parts)),
         ca.SX.sym("moments", MOMENTS, len(group.sides)),
+        ca.SX.sym("deviations", len(nominal.locator_labels)),
+        ca.SX.sym("damping"),
         *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", rows),
     ]
-    assemble, finish = _around_the_solver(group, pairs, method, inputs)
-    h, a = assemble.sparsity_out("h"), assemble.sparsity_out("a")
-    qp = solver(plugin, h, a)
-    size = h.size1()
+    assemble, finish = _around_the_solver(nominal, group, method, inputs)
+    qp = solver(plugin, assemble.sparsity_out("h"), assemble.sparsity_out("a"))
     arguments = [ca.MX.sym(name, *symbol.shape) for name, symbol in zip(INPUTS, inputs, strict=True)]
-    H, A, lower, U = assemble(*arguments)
-    cost = np.zeros(size)
-    cost[-1] = group.length
+    H, f, A, lower, upper, U = assemble(*arguments)
+    size = H.size1()
     at_least = np.full(size, -np.inf)
     at_least[-1] = 0.0
     solved = qp(
-        h=H, g=cost, a=A, lba=lower, uba=np.full(rows, np.inf), lbx=at_least, ubx=np.full(size, np.inf),
-        x0=np.zeros(size), lam_x0=np.zeros(size), lam_a0=np.zeros(rows),
+        h=H, g=f, a=A, lba=lower, uba=upper, lbx=at_least, ubx=np.full(size, np.inf),
+        x0=np.zeros(size), lam_x0=np.zeros(size), lam_a0=np.zeros(A.size1()),
     )  # fmt: skip
-    results = finish(*arguments, H, A, lower, U, solved["x"], solved["lam_a"], solved["lam_x"])
+    results = finish(*arguments, H, f, A, lower, U, solved["x"], solved["lam_a"], solved["lam_x"])
     return ca.Function("contact", arguments, list(results), list(INPUTS), list(OUTPUTS))
 
 
-def _around_the_solver(
-    group: Group, pairs: Sequence[ContactPoints], method: Method, inputs: list[ca.SX]
-) -> tuple[ca.Function, ca.Function]:
-    """What stands before and after the solver: (inputs -> H, A, lower bound, U) and (those, solution -> outputs)."""
-    entries, moments, P_m, P_r, n_r, filled = inputs
-    raw = poses_of(entries)
+def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
+    """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
+    entries, raw_entries, moments, deviations, damping, P_m, P_r, n_r, filled = inputs
+    now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
-    position = {part: k for k, part in enumerate(group.parts)}
-    centres = [raw[position[part]].place(ca.DM(group.carried[position[part]].centre)) for part in group.free]
+    centres = [now[k].place(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
     moves = increments(z, group.length, centres)
-    twists = [total(part, X, moves) for part, X in zip(group.carried, raw, strict=True)]
-    poses = [corrected(*each) for each in zip(group.carried, raw, twists, strict=True)]
+    moved = [linear(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
+    update = rigid if method.resolution == "exact" else published
+    poses = [update(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
 
     rows, constants, linearized = [], [], []
-    for k, pair in enumerate(pairs):
-        moving, reference = position[pair.moving], position[pair.reference]
-        X_RM = relative(poses[moving], poses[reference]).vector()
-        by_z = ca.substitute(ca.jacobian(X_RM, z), z, at_rest)
-        now = relative(raw[moving], raw[reference]).vector()
-        linearized.append(now + by_z @ z)
+    for k, (before, after) in enumerate(zip(_pairs(nominal, group, now), _pairs(nominal, group, moved), strict=True)):
+        by_z = ca.substitute(ca.jacobian(after.vector(), z), z, at_rest)
+        linearized.append(before.vector() + by_z @ z)
         for slot in range(k * SLOTS, (k + 1) * SLOTS):
             X = ca.SX.sym("X_RM", ENTRIES)
             g = gap(pose_of(X), P_m[:, slot], P_r[:, slot], n_r[:, slot])
-            rows.append(ca.substitute(ca.jacobian(g, X), X, now) @ by_z)
-            constants.append(ca.substitute(g, X, now))
-    H, U = _conditioned(_objective(group, method, moments, raw, moves, twists, z))
-    A = ca.horzcat(ca.solve(U.T, ca.vertcat(*rows).T).T, ca.DM(np.full(len(rows), SLACK)))
-    idle, far = _idle_rows(*A.shape), -FAR * group.length
-    A = ca.if_else(ca.repmat(filled, 1, A.size2()), A, idle)
-    lower = ca.if_else(filled, -ca.vertcat(*constants), far)
+            rows.append(ca.substitute(ca.jacobian(g, X), X, before.vector()) @ by_z)
+            constants.append(ca.substitute(g, X, before.vector()))
+    slots = len(rows)
+    held, elongation = _held(nominal, group, moved, deviations, z) if method.objective == "seating" else (0, ca.SX(0, 1))
+    goal = criterion(nominal, group, method, moments, raw, moved, z)
+    Q, pull = ca.hessian(goal.energy + damping * proximity(group, now, moved, z), z)
+    H, U = _conditioned(ca.substitute(Q, z, at_rest))
+    whiten = _whitening(U)
+    A = ca.vertcat(*rows) @ whiten
+    A = ca.vertcat(*(_or_idle(filled[k], A[k, :], k) for k in range(slots)))
+    B = ca.substitute(ca.jacobian(elongation, z), z, at_rest) @ whiten
+    A = ca.blockcat([[A, ca.DM(np.full(slots, SLACK))], [B, ca.SX(held, 1)]])
+    rest = -ca.substitute(elongation, z, at_rest)
+    lower = ca.vertcat(ca.if_else(filled, -ca.vertcat(*constants), -FAR * group.length), rest)
+    upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
+    f = ca.vertcat(whiten.T @ ca.substitute(pull, z, at_rest), group.length)
     H = ca.diagcat(H, 1)
-    assemble = ca.Function("assemble", inputs, [H, A, lower, U], list(INPUTS), ["h", "a", "lower", "u"])
+    assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
 
-    x = ca.SX.sym("x", z.numel() + 1)
-    lam_a, lam_x = ca.SX.sym("lam_a", len(rows)), ca.SX.sym("lam_x", x.numel())
+    x, lam_a, lam_x = ca.SX.sym("x", z.numel() + 1), ca.SX.sym("lam_a", slots + held), ca.SX.sym("lam_x", z.numel() + 1)
     # The results get the QP's matrices as inputs, so that nothing is computed twice and the residuals are of what was solved.
     H_in, A_in, U_in = (ca.SX.sym("M", matrix.sparsity()) for matrix in (H, A, U))
-    lower_in = ca.SX.sym("lower", len(rows))
-    price = ca.vertcat(ca.SX.zeros(z.numel()), group.length)
-    stationarity = ca.norm_inf(H_in @ x + price + A_in.T @ lam_a + lam_x)
-    natural = ca.norm_inf(ca.fmin(A_in @ x - lower_in, -lam_a))
+    f_in, lower_in = ca.SX.sym("f", f.shape), ca.SX.sym("lower", lower.shape)
+    excess = A_in @ x - lower_in
+    complementarity = ca.norm_inf(ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(x[-1], -lam_x[-1])))
     results = [
         ca.vertcat(*(pose.vector() for pose in poses)),
         ca.vertcat(*linearized),
-        -lam_a * filled,
-        stationarity,
-        ca.fmax(natural, ca.fabs(ca.fmin(x[-1], -lam_x[-1]))),
+        ca.vertcat(*(X_RM.vector() for X_RM in _pairs(nominal, group, poses))),
+        -lam_a[:slots] * filled * goal.scale,
+        ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x),
+        ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
         SLACK * x[-1],
+        ca.norm_inf(z),
     ]
-    step = ca.solve(U_in, x[:-1])
+    step = _whitening(U_in) @ x[:-1]
     results = [ca.substitute(result, z, step) for result in results]
-    finish = ca.Function("finish", [*inputs, H_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
+    finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
     return assemble, finish
 
 
-def _idle_rows(rows: int, columns: int) -> ca.DM:
-    """Rows for empty slots, in general position; with a bound far away they never bind.
+def _pairs(nominal: Nominal, group: Group, poses: Sequence[Pose]) -> list[Pose]:
+    """X_RM of the group's pairs."""
+    pairs = [nominal.pairs[index] for index in group.pairs]
+    return [
+        poses[group.position(pair.moving)]
+        if pair.reference is None
+        else relative(poses[group.position(pair.moving)], poses[group.position(pair.reference)])
+        for pair in pairs
+    ]
+
+
+def _held(nominal: Nominal, group: Group, poses: Sequence[Pose], deviations: ca.SX, z: ca.SX) -> tuple[int, ca.SX]:
+    """How far the two-sided locators of the free parts are from where they hold their part [mm], and their number."""
+    labels = np.cumsum([0, *(len(part.labels) for part in nominal.parts)])
+    apart = []
+    for part in group.free:
+        columns = labels[part] + np.flatnonzero(~nominal.parts[part].one_sided)
+        if columns.size:
+            apart.append(two_sided(nominal, group, part, poses, z) - deviations[[int(c) for c in columns]])
+    elongation = ca.vertcat(*apart) if apart else ca.SX(0, 1)
+    return elongation.numel(), elongation
+
+
+def _or_idle(filled: ca.SX, row: ca.SX, seed: int) -> ca.SX:
+    """A row, or where its slot is empty one in general position that with a bound far away never binds.
 
     Rows of zeros would do for other plugins, but qpOASES starts from the rows that carried in the previous problem, and
     fails where one of those has become zero.
     """
-    directions = np.random.default_rng(0).normal(size=(rows, columns))
-    directions[:, -1] = 0
-    return ca.DM(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    idle = np.random.default_rng(seed).normal(size=row.nnz())
+    return ca.SX(row.sparsity(), ca.if_else(filled, row.T.nz[:], ca.DM(idle / np.linalg.norm(idle))))
 
 
 def _conditioned(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
@@ -231,27 +182,7 @@ def _conditioned(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.sparsify(ca.blockcat(blocks)), ca.diagcat(*factors)
 
 
-def _objective(
-    group: Group,
-    method: Method,
-    moments: ca.SX,
-    raw: Sequence[Pose],
-    moves: Sequence[Twist],
-    twists: Sequence[Twist],
-    z: ca.SX,
-) -> ca.SX:
-    """Q of (11) in the variables z, divided by the number of active points."""
-    energy = ca.SX(0)
-    for k, side in enumerate(group.sides):
-        energy += displacement_energy(moments[:, k], side.centre, raw[side.part], twists[side.part])
-        if method.regularization == "points":
-            everything = ca.SX(side.table.sum(axis=1))
-            own = moves[group.carried[side.part].movers[-1]]
-            energy += method.eta * displacement_energy(everything, side.centre, raw[side.part], own)
-    if method.regularization == "identity":
-        for part, move in zip(group.free, moves, strict=True):
-            dt = move.at(raw[group.parts.index(part)].t)
-            energy += method.eta * (ca.dot(dt, dt) + ca.dot(move.W, move.W)) / 2
-    active = ca.fmax(ca.sum2(moments[0, :]), 1)
-    H, _ = ca.hessian(energy / active, z)
-    return H
+def _whitening(U: ca.SX) -> ca.SX:
+    """U^-1, block by block: z = U^-1 y."""
+    movers = range(0, U.size1(), FREEDOMS)
+    return ca.diagcat(*(ca.solve(U[k : k + FREEDOMS, k : k + FREEDOMS], ca.SX.eye(FREEDOMS)) for k in movers))

@@ -1,4 +1,4 @@
-"""Increments dq = (dt, w) of the free parts, and the poses and displacements that they cause. Paper (6), (7), (12)."""
+"""Increments dq = (dt, w) of the free parts, and the poses that they cause. Paper (6), (7), (12)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,26 +37,44 @@ class Twist:
         """Displacement of a point at x (3, 1) [mm]."""
         return self.d + ca.cross(self.W, x - self.c)
 
+    def moving(self, X: Pose, turn: ca.SX) -> Pose:
+        """A pose after the motion x -> c + d + turn (x - c)."""
+        return Pose(turn @ X.R, turn @ (X.t - self.c) + self.c + self.d)
+
 
 def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:
     """The increments of the movers from the QP's variables, all of them in mm: (dt, length * w) for each mover."""
     return [Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)]
 
 
-def total(part: Carried, raw: Pose, movers: Sequence[Twist]) -> Twist:
+def linear(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+    """The pose after the increments to first order, affine in them: R <- (I + [W]x) R, paper (12)."""
+    twist = _total(part, X, movers)
+    return twist.moving(X, ca.SX.eye(3) + ca.skew(twist.W))
+
+
+def rigid(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+    """The pose after the increments as rigid motions: R <- exp([w]x) R for its own, then for those that carry it."""
+    for mover in reversed(part.movers):
+        X = movers[mover].moving(X, rotation(movers[mover].W))
+    return X
+
+
+def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+    """Paper (12), which keeps the linearized gap exactly; but a part that others rest on turns by exp([W]x).
+
+    Stretched by (12), the normals (4) of a reference part would no longer be normal to it. To first order the two agree.
+    """
+    if not part.is_reference:
+        return linear(part, X, movers)
+    twist = _total(part, X, movers)
+    return twist.moving(X, rotation(twist.W))
+
+
+def _total(part: Carried, X: Pose, movers: Sequence[Twist]) -> Twist:
     """What all its movers together do to a part, about its own centre."""
-    c = raw.place(ca.DM(part.centre))
+    c = X.place(ca.DM(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)
     for mover in part.movers:
         d, W = d + movers[mover].at(c), W + movers[mover].W
     return Twist(c, d, W)
-
-
-def corrected(part: Carried, raw: Pose, twist: Twist) -> Pose:
-    """The updated pose: R <- (I + [W]x) R, paper (12), which keeps the linearized gap exactly.
-
-    A part that others rest on turns by exp([W]x) instead: stretched by (12), its normals (4) would no longer be
-    normal to it. To first order the two agree.
-    """
-    turn = rotation(twist.W) if part.is_reference else ca.SX.eye(3) + ca.skew(twist.W)
-    return Pose(turn @ raw.R, turn @ (raw.t - twist.c) + twist.c + twist.d)

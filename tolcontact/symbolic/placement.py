@@ -1,10 +1,10 @@
-"""Locator deviations to raw poses: q = J^-1 d for each part, on the ground or on the part that it is located on."""
+"""Locator deviations to raw poses: q = M d (see placing_matrix) of each part, on the ground or on another part."""
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.discretization.nominal import locator_matrix
+from tolcontact.discretization.nominal import placing_matrix
 from tolcontact.symbolic.pose import Pose, rotation
 
 
@@ -31,7 +31,7 @@ def _on_its_locators(part: NominalPart, d: ca.SX) -> Pose:
     """
     if not part.labels:
         return Pose(ca.SX.eye(3), ca.SX.zeros(3))
-    J, c = locator_matrix(part.locator_points, part.locator_directions)
-    q = ca.DM(np.linalg.inv(J)) @ d
+    M, c = placing_matrix(part)
+    q = ca.DM(M) @ d
     R = rotation(q[3:])
     return Pose(R, q[:3] + c - R @ ca.DM(c))

@@ -8,8 +8,9 @@ import numpy as np
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
 from tolcontact.symbolic.batch import Batch, quiet
-from tolcontact.symbolic.contact_program import SLOTS, Group, contact_groups, contact_program
+from tolcontact.symbolic.contact_program import SLOTS, contact_program
 from tolcontact.symbolic.gap import gap_matrix
+from tolcontact.symbolic.groups import Group, contact_groups
 from tolcontact.symbolic.measure import measured
 from tolcontact.symbolic.placement import raw_poses
 from tolcontact.symbolic.plugins import Plugin, plugin
@@ -61,7 +62,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         poses = poses_of(entries)
         values = measured(nominal, poses)
-        X_RM = [relative(poses[pair.moving], poses[pair.reference]).vector() for pair in nominal.pairs]
+        X_RM = [
+            (poses[pair.moving] if pair.reference is None else relative(poses[pair.moving], poses[pair.reference])).vector()
+            for pair in nominal.pairs
+        ]
         observe = ca.Function(
             "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
         )

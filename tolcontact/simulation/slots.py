@@ -1,0 +1,54 @@
+"""Slots of the contact QP: which points of a pair have a row in it, realization by realization."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+KEPT = 8
+CARRIES = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Slots:
+    """points (row, slot): numbers of contact points; filled (row, slot): which slots are in use; reactions (row, slot)."""
+
+    points: np.ndarray
+    filled: np.ndarray
+    reactions: np.ndarray
+
+    @classmethod
+    def empty(cls, rows: int, slots: int) -> "Slots":
+        """No point has a slot."""
+        return cls(np.zeros((rows, slots), dtype=int), np.zeros((rows, slots), dtype=bool), np.zeros((rows, slots)))
+
+    def take(self, rows: np.ndarray) -> "Slots":
+        """The slots of some rows."""
+        return Slots(self.points[rows], self.filled[rows], self.reactions[rows])
+
+    def put(self, rows: np.ndarray, other: "Slots") -> None:
+        """Replace the slots of some rows."""
+        self.points[rows], self.filled[rows], self.reactions[rows] = other.points, other.filled, other.reactions
+
+    def carrying(self, multipliers: np.ndarray) -> "Slots":
+        """Only the slots whose rows carry, at most KEPT of them, largest multipliers (row, slot) first."""
+        largest = np.where(self.filled, multipliers, 0.0)
+        order = np.argsort(-largest, axis=1, kind="stable")
+        sorted_ = np.take_along_axis(largest, order, axis=1)
+        carries = sorted_ > CARRIES * np.maximum(sorted_[:, :1], CARRIES)
+        carries[:, KEPT:] = False
+        return Slots(np.take_along_axis(self.points, order, axis=1), carries, np.where(carries, sorted_, 0.0))
+
+    def with_deepest(self, points: np.ndarray, depth: np.ndarray, tolerance: float) -> "tuple[Slots, np.ndarray]":
+        """Fill the free slots with the deepest of the candidate `points` (row, cluster) that are inside.
+
+        Returns the new slots, and (row,) whether any candidate was new.
+        """
+        known = ((points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]).any(axis=2)
+        new = (depth > tolerance) & ~known
+        urgency = np.hstack([np.where(self.filled, np.inf, -np.inf), np.where(new, depth, -np.inf)])
+        order = np.argsort(-urgency, axis=1, kind="stable")[:, : self.points.shape[1]]
+        every = np.hstack([self.points, points])
+        reactions = np.hstack([self.reactions, np.zeros(points.shape)])
+        filled = np.take_along_axis(urgency, order, axis=1) > -np.inf
+        chosen = (np.take_along_axis(values, order, axis=1) for values in (every, reactions))
+        return Slots(next(chosen), filled, next(chosen)), new.any(axis=1)
