@@ -66,7 +66,13 @@ def test_it_follows_the_cf_conventions(archive):
         for variable in (v for group in groups for v in group.variables.values()):
             assert variable.long_name
             is_label = variable.dtype is str or variable.name in ("faces", "status") or "part" in variable.name
-            assert is_label or variable.name.endswith("of_point") or variable.name == "one_sided" or "measure_" in variable.name or variable.units
+            assert (
+                is_label
+                or variable.name.endswith("of_point")
+                or variable.name == "one_sided"
+                or "measure_" in variable.name
+                or variable.units
+            )
 
 
 def test_fields_are_those_of_the_archived_poses(archive):

@@ -7,7 +7,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.discretization.projection import project
+from tolcontact.discretization.projection import Surface
 from tolcontact.discretization.spreading import spread
 
 
@@ -64,7 +64,7 @@ def test_projections_on_curved_faces_lie_on_them_with_normals_outward(solid):
     if len(solid.vertices) < 1000:  # the cylinder's barrel
         direction[:, 2] = 0
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    nearest, normals, over = project(direction * 11, solid)
+    nearest, normals, over = Surface(solid).project(direction * 11)
     chord = 10 * (1 - np.cos(np.pi / 48))
     assert over.all()
     assert np.abs(np.linalg.norm(nearest, axis=1) - 10).max() < chord

@@ -18,6 +18,7 @@ ROOMS = {
     "netCDF4": ("archive.py",),
     "typer": ("cli.py",),
     "trimesh": ("discretization/",),
+    "igl": ("discretization/",),
 }
 NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
 # From the top of the flow to its end; a room imports from rooms that stand before it.

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
 from tolcontact.discretization.layout import lay_out
-from tolcontact.discretization.projection import project
+from tolcontact.discretization.projection import Surface
 from tolcontact.discretization.solids import GeometryFault, field_surface, patch, select, surface
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.errors import ModelError
@@ -59,7 +59,7 @@ class ContactPoints:
 
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     `locators` holds the column of the deviation of each such point, by which the support stands out along n^r; it is
-    None for a pair of faces.
+    None for a pair of faces, whose `surface` is the reference face in its nominal place.
     """
 
     name: str
@@ -69,6 +69,7 @@ class ContactPoints:
     P_r: np.ndarray
     n_r: np.ndarray
     locators: np.ndarray | None = None
+    surface: Surface | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +245,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
     target = _face_in_place(reference, pair.reference)
     sampled = own_vertices(own) if isinstance(pair.points, str) else spread(own, pair.points, pair.spacing)
     P_m = moving.place(sampled)
-    P_r, n_r, over = project(P_m, target)
+    P_r, n_r, over = target.project(P_m)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     distance = np.linalg.norm(P_m - P_r, axis=1)
     kept = over & (distance <= reach)
@@ -255,7 +256,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
             + (" and overhangs the rim" if not over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
-    _, normals, _ = project(P_m[kept], _face_in_place(moving, pair.moving))
+    _, normals, _ = _face_in_place(moving, pair.moving).project(P_m[kept])
     if ((normals * n_r[kept]).sum(axis=1) > 0).all():
         raise GeometryFault(
             f"its faces {pair.moving} and {pair.reference} look the same way, so one cannot rest on the other; "
@@ -268,12 +269,13 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
         P_m[kept],
         P_r[kept],
         n_r[kept],
+        surface=target,
     )
 
 
-def _face_in_place(part: NominalPart, face: Face) -> trimesh.Trimesh:
+def _face_in_place(part: NominalPart, face: Face) -> Surface:
     own = patch(part.mesh, select(part.mesh, face))
-    return trimesh.Trimesh(part.place(np.asarray(own.vertices)), own.faces, process=False)
+    return Surface(trimesh.Trimesh(part.place(np.asarray(own.vertices)), own.faces, process=False))
 
 
 def _immovable(assembly: Assembly) -> list[str]:

@@ -20,6 +20,7 @@ CLUSTERS = 6
 PENETRATION = 1e-10
 AT_REST = 1e-9
 CARRIES = 1e-4
+ADRIFT = 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +76,7 @@ class ContactResolver:
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
+        self._group = group.group
         self._slots = group.slots
         self._solve = group.solve
         self._accuracy = program.plugin.accuracy
@@ -118,7 +120,19 @@ class ContactResolver:
             if self._method.resolution == "exact":
                 result.residual[moving] = np.maximum(result.residual[moving], step)
             moving = moving[step > self._at_rest]
+        if self._method.objective == "seating":
+            result.residual[self._adrift(task, result)] = np.inf
         return result
+
+    def _adrift(self, task: Task, result: Resolution) -> np.ndarray:
+        """Rows (row,) in which a force finds nothing to rest on, and only the small quadratic term stops its part."""
+        apart = [
+            displacement(before, after, part.centre)
+            for before, after, part in zip(
+                task.raw.swapaxes(0, 1), result.poses.swapaxes(0, 1), self._group.carried, strict=True
+            )
+        ]
+        return np.max(apart, axis=0) > ADRIFT * self._group.length
 
     def _task(self, rows: np.ndarray, raw: np.ndarray, deviations: np.ndarray, gaps: list[np.ndarray]) -> Task:
         active = [gap < self._method.activity for gap in gaps]
@@ -208,6 +222,12 @@ class ContactResolver:
                 for name, values in again.items():
                     answer[name][k] = values[0]
         return answer
+
+
+def displacement(before: np.ndarray, after: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """How far (row,) [mm] a point with nominal coordinates p (3,) lies apart at poses (row, 12) before and after."""
+    change = after - before
+    return np.asarray(np.linalg.norm(change[:, :9].reshape(-1, 3, 3) @ p + change[:, 9:], axis=1))
 
 
 def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:

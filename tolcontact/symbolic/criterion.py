@@ -16,6 +16,10 @@ from tolcontact.symbolic.groups import Group, Side
 from tolcontact.symbolic.objective import displacement_energy
 from tolcontact.symbolic.pose import Pose, affine, relative
 
+# Seating: the share of the forces that the quadratic term holds when all points have moved by the group's length. Small enough
+# to leave it to the contacts who carries, large enough for the solvers.
+YIELD = 1e-3
+
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
@@ -40,7 +44,7 @@ def criterion(
         return Criterion(springs / total + held / count, ca.SX(total))
     if method.objective == "seating":
         work, total = _work(nominal, group, raw, now)
-        return Criterion(held / (count * group.length) - work / total, ca.SX(total))
+        return Criterion(YIELD * proximity(group, raw, now, z) / group.length - work / total, ca.SX(total))
     energy = held
     for k, side in enumerate(group.sides):
         energy += displacement_energy(moments[:, k], side.centre, raw[side.part], now[side.part])
