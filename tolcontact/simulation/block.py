@@ -26,7 +26,7 @@ class Block:
     measured      (n, state, measure)
     gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
     active        (n, pair): number of active contact points in the raw state
-    carrying      (n, pair): number of contact points that carry in the corrected state: with more than 1e-4 of the largest reaction
+    carrying      (n, pair): number of contact points that carry: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of their reactions, in the units of the objective
     status        (n,), Status
     kkt_residual  (n,) [mm], 0 where untouched

@@ -4,21 +4,26 @@ The QP has a few slots for rows. All gaps are scanned, the deepest point of each
 realizations in which another point is still inside enter again with their carrying points kept. Each round raises the
 optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row: one linear step.
 The linearized resolution takes one. The exact one goes on from the poses reached, with their true gaps, until they stay.
+With an iterated search, contact points are then projected again, and all of this repeated until the poses stay.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tolcontact.simulation.scan import PairScan, pair_scan
+from tolcontact.simulation.search import placed, search
 from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 STEPS = 60
+SEARCHES = 40
 CLUSTERS = 6
-PENETRATION = 1e-10
-AT_REST = 1e-9
+PENETRATION = 1e-10  # mm: less than this is no penetration
+AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
+SETTLED = 1e-6  # mm: poses that move less after a search have settled
 CARRIES = 1e-4
 ADRIFT = 10
 
@@ -33,6 +38,11 @@ class Resolution:
     slack       (row,) [mm]: penetration that no increment could remove
     iterations  (row,): linear steps taken
     slots       which points carry, and their reactions; one for each pair of the group
+
+    and of all realizations of the block:
+
+    gap_min     (realization, state, pair of the group) [mm]: least true gap
+    active      (realization, pair of the group): number of active contact points in the raw state
     """
 
     rows: np.ndarray
@@ -42,6 +52,8 @@ class Resolution:
     slack: np.ndarray
     iterations: np.ndarray
     slots: list[Slots]
+    gap_min: np.ndarray
+    active: np.ndarray
 
     def reactions(self) -> np.ndarray:
         """Sum of the reactions of each pair, (row, pair)."""
@@ -55,7 +67,7 @@ class Resolution:
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What stays the same while the realizations `rows` are resolved; first dimension: the row.
+    """What stays the same while the realizations `rows` are resolved; first dimension of the arrays: the row.
 
     raw          (row, part of the group, 12)
     deviations   (row, locator) [mm]
@@ -63,7 +75,6 @@ class Task:
     may_carry    (row, point) for each pair of the group
     """
 
-    rows: np.ndarray
     raw: np.ndarray
     deviations: np.ndarray
     moments: np.ndarray
@@ -83,6 +94,7 @@ class ContactResolver:
         self._tolerance = max(program.plugin.accuracy / 100, PENETRATION)
         self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
         self._method = program.method
+        self._surfaces = [program.nominal.pairs[pair].surface for pair in group.group.pairs]
         self._scans = [
             pair_scan(
                 program.nominal.pairs[pair],
@@ -99,46 +111,43 @@ class ContactResolver:
         poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw; deviations
         (realization, locator) [mm]. Forces move every realization, else contact those in which a point is inside.
         """
-        gaps = [scan.gaps(relative[:, pair], deviations) for scan, pair in zip(self._scans, self.pairs, strict=True)]
+        relative = relative[:, self.pairs]
+        scans = self._found(relative)
+        gaps = _gaps(scans, relative, deviations)
         inside = np.any([gap.min(axis=1) < -self._tolerance for gap in gaps], axis=0)
         rows = np.arange(len(poses)) if self._method.objective == "seating" else np.flatnonzero(inside)
-        task = self._task(rows, poses[rows][:, self.parts], deviations[rows], [gap[rows] for gap in gaps])
+        active = [gap < self._method.activity for gap in gaps]
+        least = np.stack([gap.min(axis=1) for gap in gaps], axis=1)
         result = Resolution(
             rows=rows,
-            poses=task.raw.copy(),
-            relative=relative[rows][:, self.pairs],
+            poses=poses[rows][:, self.parts],
+            relative=relative[rows],
             residual=np.full(len(rows), np.inf),
             slack=np.full(len(rows), np.inf),
             iterations=np.zeros(len(rows), dtype=int),
-            slots=[Slots.empty(len(rows), self._slots) for _ in self._scans],
+            slots=[Slots.empty(len(rows), self._slots) for _ in scans],
+            gap_min=np.stack([least, least], axis=1),
+            active=np.stack([on.sum(axis=1) for on in active], axis=1),
         )
-        moving = np.arange(len(rows))
-        for _ in range(STEPS if self._method.resolution == "exact" else 1):
-            if not moving.size:
-                break
-            step = self._step(task, result, moving)
-            if self._method.resolution == "exact":
-                result.residual[moving] = np.maximum(result.residual[moving], step)
-            moving = moving[step > self._at_rest]
+        task = self._task(result.poses.copy(), deviations[rows], [on[rows] for on in active])
+        scans = [scan.take(rows) for scan in scans]
+        self._repeat(task, result, scans, np.arange(len(rows)))
+        if self._method.search == "iterated":
+            scans = self._settle(task, result)
         if self._method.objective == "seating":
             result.residual[self._adrift(task, result)] = np.inf
+        result.gap_min[rows, 1] = np.stack([g.min(axis=1) for g in _gaps(scans, result.relative, task.deviations)], axis=1)
         return result
 
-    def _adrift(self, task: Task, result: Resolution) -> np.ndarray:
-        """Rows (row,) in which a force finds nothing to rest on, and only the small quadratic term stops its part."""
-        apart = [
-            displacement(before, after, part.centre)
-            for before, after, part in zip(
-                task.raw.swapaxes(0, 1), result.poses.swapaxes(0, 1), self._group.carried, strict=True
-            )
-        ]
-        return np.max(apart, axis=0) > ADRIFT * self._group.length
+    def _found(self, relative: np.ndarray) -> list[PairScan]:
+        """The scans for X_RM (realization, pair, 12), their contact points projected again if the method says so."""
+        if self._method.search == "fixed":
+            return self._scans
+        return [search(*both, relative[:, k]) for k, both in enumerate(zip(self._scans, self._surfaces, strict=True))]
 
-    def _task(self, rows: np.ndarray, raw: np.ndarray, deviations: np.ndarray, gaps: list[np.ndarray]) -> Task:
-        active = [gap < self._method.activity for gap in gaps]
+    def _task(self, raw: np.ndarray, deviations: np.ndarray, active: list[np.ndarray]) -> Task:
         counts = [self._counts(scan, on) for scan, on in zip(self._scans, active, strict=True)]
         return Task(
-            rows=rows,
             raw=raw,
             deviations=deviations,
             moments=np.concatenate([scan.moments(on) for scan, on in zip(self._scans, counts, strict=True)], axis=1),
@@ -154,44 +163,72 @@ class ContactResolver:
             return np.zeros_like(active)
         return np.ones_like(active) if self._method.objective == "all points" else active
 
-    def _step(self, task: Task, result: Resolution, moving: np.ndarray) -> np.ndarray:
+    def _settle(self, task: Task, result: Resolution) -> list[PairScan]:
+        """Search and resolve again until the poses stay; returns the scans of the last search."""
+        searching = np.arange(len(task.raw))
+        for _ in range(SEARCHES):
+            before = result.poses[searching]
+            self._repeat(task, result, self._found(result.relative[searching]), searching)
+            moved = self._displacements(before, result.poses[searching])
+            searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]
+            if not searching.size:
+                break
+        else:
+            result.residual[searching] = np.maximum(result.residual[searching], moved)
+        return self._found(result.relative)
+
+    def _repeat(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> None:
+        """Linear steps of the rows `moving` (`scans` are theirs) until they are at rest; in the linearized resolution one."""
+        exact = self._method.resolution == "exact"
+        for _ in range(STEPS if exact else 1):
+            if not moving.size:
+                break
+            step = self._step(task, result, scans, moving)
+            if exact:
+                result.residual[moving] = np.maximum(result.residual[moving], step)
+            on = step > self._at_rest
+            moving, scans = moving[on], [scan.take(on) for scan in scans]
+
+    def _step(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> np.ndarray:
         """One linear step of the rows `moving`, and (row,) its size [mm]: the QP in which every point has its row."""
         now = result.poses[moving]
-        gaps = [scan.gaps(result.relative[moving, k], task.deviations[moving]) for k, scan in enumerate(self._scans)]
+        gaps = _gaps(scans, result.relative[moving], task.deviations[moving])
         slots = [s.take(moving) for s in result.slots]
         step = np.zeros(len(moving))
         open_ = np.arange(len(moving))
         for number in range(ROUNDS):
             more = np.full(len(open_), number == 0)
-            for k, scan in enumerate(self._scans):
+            for k, scan in enumerate(scans):
                 candidates = np.where(task.may_carry[k][moving[open_]], gaps[k], np.inf)
                 slots[k], grown = slots[k].with_deepest(*scan.deepest(candidates), self._tolerance)
                 more |= grown
-            open_, gaps, slots = open_[more], [gap[more] for gap in gaps], [s.take(more) for s in slots]
+            open_, gaps = open_[more], [gap[more] for gap in gaps]
+            slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            gaps, slots, step[open_] = self._solve_round(task, result, moving[open_], now[open_], slots)
+            gaps, slots, step[open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots)
         result.iterations[moving] += 1
         return step
 
     def _solve_round(
-        self, task: Task, result: Resolution, rows: np.ndarray, now: np.ndarray, slots: list[Slots]
+        self, task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray, now: np.ndarray, slots: list[Slots]
     ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
         """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
-        held = [(scan, scan.deviated(task.deviations[rows], s.points), s) for scan, s in zip(self._scans, slots, strict=True)]
+        deviations = task.deviations[rows]
+        held = zip(*(scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)), strict=True)
+        P_m, P_r, n_r = (np.concatenate(arrays, axis=1) for arrays in held)
         answer = self._answer(
             poses=now,
             raw=task.raw[rows],
             moments=task.moments[rows],
-            deviations=task.deviations[rows],
-            damping=np.zeros(len(rows)),
-            P_m=np.concatenate([scan.P_m[s.points] for scan, _, s in held], axis=1),
-            P_r=np.concatenate([P_r for _, P_r, _ in held], axis=1),
-            n_r=np.concatenate([scan.n_r[s.points] for scan, _, s in held], axis=1),
+            deviations=deviations,
+            P_m=P_m,
+            P_r=P_r,
+            n_r=n_r,
             filled=np.concatenate([s.filled for s in slots], axis=1),
         )
-        linearized = answer["linearized"].reshape(len(rows), len(self._scans), ENTRIES)
-        gaps = [scan.gaps(linearized[:, k], task.deviations[rows]) for k, scan in enumerate(self._scans)]
+        linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
+        gaps = _gaps(scans, linearized, deviations)
         inside = [np.where(task.may_carry[k][rows], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
         slack = answer["slack"][:, 0]
         # With the rows in conflict every carrying point stays inside by the slack; only what exceeds it is left undone.
@@ -223,11 +260,22 @@ class ContactResolver:
                     answer[name][k] = values[0]
         return answer
 
+    def _adrift(self, task: Task, result: Resolution) -> np.ndarray:
+        """Rows (row,) in which a force finds nothing to rest on, and only the small quadratic term stops its part."""
+        return self._displacements(task.raw, result.poses) > ADRIFT * self._group.length
 
-def displacement(before: np.ndarray, after: np.ndarray, p: np.ndarray) -> np.ndarray:
-    """How far (row,) [mm] a point with nominal coordinates p (3,) lies apart at poses (row, 12) before and after."""
-    change = after - before
-    return np.asarray(np.linalg.norm(change[:, :9].reshape(-1, 3, 3) @ p + change[:, 9:], axis=1))
+    def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""
+        apart = [
+            np.linalg.norm(placed(side.points, after[:, side.part]) - placed(side.points, before[:, side.part]), axis=2)
+            for side in self._group.sides
+        ]
+        return np.asarray(np.max([each.max(axis=1) for each in apart], axis=0))
+
+
+def _gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray]:
+    """Gaps (row, point) [mm] of each pair at X_RM (row, pair, 12)."""
+    return [scan.gaps(relative[:, k], deviations) for k, scan in enumerate(scans)]
 
 
 def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:

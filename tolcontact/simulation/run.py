@@ -7,7 +7,6 @@ import numpy as np
 from tolcontact.sampling import draw
 from tolcontact.simulation.block import Block, Status
 from tolcontact.simulation.contact import ContactResolver
-from tolcontact.simulation.scan import pair_scan
 from tolcontact.symbolic import ENTRIES, Program
 
 BLOCK = 1000
@@ -35,31 +34,26 @@ def simulate_block(
     poses = raw.copy()
     touched, residual, slack = np.zeros(count, dtype=bool), np.zeros(count), np.zeros(count)
     iterations, carrying = np.zeros(count, dtype=int), np.zeros((count, len(nominal.pairs)), dtype=int)
-    reaction = np.zeros((count, len(nominal.pairs)))
+    reaction, active = np.zeros((count, len(nominal.pairs))), np.zeros((count, len(nominal.pairs)), dtype=int)
+    gap_min = np.empty((count, 2, len(nominal.pairs)))
     for resolver in resolvers:
         found = resolver.resolve(raw, relative_raw, deviations)
         poses[np.ix_(found.rows, resolver.parts)] = found.poses
+        gap_min[:, :, resolver.pairs], active[:, resolver.pairs] = found.gap_min, found.active
         touched[found.rows] = True
         residual[found.rows] = np.maximum(residual[found.rows], found.residual)
         slack[found.rows] = np.maximum(slack[found.rows], found.slack)
         iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
         carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying()
         reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions()
-    measured, relative = measured_raw.copy(), relative_raw.copy()
-    measured[touched], relative[touched] = _observe(program, poses[touched])
+    measured = measured_raw.copy()
+    measured[touched], _ = _observe(program, poses[touched])
 
     accuracy = program.plugin.accuracy
     stuck = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
     status = np.where(slack <= accuracy, Status.RESOLVED, stuck)
     status = np.where(residual <= accuracy, status, Status.NOT_CONVERGED)
     status = np.where(touched, status, Status.UNTOUCHED)
-    gap_min, active = np.empty((count, 2, len(nominal.pairs))), np.empty((count, len(nominal.pairs)), dtype=int)
-    for pair, matrix in enumerate(program.gaps):
-        scan = pair_scan(nominal.pairs[pair], matrix, [], 1)
-        gaps = scan.gaps(relative_raw[:, pair], deviations)
-        active[:, pair] = (gaps < program.method.activity).sum(axis=1)
-        gap_min[:, 0, pair] = gaps.min(axis=1)
-        gap_min[:, 1, pair] = scan.gaps(relative[:, pair], deviations).min(axis=1)
     return Block(
         start=start,
         deviations=deviations,

@@ -31,6 +31,10 @@ class PairScan:
     locators: np.ndarray | None
     clusters: tuple[slice, ...]
 
+    def take(self, rows: np.ndarray) -> "PairScan":
+        """The scan for some of the realizations: here all have the same contact points."""
+        return self
+
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
         result = np.repeat(self.matrix[-1:], len(relative), axis=0)
@@ -39,13 +43,13 @@ class PairScan:
             result += np.multiply(entry[:, None], row, out=term)
         return result if self.locators is None else result - deviations[:, self.locators]
 
-    def deviated(self, deviations: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """P^r (realization, slot, 3) of some `points` (realization, slot), standing out by their deviations along n^r."""
-        P_r = np.asarray(self.P_r[points])
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
+        P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
         if self.locators is None:
-            return P_r
+            return P_m, P_r, n_r
         height = np.take_along_axis(deviations, self.locators[points], axis=1)
-        return np.asarray(P_r + height[..., None] * self.n_r[points])
+        return P_m, P_r + height[..., None] * n_r, n_r
 
     def moments(self, active: np.ndarray) -> np.ndarray:
         """Moments (realization, side, moment) of the points where `active` (realization, point)."""

@@ -17,7 +17,7 @@ import numpy as np
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
 from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, rigid
-from tolcontact.symbolic.criterion import criterion, proximity, two_sided
+from tolcontact.symbolic.criterion import criterion, two_sided
 from tolcontact.symbolic.gap import gap
 from tolcontact.symbolic.groups import Group
 from tolcontact.symbolic.objective import MOMENTS
@@ -27,7 +27,7 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "damping", "P_m", "P_r", "n_r", "filled")
+INPUTS = ("poses", "raw", "moments", "deviations", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
@@ -38,7 +38,6 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (l)       of all locators of the model [mm]
-    damping              weight of staying near `poses`, 0 for none
     P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
     filled (k)           1 where a slot holds a point, 0 where it is empty
 
@@ -56,7 +55,6 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
         ca.SX.sym("raw", ENTRIES * len(group.parts)),
         ca.SX.sym("moments", MOMENTS, len(group.sides)),
         ca.SX.sym("deviations", len(nominal.locator_labels)),
-        ca.SX.sym("damping"),
         *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", rows),
     ]
@@ -77,7 +75,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
 
 def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
     """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, damping, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -99,7 +97,7 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     slots = len(rows)
     held, elongation = _held(nominal, group, moved, deviations, z) if method.objective == "seating" else (0, ca.SX(0, 1))
     goal = criterion(nominal, group, method, moments, raw, moved, z)
-    Q, pull = ca.hessian(goal.energy + damping * proximity(group, now, moved, z), z)
+    Q, pull = ca.hessian(goal.energy, z)
     H, U = _conditioned(ca.substitute(Q, z, at_rest))
     whiten = _whitening(U)
     A = ca.vertcat(*rows) @ whiten

@@ -53,7 +53,7 @@ def criterion(
 
 
 def proximity(group: Group, start: Sequence[Pose], end: Sequence[Pose], z: ca.SX) -> ca.SX:
-    """Mean squared displacement of all contact points [mm^2] between two poses, halved: what damps a step."""
+    """Mean squared displacement of all contact points [mm^2] between two poses, halved."""
     count = sum(len(side.points) for side in group.sides)
     return sum((_of_all_points(group, side, start, end, z) for side in group.sides), ca.SX(0)) / count
 

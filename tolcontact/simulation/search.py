@@ -1,0 +1,58 @@
+"""Contact search at poses other than the nominal one: paper, 2.2, last sentence."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tolcontact.discretization.projection import Surface
+from tolcontact.simulation.scan import PairScan
+
+
+@dataclass(frozen=True, eq=False)
+class FoundScan(PairScan):
+    """A scan in which every realization has feet of its own.
+
+    feet, normals    (realization, point, 3): P^r and n^r, nominal
+    over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
+    """
+
+    feet: np.ndarray
+    normals: np.ndarray
+    over: np.ndarray
+
+    def take(self, rows: np.ndarray) -> "FoundScan":
+        return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
+
+    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        apart = placed(self.P_m, relative) - self.feet
+        n = self.normals
+        gaps = n[..., 0] * apart[..., 0] + n[..., 1] * apart[..., 1] + n[..., 2] * apart[..., 2]
+        return np.where(self.over, gaps, np.inf)
+
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        chosen = points[..., None]
+        return self.P_m[points], *(np.take_along_axis(values, chosen, axis=1) for values in (self.feet, self.normals))
+
+
+def search(scan: PairScan, surface: Surface | None, relative: np.ndarray) -> PairScan:
+    """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are."""
+    if surface is None:
+        return scan
+    shape = (len(relative), len(scan.P_m), 3)
+    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), smooth=True)
+    return FoundScan(
+        **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
+        feet=feet.reshape(shape),
+        normals=normals.reshape(shape),
+        over=over.reshape(shape[:2]),
+    )
+
+
+def placed(P: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Where points P (point, 3) are at poses (realization, 12): (realization, point, 3) [mm]."""
+    R = poses[:, None, :9]
+    columns = [
+        R[..., 3 * i] * P[:, 0] + R[..., 3 * i + 1] * P[:, 1] + R[..., 3 * i + 2] * P[:, 2] + poses[:, None, 9 + i]
+        for i in range(3)
+    ]
+    return np.stack(columns, axis=2)
