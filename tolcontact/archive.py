@@ -58,14 +58,15 @@ class ArchiveWriter:
         """
         writer = cls.__new__(cls)
         writer._nominal = program.nominal
-        _check_same_run(path, program, _settings(program, seed, samples))
-        with netCDF4.Dataset(path) as there:
-            unfinished = np.flatnonzero(there[words.STATUS.name][:] == words.UNFINISHED)
-            length = len(there.dimensions[words.REALIZATION])
-        writer.rows = int(unfinished[0]) if unfinished.size else length
         with _replacing(path) as part:
+            # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
             shutil.copyfile(path, part)
+            open_archive(part, shown=path).close()
             with _opened(part, "r+") as file:
+                _check_same_run(file, path, program, _settings(program, seed, samples))
+                unfinished = np.flatnonzero(file[words.STATUS.name][:] == words.UNFINISHED)
+                length = len(file.dimensions[words.REALIZATION])
+                writer.rows = int(unfinished[0]) if unfinished.size else length
                 _make_room(file, length, samples)
                 file.setncattr("samples", np.int64(max(samples, length)))
                 file.setncattr("history", f"{file.history}\n{_now()} resumed after {writer.rows} realizations")
@@ -121,16 +122,17 @@ class ArchiveWriter:
             yield np.asarray(R[rows, state, part]), np.asarray(t[rows, state, part])
 
 
-def open_archive(path: str | Path) -> xr.DataTree:
+def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
     """An archive as a tree of labelled datasets, read on demand.
 
-    Raises ArchiveError where the file is missing, is not netCDF, or was not written by tolcontact.
+    Raises ArchiveError where the file is missing, is not netCDF, or was not written by tolcontact; messages speak of
+    `shown` where that is given.
     """
-    path = Path(path)
-    if not path.is_file():
+    source, path = Path(path), shown or Path(path)
+    if not source.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     try:
-        tree = xr.open_datatree(path, engine="netcdf4")
+        tree = xr.open_datatree(source, engine="netcdf4")
     except (OSError, ValueError) as error:
         raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
     missing = [v.name for v in words.ROWS if v.name not in tree.ds] + [g for g in ("model", "sample") if g not in tree.children]
@@ -222,17 +224,18 @@ def _declaration(program: Program) -> str:
     return json.dumps(to_document(nominal.assembly, triangles, program.tapes))
 
 
-def _check_same_run(path: Path, program: Program, settings: Mapping[str, Any]) -> None:
-    open_archive(path).close()
-    with netCDF4.Dataset(path) as there:
-        if there["model"][words.DECLARATION.name][...] != _declaration(program):
-            raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
-        for word, value in settings.items():
-            was = getattr(there, word, None)
-            if word != "samples" and was != value:
-                raise ArchiveError(
-                    f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
-                )
+def _check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any]) -> None:
+    if there["model"][words.DECLARATION.name][...] != _declaration(program):
+        raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
+    for part in program.nominal.parts:
+        if not np.array_equal(there[f"field/{part.name}"][words.FIELD_VERTICES.name][...], part.vertices):
+            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    for word, value in settings.items():
+        was = getattr(there, word, None)
+        if word != "samples" and was != value:
+            raise ArchiveError(
+                f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
+            )
 
 
 def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any]) -> None:

@@ -12,18 +12,26 @@ from scipy.special import ndtri
 
 from tolcontact.assembly import Tolerance
 from tolcontact.discretization import Nominal
+from tolcontact.errors import ModelError
 
 STREAM = 4096
 _BITS = 52
 
 
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
-    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locator_labels`."""
-    columns = [
-        quantile(tolerance, _uniform(seed, label, start, stop))
-        for label, tolerance in zip(nominal.locator_labels, nominal.tolerances, strict=True)
-    ]
-    return np.stack(columns, axis=1)
+    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locator_labels`.
+
+    Raises ModelError for a distribution that gives no finite numbers.
+    """
+    deviations = np.empty((stop - start, len(nominal.locator_labels)))
+    for column, (label, tolerance) in enumerate(zip(nominal.locator_labels, nominal.tolerances, strict=True)):
+        deviations[:, column] = quantile(tolerance, _uniform(seed, label, start, stop))
+        if not np.isfinite(deviations[:, column]).all():
+            raise ModelError(
+                nominal.assembly.name,
+                [f'locator "{label}": its distribution, {tolerance}, gives deviations that are no finite numbers'],
+            )
+    return deviations
 
 
 def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:

@@ -6,6 +6,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import Nominal
+from tolcontact.errors import ModelError
 from tolcontact.method import Method
 from tolcontact.symbolic.batch import Batch, quiet
 from tolcontact.symbolic.contact_program import SLOTS, contact_program
@@ -57,6 +58,11 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """
     with quiet():
         chosen = plugin(solver)
+        if method.objective == "seating" and not nominal.assembly.forces:
+            raise ModelError(
+                nominal.assembly.name,
+                ['nothing presses its parts, but the objective is "seating"; declare a force with assembly.force(...)'],
+            )
         d = ca.SX.sym("deviations", len(nominal.locator_labels))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
