@@ -35,7 +35,7 @@ class Resolution:
     poses       (row, part of the group, 12), corrected
     relative    (row, pair of the group, 12): X_RM, corrected
     residual    (row,) [mm]: KKT residual, any penetration left undone, and in the exact resolution the last step
-    slack       (row,) [mm]: penetration that no increment could remove
+    slack       (row, pair of the group) [mm]: penetration that no increment could remove
     iterations  (row,): linear steps taken
     slots       which points carry, and their reactions; one for each pair of the group
 
@@ -123,7 +123,7 @@ class ContactResolver:
             poses=poses[rows][:, self.parts],
             relative=relative[rows],
             residual=np.full(len(rows), np.inf),
-            slack=np.full(len(rows), np.inf),
+            slack=np.full((len(rows), len(scans)), np.inf),
             iterations=np.zeros(len(rows), dtype=int),
             slots=[Slots.empty(len(rows), self._slots) for _ in scans],
             gap_min=np.stack([least, least], axis=1),
@@ -136,7 +136,11 @@ class ContactResolver:
             scans = self._settle(task, result)
         if self._method.objective == "seating":
             result.residual[self._adrift(task, result)] = np.inf
-        result.gap_min[rows, 1] = np.stack([g.min(axis=1) for g in _gaps(scans, result.relative, task.deviations)], axis=1)
+        least = np.stack([g.min(axis=1) for g in _gaps(scans, result.relative, task.deviations)], axis=1)
+        result.gap_min[rows, 1] = least
+        if self._method.resolution == "exact" and self._method.active_set == "closed":
+            # The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts.
+            result.residual[:] = np.maximum(result.residual, np.max(-least - result.slack, axis=1))
         return result
 
     def _found(self, relative: np.ndarray) -> list[PairScan]:
@@ -230,10 +234,9 @@ class ContactResolver:
         linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
         gaps = _gaps(scans, linearized, deviations)
         inside = [np.where(task.may_carry[k][rows], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
-        slack = answer["slack"][:, 0]
-        # With the rows in conflict every carrying point stays inside by the slack; only what exceeds it is left undone.
-        left = np.maximum(np.max(inside, axis=0) - np.maximum(slack, 0), 0)
-        residual = np.maximum(_residual(answer), left)
+        slack = np.maximum(answer["slack"], 0)
+        # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
+        residual = np.maximum(_residual(answer), np.max(np.transpose(inside) - slack, axis=1))
         solved = np.isfinite(residual)
         result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), len(self.parts), ENTRIES)[solved]
         result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
@@ -242,7 +245,7 @@ class ContactResolver:
         slots = [s.carrying(m) for s, m in zip(slots, np.split(answer["multipliers"], len(slots), axis=1), strict=True)]
         for kept, s in zip(result.slots, slots, strict=True):
             kept.put(rows, s)
-        gaps = [np.where(solved[:, None], gap + np.maximum(slack, 0)[:, None], np.inf) for gap in gaps]
+        gaps = [np.where(solved[:, None], gap + slack[:, k, None], np.inf) for k, gap in enumerate(gaps)]
         return gaps, slots, np.where(solved, answer["step"][:, 0], 0.0)
 
     def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:

@@ -42,7 +42,7 @@ def simulate_block(
         gap_min[:, :, resolver.pairs], active[:, resolver.pairs] = found.gap_min, found.active
         touched[found.rows] = True
         residual[found.rows] = np.maximum(residual[found.rows], found.residual)
-        slack[found.rows] = np.maximum(slack[found.rows], found.slack)
+        slack[found.rows] = np.maximum(slack[found.rows], found.slack.max(axis=1))
         iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
         carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying()
         reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions()

@@ -22,7 +22,6 @@ STATISTICS: dict[str, Callable[[np.ndarray], Estimate]] = {
 }
 OUTSIDE = "outside tolerance"
 NOT_ASSEMBLABLE = words.STATUS_MEANINGS.index("not_assemblable")
-CONFLICT = 1e-3
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
 
 
@@ -89,12 +88,11 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
 def in_conflict(rows: xr.Dataset) -> np.ndarray:
     """Which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
 
-    The reactions of the rows in conflict grow until their sum pays for the penetration, a thousand times and more the
-    reactions of a pair that merely rests.
+    These are the pairs that the pose of least penetration leaves inside each other.
     """
-    reaction = rows[words.REACTION.name].transpose(words.REALIZATION, words.PAIR).values
+    gap = rows[words.GAP_MIN.name].sel({words.STATE: "corrected"}).transpose(words.REALIZATION, words.PAIR).values
     stuck = rows[words.STATUS.name].values == NOT_ASSEMBLABLE
-    return np.asarray(stuck[:, None] & (reaction > CONFLICT * reaction.sum(axis=1, keepdims=True)))
+    return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
 
 
 def _iterations(rows: xr.Dataset, status: np.ndarray) -> list[float]:

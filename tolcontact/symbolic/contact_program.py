@@ -1,12 +1,13 @@
 """The contact QP of one group of parts, as one CasADi Function, paper (9) to (12).
 
-min 1/2 y'Hy + f'y + L s + 1/2 s^2   subject to   g_i + A_i y + SLACK s >= 0,  h_j + B_j y = 0,  s >= 0
+min 1/2 y'Hy + f'y + sum (L s_k + 1/2 s_k^2)   subject to   g_i + A_i y + SLACK s_k >= 0,  h_j + B_j y = 0,  s_k >= 0
 
 The increments z = (dt, L w) of a mover, all in mm (L is a length of the group's size), are z = U^-1 y, where U'U is the
 mover's own block of (11): H then has unit blocks on its diagonal, and the few freedoms that only the regularization holds
-are as well conditioned as the others. s makes the problem solvable whatever the gaps are; its price is so high that
-it stays zero unless the rows contradict each other (an exact penalty). f, the pull of the objective at the present poses,
-is zero in the raw state but for forces; h are the two-sided locators, where the objective holds them.
+are as well conditioned as the others. s_k, one for each pair k, make the problem solvable whatever the gaps are; their
+price is so high that they stay zero unless the rows contradict each other (an exact penalty). f, the pull of the
+objective at the present poses, is zero in the raw state but for forces; h are the two-sided locators, where the
+objective holds them.
 """
 
 from collections.abc import Sequence
@@ -46,7 +47,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     relative (12 q)      X_RM of every pair at `corrected`
     multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
     stationarity, natural_residual   KKT residuals [mm]: max |Hy + f - A'lambda| and max |min(row, lambda)|
-    slack                penetration that no increment could remove, to first order [mm]
+    slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step                 largest increment (dt, L w) of a mover [mm]
     """
     rows = SLOTS * len(group.pairs)
@@ -64,7 +65,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     H, f, A, lower, upper, U = assemble(*arguments)
     size = H.size1()
     at_least = np.full(size, -np.inf)
-    at_least[-1] = 0.0
+    at_least[-len(group.pairs) :] = 0.0
     solved = qp(
         h=H, g=f, a=A, lba=lower, uba=upper, lbx=at_least, ubx=np.full(size, np.inf),
         x0=np.zeros(size), lam_x0=np.zeros(size), lam_a0=np.zeros(A.size1()),
@@ -103,20 +104,23 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     A = ca.vertcat(*rows) @ whiten
     A = ca.vertcat(*(_or_idle(filled[k], A[k, :], k) for k in range(slots)))
     B = ca.substitute(ca.jacobian(elongation, z), z, at_rest) @ whiten
-    A = ca.blockcat([[A, ca.DM(np.full(slots, SLACK))], [B, ca.SX(held, 1)]])
+    pairs = len(group.pairs)
+    A = ca.blockcat([[A, SLACK * ca.kron(ca.DM.eye(pairs), ca.DM.ones(SLOTS))], [B, ca.SX(held, pairs)]])
     rest = -ca.substitute(elongation, z, at_rest)
     lower = ca.vertcat(ca.if_else(filled, -ca.vertcat(*constants), -FAR * group.length), rest)
     upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
-    f = ca.vertcat(whiten.T @ ca.substitute(pull, z, at_rest), group.length)
-    H = ca.diagcat(H, 1)
+    f = ca.vertcat(whiten.T @ ca.substitute(pull, z, at_rest), ca.DM(np.full(pairs, group.length)))
+    H = ca.diagcat(H, ca.SX.eye(pairs))
     assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
 
-    x, lam_a, lam_x = ca.SX.sym("x", z.numel() + 1), ca.SX.sym("lam_a", slots + held), ca.SX.sym("lam_x", z.numel() + 1)
+    size = z.numel() + pairs
+    x, lam_a, lam_x = ca.SX.sym("x", size), ca.SX.sym("lam_a", slots + held), ca.SX.sym("lam_x", size)
+    y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
     # The results get the QP's matrices as inputs, so that nothing is computed twice and the residuals are of what was solved.
     H_in, A_in, U_in = (ca.SX.sym("M", matrix.sparsity()) for matrix in (H, A, U))
     f_in, lower_in = ca.SX.sym("f", f.shape), ca.SX.sym("lower", lower.shape)
     excess = A_in @ x - lower_in
-    complementarity = ca.norm_inf(ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(x[-1], -lam_x[-1])))
+    complementarity = ca.norm_inf(ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(s, -lam_s)))
     results = [
         ca.vertcat(*(pose.vector() for pose in poses)),
         ca.vertcat(*linearized),
@@ -124,10 +128,10 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
         -lam_a[:slots] * filled * goal.scale,
         ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x),
         ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
-        SLACK * x[-1],
+        SLACK * s,
         ca.norm_inf(z),
     ]
-    step = _whitening(U_in) @ x[:-1]
+    step = _whitening(U_in) @ y
     results = [ca.substitute(result, z, step) for result in results]
     finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
     return assemble, finish
