@@ -86,7 +86,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         if (set(chains[pair.moving]) | _movers_of(pair.reference, chains)) & set(free)
     ]
     moved = {part for part, chain in enumerate(chains) if set(chain) & set(free)}
-    others = {pair.reference for _, pair in own} | {nominal.parts[part].parent for part in free}
+    others = {part for _, pair in own for part in (pair.moving, pair.reference)} | {nominal.parts[part].parent for part in free}
     parts = tuple(sorted(moved | {part for part in others if part is not None}))
     points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
     for _, pair in own:
