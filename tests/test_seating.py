@@ -166,4 +166,4 @@ def test_springs_share_a_push_by_their_stiffness():
     assert left + (right - left) * rest / 100 == pytest.approx(0.01, abs=1e-6)
     # Statics: forces 20 N/mm * left and 1 N/mm * right balance about the rest.
     assert 20 * left * rest == pytest.approx(1 * right * (100 - rest), rel=1e-5)
-    assert run["reaction"][0, 0] == pytest.approx(20 * left + right, rel=1e-6)
+    assert run["reaction"][0, 0] == pytest.approx(20 * left + right, rel=1e-4)  # the normal tilts with the bar
