@@ -18,11 +18,13 @@ from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
-STEPS = 60
+STEPS = 200
+FREE_STEPS = 8  # later ones are damped where they do not shrink
 SEARCHES = 40
 CLUSTERS = 6
 PENETRATION = 1e-10  # mm: less than this is no penetration
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
+NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
 SETTLED = 1e-6  # mm: poses that move less after a search have settled
 CARRIES = 1e-4
 ADRIFT = 10
@@ -34,8 +36,10 @@ class Resolution:
 
     poses       (row, part of the group, 12), corrected
     relative    (row, pair of the group, 12): X_RM, corrected
-    residual    (row,) [mm]: KKT residual, any penetration left undone, and in the exact resolution the last step
-    slack       (row, pair of the group) [mm]: penetration that no increment could remove
+    residual    (row,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution in the norm
+                of the objective
+    slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
+                for it, the true penetration at the best poses on the way, which are kept
     iterations  (row,): linear steps taken
     slots       which points carry, and their reactions; one for each pair of the group
 
@@ -135,7 +139,7 @@ class ContactResolver:
         if self._method.search == "iterated":
             scans = self._settle(task, result)
         if self._method.objective == "seating":
-            result.residual[self._adrift(task, result)] = np.inf
+            result.residual[self._adrift(task, result, np.arange(len(rows)))] = np.inf
         least = np.stack([g.min(axis=1) for g in _gaps(scans, result.relative, task.deviations)], axis=1)
         result.gap_min[rows, 1] = least
         if self._method.resolution == "exact" and self._method.active_set == "closed":
@@ -183,22 +187,52 @@ class ContactResolver:
 
     def _repeat(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> None:
         """Linear steps of the rows `moving` (`scans` are theirs) until they are at rest; in the linearized resolution one."""
-        exact = self._method.resolution == "exact"
-        for _ in range(STEPS if exact else 1):
-            if not moving.size:
-                break
-            step = self._step(task, result, scans, moving)
-            if exact:
-                result.residual[moving] = np.maximum(result.residual[moving], step)
-            on = step > self._at_rest
+        damping = np.zeros(len(moving))
+        if self._method.resolution == "linearized":
+            self._step(task, result, scans, moving, damping)
+            return
+        last = np.full(len(moving), np.inf)
+        best = result.poses.copy(), result.relative.copy(), np.full(result.slack.shape, np.inf)
+        for number in range(STEPS):
+            free = number < FREE_STEPS
+            step, scaled = self._step(task, result, scans, moving, damping)
+            on = (step > self._at_rest) & (free | (scaled > NOISE))
+            result.residual[moving[~on]] = np.maximum(result.residual[moving[~on]], scaled[~on])
+            on[on] = ~self._adrift(task, result, moving[on])
             moving, scans = moving[on], [scan.take(on) for scan in scans]
+            if not moving.size:
+                return
+            scaled, damping, last = scaled[on], damping[on], last[on]
+            if not free:
+                damping = np.where(scaled > last / 2, np.maximum(2 * damping, 1), damping / 4)
+                self._keep_best(best, task, result, scans, moving)
+            last = scaled
+        in_conflict = (result.slack[moving] > self._tolerance).any(axis=1)
+        stuck = moving[in_conflict]
+        result.poses[stuck], result.relative[stuck], result.slack[stuck] = (kept[stuck] for kept in best)
+        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, last))
 
-    def _step(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> np.ndarray:
-        """One linear step of the rows `moving`, and (row,) its size [mm]: the QP in which every point has its row."""
+    def _keep_best(
+        self, best: tuple[np.ndarray, ...], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
+    ) -> None:
+        """Put into `best` (poses, relative, true penetration of each pair) what is better than it."""
+        gaps = _gaps(scans, result.relative[rows], task.deviations[rows])
+        inside = np.stack([np.maximum(-gap.min(axis=1), 0) for gap in gaps], axis=1)
+        better = inside.max(axis=1) < best[-1][rows].max(axis=1)
+        for kept, new in zip(best, (result.poses[rows], result.relative[rows], inside), strict=True):
+            kept[rows[better]] = new[better]
+
+    def _step(
+        self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray, damping: np.ndarray
+    ) -> np.ndarray:
+        """One linear step of the rows `moving`: the QP in which every point has its row.
+
+        Returns its size (2, row) [mm]: that of the largest increment, and in the norm of the objective.
+        """
         now = result.poses[moving]
         gaps = _gaps(scans, result.relative[moving], task.deviations[moving])
         slots = [s.take(moving) for s in result.slots]
-        step = np.zeros(len(moving))
+        step = np.zeros((2, len(moving)))
         open_ = np.arange(len(moving))
         for number in range(ROUNDS):
             more = np.full(len(open_), number == 0)
@@ -210,12 +244,21 @@ class ContactResolver:
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            gaps, slots, step[open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots)
+            gaps, slots, step[:, open_] = self._solve_round(
+                task, result, scans, moving[open_], now[open_], slots, damping[open_]
+            )
         result.iterations[moving] += 1
         return step
 
     def _solve_round(
-        self, task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray, now: np.ndarray, slots: list[Slots]
+        self,
+        task: Task,
+        result: Resolution,
+        scans: Sequence[PairScan],
+        rows: np.ndarray,
+        now: np.ndarray,
+        slots: list[Slots],
+        damping: np.ndarray,
     ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
         """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
         deviations = task.deviations[rows]
@@ -226,6 +269,7 @@ class ContactResolver:
             raw=task.raw[rows],
             moments=task.moments[rows],
             deviations=deviations,
+            damping=damping,
             P_m=P_m,
             P_r=P_r,
             n_r=n_r,
@@ -241,12 +285,12 @@ class ContactResolver:
         result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), len(self.parts), ENTRIES)[solved]
         result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
         result.residual[rows] = np.where(solved, residual, np.inf)
-        result.slack[rows] = slack
+        result.slack[rows[solved]] = slack[solved]
         slots = [s.carrying(m) for s, m in zip(slots, np.split(answer["multipliers"], len(slots), axis=1), strict=True)]
         for kept, s in zip(result.slots, slots, strict=True):
             kept.put(rows, s)
         gaps = [np.where(solved[:, None], gap + slack[:, k, None], np.inf) for k, gap in enumerate(gaps)]
-        return gaps, slots, np.where(solved, answer["step"][:, 0], 0.0)
+        return gaps, slots, np.where(solved, answer["step"].T, 0.0)
 
     def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
         """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
@@ -263,9 +307,9 @@ class ContactResolver:
                     answer[name][k] = values[0]
         return answer
 
-    def _adrift(self, task: Task, result: Resolution) -> np.ndarray:
-        """Rows (row,) in which a force finds nothing to rest on, and only the small quadratic term stops its part."""
-        return self._displacements(task.raw, result.poses) > ADRIFT * self._group.length
+    def _adrift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
+        """Which of `rows` are so far away that a force seems to find nothing to rest on."""
+        return self._displacements(task.raw[rows], result.poses[rows]) > ADRIFT * self._group.length
 
     def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""

@@ -52,7 +52,8 @@ def simulate_block(
     accuracy = program.plugin.accuracy
     stuck = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
     status = np.where(slack <= accuracy, Status.RESOLVED, stuck)
-    status = np.where(residual <= accuracy, status, Status.NOT_CONVERGED)
+    # A conflict is believed where it exceeds what the solver left undone.
+    status = np.where(residual <= np.maximum(accuracy, slack), status, Status.NOT_CONVERGED)
     status = np.where(touched, status, Status.UNTOUCHED)
     return Block(
         start=start,

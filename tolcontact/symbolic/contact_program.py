@@ -28,7 +28,7 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "P_m", "P_r", "n_r", "filled")
+INPUTS = ("poses", "raw", "moments", "deviations", "damping", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
@@ -39,6 +39,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (l)       of all locators of the model [mm]
+    damping              share of itself by which the Hessian is raised, for shorter steps
     P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
     filled (k)           1 where a slot holds a point, 0 where it is empty
 
@@ -48,7 +49,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
     stationarity, natural_residual   KKT residuals [mm]: max |Hy + f - A'lambda| and max |min(row, lambda)|
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
-    step                 largest increment (dt, L w) of a mover [mm]
+    step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|
     """
     rows = SLOTS * len(group.pairs)
     inputs = [
@@ -56,6 +57,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
         ca.SX.sym("raw", ENTRIES * len(group.parts)),
         ca.SX.sym("moments", MOMENTS, len(group.sides)),
         ca.SX.sym("deviations", len(nominal.locator_labels)),
+        ca.SX.sym("damping"),
         *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", rows),
     ]
@@ -76,7 +78,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
 
 def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
     """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, damping, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -110,7 +112,7 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     lower = ca.vertcat(ca.if_else(filled, -ca.vertcat(*constants), -FAR * group.length), rest)
     upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
     f = ca.vertcat(whiten.T @ ca.substitute(pull, z, at_rest), ca.DM(np.full(pairs, group.length)))
-    H = ca.diagcat(H, ca.SX.eye(pairs))
+    H = ca.diagcat((1 + damping) * H, ca.SX.eye(pairs))
     assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
 
     size = z.numel() + pairs
@@ -129,7 +131,7 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
         ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x),
         ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
         SLACK * s,
-        ca.norm_inf(z),
+        ca.vertcat(ca.norm_inf(z), ca.norm_inf(y)),
     ]
     step = _whitening(U_in) @ y
     results = [ca.substitute(result, z, step) for result in results]

@@ -1,0 +1,101 @@
+"""Small assemblies at random: whatever is declared, every realization has a status, and what it certifies is true."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, event, given, settings
+from hypothesis import strategies as st
+
+import tolcontact as tc
+from tests import referee
+from tests.test_contact import R_t, simulate
+from tolcontact.method import OBJECTIVES
+from tolcontact.simulation import CORRECTED, RAW, Status
+
+lengths = st.floats(2, 50)
+ranges = st.sampled_from([0.0, 0.01, 0.1, 1.0])
+
+
+@st.composite
+def assemblies(draw) -> tc.Assembly:
+    """A row of up to four boxes along x, each against the one before; some are fixed, some stand on others or have supports."""
+    a = tc.Assembly("random")
+    boxes, x = [], 0.0
+    for k in range(draw(st.integers(2, 4))):
+        size = [draw(lengths), *(draw(lengths) + 10 * k for _ in range(2))]  # each against a larger one: few overhangs
+        part = a.part(
+            f"box{k}",
+            tc.Box(*size),
+            at=(x, draw(st.floats(-1, 1)), draw(st.floats(-1, 1))),
+            fixed=draw(st.sampled_from([None, None, k % 2 == 0 or None])),
+        )
+        x += size[0] - draw(st.sampled_from([0.0, 0.0, -0.1, 0.1]))
+        sx, sy, sz = size
+        one_sided = draw(st.booleans())
+        z = draw(ranges)
+        feet = [
+            tc.Locator(f"A{i}", p, "z", z, one_sided=one_sided) for i, p in enumerate([(0, 0, 0), (sx, 0, 0), (sx / 2, sy, 0)])
+        ]
+        if one_sided and draw(st.booleans()):
+            feet.append(tc.Locator("A4", (0, sy, 0), "z", z, one_sided=True))
+        y, along = draw(ranges), draw(ranges)
+        sides = [
+            tc.Locator("B1", (0, 0, sz / 2), "y", y),
+            tc.Locator("B2", (sx, 0, sz / 2), "y", y),
+            tc.Locator("C", (0, sy / 2, sz / 2), "x", along),
+        ]
+        on = draw(st.sampled_from([None, None, *boxes])) if boxes else None
+        a.locate(part, [*feet, *sides], on=on)
+        a.force(f"push{k}", at=part.point(sx / 2, sy / 2, sz / 2), vector=(-1.0, 0.0, -2.0))
+        boxes.append(part)
+    for k, (left, right) in enumerate(itertools.pairwise(boxes)):
+        sides = [left.face("+x"), right.face("-x")]
+        if draw(st.integers(0, 3)) == 0:
+            sides.reverse()
+        if any(part.fixed is None for part in (left, right)):
+            a.contact(f"joint{k}", moving=sides[0], reference=sides[1], points=draw(st.sampled_from([1, 5, 30])), within=5.0)
+    a.measure("end", boxes[-1].point(0, 0, 0), along="x", tolerance=1)
+    return a
+
+
+@settings(max_examples=200, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
+@given(
+    assembly=assemblies(),
+    solver=st.sampled_from(["qpoases", "daqp"]),
+    resolution=st.sampled_from(["exact", "exact", "linearized"]),
+    objective=st.sampled_from(OBJECTIVES),
+)
+def test_certificates_hold(assembly, solver, resolution, objective):
+    method = tc.Method(resolution=resolution, objective=objective)
+    try:
+        program, run = simulate(assembly, samples=20, solver=solver, method=method)
+    except tc.TolcontactError as error:
+        # Some random models cannot be: no free side, or faces that do not meet. That is said, and nothing is run.
+        assert "contact" in str(error)
+        event("refused")
+        return
+    event(f"{resolution}, {objective}: {sorted({Status(s).name for s in run['status']})}")
+    for name, values in run.items():
+        assert not np.isnan(values).any(), name
+    status = run["status"]
+    assert np.isin(status, list(Status)).all()
+    accuracy = program.plugin.accuracy
+    penetration = -run["gap_min"][:, CORRECTED].min(axis=1, initial=np.inf)
+    resolved, untouched = status == Status.RESOLVED, status == Status.UNTOUCHED
+    assert (run["kkt_residual"][resolved] <= accuracy).all()
+    assert (run["poses"][untouched, CORRECTED] == run["poses"][untouched, RAW]).all()
+    assert (run["reaction"] >= 0).all()
+    assert (run["iterations"][~untouched] > 0).all()
+    if resolution == "exact":
+        assert (penetration[resolved] <= accuracy).all()
+        R, _ = R_t(run["poses"][:, CORRECTED])
+        assert np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max() < 1e-12
+        assert (penetration[status == Status.NOT_ASSEMBLABLE] > accuracy).all()
+    # The archived least gaps are those of the archived poses, by the paper's formula.
+    R, t = R_t(run["poses"])
+    for index, pair in enumerate(program.nominal.pairs):
+        if pair.locators is None:
+            for k in range(20):
+                least = referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED]).min()
+                assert least == pytest.approx(run["gap_min"][k, CORRECTED, index], rel=1e-9, abs=1e-9)
