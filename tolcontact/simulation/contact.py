@@ -28,6 +28,7 @@ NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, i
 SETTLED = 1e-6  # mm: poses that move less after a search have settled
 CARRIES = 1e-4
 ADRIFT = 10
+LOST = 1e5
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ class ContactResolver:
         if self._method.search == "iterated":
             scans = self._settle(task, result)
         if self._method.objective == "seating":
-            result.residual[self._adrift(task, result, np.arange(len(rows)))] = np.inf
+            result.residual[self._drift(task, result, np.arange(len(rows))) > ADRIFT] = np.inf
         least = np.stack([g.min(axis=1) for g in _gaps(scans, result.relative, task.deviations)], axis=1)
         result.gap_min[rows, 1] = least
         if self._method.resolution == "exact" and self._method.active_set == "closed":
@@ -198,7 +199,7 @@ class ContactResolver:
             step, scaled = self._step(task, result, scans, moving, damping)
             on = (step > self._at_rest) & (free | (scaled > NOISE))
             result.residual[moving[~on]] = np.maximum(result.residual[moving[~on]], scaled[~on])
-            on[on] = ~self._adrift(task, result, moving[on])
+            on[on] = self._drift(task, result, moving[on]) < LOST
             moving, scans = moving[on], [scan.take(on) for scan in scans]
             if not moving.size:
                 return
@@ -307,9 +308,9 @@ class ContactResolver:
                     answer[name][k] = values[0]
         return answer
 
-    def _adrift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
-        """Which of `rows` are so far away that a force seems to find nothing to rest on."""
-        return self._displacements(task.raw[rows], result.poses[rows]) > ADRIFT * self._group.length
+    def _drift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
+        """How far `rows` have come from their raw pose, in lengths of the group. A force may find nothing to rest on."""
+        return self._displacements(task.raw[rows], result.poses[rows]) / self._group.length
 
     def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""

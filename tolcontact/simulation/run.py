@@ -53,7 +53,8 @@ def simulate_block(
     stuck = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
     status = np.where(slack <= accuracy, Status.RESOLVED, stuck)
     # A conflict is believed where it exceeds what the solver left undone.
-    status = np.where(residual <= np.maximum(accuracy, slack), status, Status.NOT_CONVERGED)
+    believed = np.isfinite(residual) & (residual <= np.maximum(accuracy, slack))
+    status = np.where(believed, status, Status.NOT_CONVERGED)
     status = np.where(touched, status, Status.UNTOUCHED)
     return Block(
         start=start,

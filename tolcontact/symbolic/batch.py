@@ -29,6 +29,7 @@ class Batch:
         self._results = function.name_out()
         self._many = _Buffered(function.map(WIDTH), WIDTH)
         self._one = _Buffered(function, 1)
+        self._solvers = [inner for inner in function.find_functions() if inner.is_a("Conic")]
 
     def __call__(self, **arrays: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Evaluate for all realizations: `name=(realization, ...)` for each input of the Function.
@@ -50,14 +51,22 @@ class Batch:
             rows = slice(start, start + width)
             if not call([array[rows] for array in flat], [result[rows] for result in results]):
                 # A plugin that gives up on one realization ends the whole call (qpOASES does), so find out which.
+                self._forget()
                 for k in range(start, start + width):
                     one = slice(k, k + 1)
                     if not self._one([array[one] for array in flat], [result[one] for result in results]):
                         failed[k] = True
+                        self._forget()
                         for result in results:
                             result[k] = np.nan
             start += width
         return dict(zip(self._results, results, strict=True)), failed
+
+    def _forget(self) -> None:
+        """Give the solvers a new memory. qpOASES starts from its last problem, and once it has failed it fails for ever."""
+        for solver in self._solvers:
+            solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
+        self._many.is_new = self._one.is_new = True
 
 
 def _dense(function: ca.Function) -> ca.Function:
@@ -80,15 +89,15 @@ class _Buffered:
             self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self._outputs):
             self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
-        self._fresh = True
+        self.is_new = True
 
     def __call__(self, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> bool:
         """Evaluate; False where the Function gave up."""
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:] = array.ravel()
-        with quiet() if self._fresh else contextlib.nullcontext():
+        with quiet() if self.is_new else contextlib.nullcontext():
             self._evaluate()
-        self._fresh = False
+        self.is_new = False
         for buffer, array in zip(self._outputs, outputs, strict=True):
             array[:] = buffer.reshape(array.shape)
         return bool(self._buffer.ret() == 0)
