@@ -4,6 +4,7 @@ import importlib.util
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
@@ -94,4 +95,100 @@ def stack(frame: Frame = STILL, *, reverse: bool = False, free_middle: bool = Tr
     a.measure("top", parts["upper"].point(15 * s, 15 * s, 10 * s), along=frame.along(0, 0, 1), tolerance=s)
     gap = {"to": parts["upper"].point(0, 0, 0), "along": frame.along(0, 0, 1)}
     a.measure("joint", parts["bottom"].point(0, 0, 10 * s), **gap, tolerance=s)
+    return a
+
+
+def tower(blocks: int = 10) -> tc.Assembly:
+    """Free blocks on a fixed one, each resting on the one below."""
+    a = tc.Assembly("tower")
+    below = a.part("block 0", tc.Box(40, 40, 10), fixed=True)
+    for k in range(1, blocks):
+        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k), fixed=False)
+        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=1)
+        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
+        below = block
+    a.measure("top", below.point(20, 20, 10), along="z", tolerance=1)
+    return a
+
+
+def ring(wedges: int = 8) -> tc.Assembly:
+    """Free wedges side by side around an axis: the loop of contacts closes."""
+    a = tc.Assembly("ring")
+    half = np.pi / wedges
+    corners = [(r * np.cos(s * half), r * np.sin(s * half), z) for r in (20, 40) for s in (-1, 1) for z in (0, 10)]
+    wedge = trimesh.Trimesh(corners).convex_hull
+    out, along = np.array([np.cos(half), np.sin(half), 0]), np.array([-np.sin(half), np.cos(half), 0])
+    x = 20 * np.cos(half)
+    locators = [
+        tc.Locator("A1", (x + 1, 0, 0), "z"),
+        tc.Locator("A2", (35, -5, 0), "z"),
+        tc.Locator("A3", (35, 5, 0), "z"),
+        tc.Locator("B1", (x, -5, 5), "x"),
+        tc.Locator("B2", (x, 5, 5), "x"),
+        tc.Locator("C", tuple(30 * out * [1, -1, 1] + [0, 0, 5]), "y"),
+    ]
+    parts = []
+    for k in range(wedges):
+        part = a.part(f"wedge {k}", tc.Mesh(wedge), rotation=(0, 0, 2 * half * k), fixed=False)
+        a.locate(part, locators, tolerance=0.5)
+        parts.append(part)
+
+    def towards(direction):
+        return lambda c, n: n @ direction > 0.99
+
+    ahead, behind = towards(along), towards(along * [1, -1, 1])
+    for k, part in enumerate(parts):
+        a.contact(f"joint {k}", moving=part.face(ahead), reference=parts[(k + 1) % wedges].face(behind), points=20)
+    a.measure("width", parts[0].point(x, 0, 5), to=parts[wedges // 2].point(x, 0, 5), along="x", tolerance=1)
+    return a
+
+
+def jaws() -> tc.Assembly:
+    """A tongue in the slot between two free jaws, all of them on a floor."""
+    a = tc.Assembly("jaws")
+    floor = a.part("floor", tc.Box(60, 30, 10), at=(0, 0, -10), fixed=True)
+    left = a.part("left", tc.Box(20, 20, 20), at=(0, 5, 0), fixed=False)
+    tongue = a.part("tongue", tc.Box(20, 20, 25), at=(20, 5, 0), fixed=False)
+    right = a.part("right", tc.Box(20, 20, 20), at=(40, 5, 0), fixed=False)
+    for part in (left, tongue, right):
+        scheme = tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=2)
+        a.locate(part, scheme, tolerance=0.5)
+        a.contact(f"{part.name} on floor", moving=part.face("-z"), reference=floor.face("+z"), points=25)
+    a.contact("left side", moving=tongue.face("-x"), reference=left.face("+x"), points=25)
+    a.contact("right side", moving=tongue.face("+x"), reference=right.face("-x"), points=25)
+    a.measure("slot", left.point(20, 10, 20), to=right.point(0, 10, 20), along="x", tolerance=1)
+    return a
+
+
+def tab(slot: float = 9.9) -> tc.Assembly:
+    """A tab 10 wide that goes down into a slot."""
+    a = tc.Assembly("tab")
+    left = a.part("left", tc.Box(10, 10, 10), at=(-10, 0, 0), fixed=True)
+    right = a.part("right", tc.Box(10, 10, 10), at=(slot, 0, 0), fixed=True)
+    floor = a.part("floor", tc.Box(10, 10, 10), at=(0, 0, -10), fixed=True)
+    part = a.part("tab", tc.Box(10, 10, 10))
+    a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=1), tolerance=0.1)
+    a.contact("left side", moving=part.face("-x"), reference=left.face("+x"), points=9)
+    a.contact("right side", moving=part.face("+x"), reference=right.face("-x"), points=9)
+    a.contact("floor", moving=part.face("-z"), reference=floor.face("+z"), points=9)
+    a.measure("side", part.point(5, 5, 5), along="x", tolerance=1)
+    return a
+
+
+def rollers(tangential: float = 6.0) -> tc.Assembly:
+    """A roller that is set down beside the top of another one, and does not turn: x goes sideways, z down."""
+    a = tc.Assembly("rollers")
+    shape = tc.Mesh(trimesh.creation.cylinder(radius=10, height=10, sections=720))
+    lower = a.part("lower", shape, fixed=True)
+    upper = a.part("upper", shape, at=(0, 20, 0))
+    a.locate(
+        upper,
+        [
+            tc.Locator("Z", (0, 0, -5), "z", 0), tc.Locator("Z2", (5, 0, -5), "z", 0), tc.Locator("Z3", (0, 5, -5), "z", 0),
+            tc.Locator("X1", (-10, 0, -4), "x", tangential), tc.Locator("Y1", (0, -10, 4), "y", 2), tc.Locator("Y2", (5, -8, 4), "y", 0),
+        ],
+    )  # fmt: skip
+    sides = {"moving": upper.face(lambda c, n: n[:, 1] < -0.5), "reference": lower.face(lambda c, n: n[:, 1] > 0.5)}
+    a.contact("line", **sides, points=400, within=20)
+    a.measure("height", upper.point(0, 0, 0), along="y", tolerance=1)
     return a
