@@ -176,18 +176,16 @@ def tab(slot: float = 9.9) -> tc.Assembly:
 
 
 def rollers(tangential: float = 6.0) -> tc.Assembly:
-    """A roller that is set down beside the top of another one, and does not turn: x goes sideways, z down."""
+    """A roller that is set down beside the top (+y) of another one; their axes (z) stay parallel."""
     a = tc.Assembly("rollers")
     shape = tc.Mesh(trimesh.creation.cylinder(radius=10, height=10, sections=720))
     lower = a.part("lower", shape, fixed=True)
     upper = a.part("upper", shape, at=(0, 20, 0))
-    a.locate(
-        upper,
-        [
-            tc.Locator("Z", (0, 0, -5), "z", 0), tc.Locator("Z2", (5, 0, -5), "z", 0), tc.Locator("Z3", (0, 5, -5), "z", 0),
-            tc.Locator("X1", (-10, 0, -4), "x", tangential), tc.Locator("Y1", (0, -10, 4), "y", 2), tc.Locator("Y2", (5, -8, 4), "y", 0),
-        ],
-    )  # fmt: skip
+    places = {
+        "Z1": ((0, 0, -5), "z", 0), "Z2": ((5, 0, -5), "z", 0), "Z3": ((0, 5, -5), "z", 0),
+        "X1": ((-10, 0, -4), "x", tangential), "Y1": ((-8, -6, 4), "y", 2), "Y2": ((8, -6, 4), "y", 2),
+    }  # fmt: skip
+    a.locate(upper, [tc.Locator(name, *place) for name, place in places.items()])
     sides = {"moving": upper.face(lambda c, n: n[:, 1] < -0.5), "reference": lower.face(lambda c, n: n[:, 1] > 0.5)}
     a.contact("line", **sides, points=400, within=20)
     a.measure("height", upper.point(0, 0, 0), along="y", tolerance=1)

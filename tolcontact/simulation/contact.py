@@ -19,7 +19,7 @@ from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 STEPS = 200
-FREE_STEPS = 8  # later ones are damped where they do not shrink
+FREE_STEPS = 8  # later ones count the curvature, and are damped where they grow
 SEARCHES = 40
 CLUSTERS = 6
 PENETRATION = 1e-10  # mm: less than this is no penetration
@@ -196,7 +196,7 @@ class ContactResolver:
         best = result.poses.copy(), result.relative.copy(), np.full(result.slack.shape, np.inf)
         for number in range(STEPS):
             free = number < FREE_STEPS
-            step, scaled = self._step(task, result, scans, moving, damping)
+            step, scaled = self._step(task, result, scans, moving, damping, newton=not free) * (1 + damping)
             on = (step > self._at_rest) & (free | (scaled > NOISE))
             result.residual[moving[~on]] = np.maximum(result.residual[moving[~on]], scaled[~on])
             on[on] = self._drift(task, result, moving[on]) < LOST
@@ -205,13 +205,13 @@ class ContactResolver:
                 return
             scaled, damping, last = scaled[on], damping[on], last[on]
             if not free:
-                damping = np.where(scaled > last / 2, np.maximum(2 * damping, 1), damping / 4)
+                damping = np.where(scaled > last, np.maximum(2 * damping, 1), damping / 2)
                 self._keep_best(best, task, result, scans, moving)
             last = scaled
         in_conflict = (result.slack[moving] > self._tolerance).any(axis=1)
         stuck = moving[in_conflict]
         result.poses[stuck], result.relative[stuck], result.slack[stuck] = (kept[stuck] for kept in best)
-        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, last))
+        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, scaled))
 
     def _keep_best(
         self, best: tuple[np.ndarray, ...], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
@@ -224,7 +224,13 @@ class ContactResolver:
             kept[rows[better]] = new[better]
 
     def _step(
-        self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray, damping: np.ndarray
+        self,
+        task: Task,
+        result: Resolution,
+        scans: Sequence[PairScan],
+        moving: np.ndarray,
+        damping: np.ndarray,
+        newton: bool = False,
     ) -> np.ndarray:
         """One linear step of the rows `moving`: the QP in which every point has its row.
 
@@ -232,7 +238,8 @@ class ContactResolver:
         """
         now = result.poses[moving]
         gaps = _gaps(scans, result.relative[moving], task.deviations[moving])
-        slots = [s.take(moving) for s in result.slots]
+        slots = before = [s.take(moving) for s in result.slots]
+        bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, slots, strict=True)], axis=1)
         step = np.zeros((2, len(moving)))
         open_ = np.arange(len(moving))
         for number in range(ROUNDS):
@@ -245,9 +252,14 @@ class ContactResolver:
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            gaps, slots, step[:, open_] = self._solve_round(
-                task, result, scans, moving[open_], now[open_], slots, damping[open_]
-            )
+            firm = [b.take(open_).reactions_of(s.points) for b, s in zip(before, slots, strict=True)]
+            curved = {
+                "newton": np.full(len(open_), float(newton)),
+                "bend": bend[open_],
+                "firm": np.concatenate(firm, axis=1),
+                "damping": damping[open_],
+            }
+            gaps, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
         result.iterations[moving] += 1
         return step
 
@@ -259,7 +271,7 @@ class ContactResolver:
         rows: np.ndarray,
         now: np.ndarray,
         slots: list[Slots],
-        damping: np.ndarray,
+        curved: dict[str, np.ndarray],
     ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
         """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
         deviations = task.deviations[rows]
@@ -270,7 +282,7 @@ class ContactResolver:
             raw=task.raw[rows],
             moments=task.moments[rows],
             deviations=deviations,
-            damping=damping,
+            **curved,
             P_m=P_m,
             P_r=P_r,
             n_r=n_r,
@@ -301,6 +313,7 @@ class ContactResolver:
         answer, _ = self._solve(**problems)
         for k in np.flatnonzero(~(_residual(answer) <= self._accuracy)):
             one = {name: values[k : k + 1] for name, values in problems.items()}
+            one["newton"] = np.zeros(1)
             self._solve(**{**one, "filled": np.zeros_like(one["filled"])})
             again, _ = self._solve(**one)
             if _residual(again)[0] < _residual(answer)[k]:
@@ -324,6 +337,14 @@ class ContactResolver:
 def _gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray]:
     """Gaps (row, point) [mm] of each pair at X_RM (row, pair, 12)."""
     return [scan.gaps(relative[:, k], deviations) for k, scan in enumerate(scans)]
+
+
+def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
+    """The reactions' sum of the gaps' gradients by the entries of X_RM, (row, 12)."""
+    P_m, _, n_r = scan.rows(slots.points, deviations)
+    weighted = slots.reactions[..., None] * n_r
+    turning = (weighted[..., :, None] * P_m[..., None, :]).sum(axis=1)
+    return np.concatenate([turning.reshape(len(turning), 9), weighted.sum(axis=1)], axis=1)
 
 
 def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:

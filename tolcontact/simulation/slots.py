@@ -29,6 +29,11 @@ class Slots:
         """Replace the slots of some rows."""
         self.points[rows], self.filled[rows], self.reactions[rows] = other.points, other.filled, other.reactions
 
+    def reactions_of(self, points: np.ndarray) -> np.ndarray:
+        """The reactions of some contact points (row, slot), 0 where they have none here."""
+        same = (points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]
+        return np.asarray(np.where(same, self.reactions[:, None, :], 0.0).max(axis=2))
+
     def carrying(self, multipliers: np.ndarray) -> "Slots":
         """Only the slots whose rows carry, at most KEPT of them, largest multipliers (row, slot) first."""
         largest = np.where(self.filled, multipliers, 0.0)

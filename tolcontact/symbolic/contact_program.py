@@ -17,7 +17,7 @@ import numpy as np
 
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
-from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, rigid
+from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, quadratic, rigid
 from tolcontact.symbolic.criterion import criterion, two_sided
 from tolcontact.symbolic.gap import gap
 from tolcontact.symbolic.groups import Group
@@ -28,7 +28,7 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "damping", "P_m", "P_r", "n_r", "filled")
+INPUTS = ("poses", "raw", "moments", "deviations", "newton", "bend", "firm", "damping", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
@@ -39,6 +39,9 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (l)       of all locators of the model [mm]
+    newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
+    bend (12 q)          where it counts: the reactions' sum of the gaps' gradients by the entries of X_RM
+    firm (k)             where it counts: the reaction that a slot's point had before
     damping              share of itself by which the Hessian is raised, for shorter steps
     P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
     filled (k)           1 where a slot holds a point, 0 where it is empty
@@ -57,6 +60,9 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
         ca.SX.sym("raw", ENTRIES * len(group.parts)),
         ca.SX.sym("moments", MOMENTS, len(group.sides)),
         ca.SX.sym("deviations", len(nominal.locator_labels)),
+        ca.SX.sym("newton"),
+        ca.SX.sym("bend", ENTRIES * len(group.pairs)),
+        ca.SX.sym("firm", rows),
         ca.SX.sym("damping"),
         *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", rows),
@@ -78,7 +84,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
 
 def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
     """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, damping, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, newton, bend, firm, damping, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -100,18 +106,28 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     slots = len(rows)
     held, elongation = _held(nominal, group, moved, deviations, z) if method.objective == "seating" else (0, ca.SX(0, 1))
     goal = criterion(nominal, group, method, moments, raw, moved, z)
-    Q, pull = ca.hessian(goal.energy, z)
-    H, U = _conditioned(ca.substitute(Q, z, at_rest))
+    Q, pull = (ca.substitute(each, z, at_rest) for each in ca.hessian(goal.energy, z))
+    A, g = ca.vertcat(*rows), ca.vertcat(*constants)
+    if method.resolution == "exact":
+        curved = [quadratic(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
+        curvature = _curvature(nominal, group, method, moments, raw, curved, z, bend / goal.scale) - Q
+        # Rows that carry are held in the objective, too: it does not change the answer, and makes it convex again.
+        hold = (1 + 2 * ca.sum1(firm) / goal.scale / group.length) * ca.if_else(firm > 0, filled, 0)
+        curvature += A.T @ ca.diag(hold) @ A
+        counts = ca.logic_and(newton, _is_convex(Q + curvature))
+        Q += ca.if_else(counts, curvature, 0)
+        pull += ca.if_else(counts, A.T @ (hold * g), 0)
+    H, U = _conditioned(Q)
     whiten = _whitening(U)
-    A = ca.vertcat(*rows) @ whiten
+    A = A @ whiten
     A = ca.vertcat(*(_or_idle(filled[k], A[k, :], k) for k in range(slots)))
     B = ca.substitute(ca.jacobian(elongation, z), z, at_rest) @ whiten
     pairs = len(group.pairs)
     A = ca.blockcat([[A, SLACK * ca.kron(ca.DM.eye(pairs), ca.DM.ones(SLOTS))], [B, ca.SX(held, pairs)]])
     rest = -ca.substitute(elongation, z, at_rest)
-    lower = ca.vertcat(ca.if_else(filled, -ca.vertcat(*constants), -FAR * group.length), rest)
+    lower = ca.vertcat(ca.if_else(filled, -g, -FAR * group.length), rest)
     upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
-    f = ca.vertcat(whiten.T @ ca.substitute(pull, z, at_rest), ca.DM(np.full(pairs, group.length)))
+    f = ca.vertcat(whiten.T @ pull, ca.DM(np.full(pairs, group.length)))
     H = ca.diagcat((1 + damping) * H, ca.SX.eye(pairs))
     assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
 
@@ -137,6 +153,30 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     results = [ca.substitute(result, z, step) for result in results]
     finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
     return assemble, finish
+
+
+def _curvature(
+    nominal: Nominal,
+    group: Group,
+    method: Method,
+    moments: ca.SX,
+    raw: Sequence[Pose],
+    poses: Sequence[Pose],
+    z: ca.SX,
+    bend: ca.SX,
+) -> ca.SX:
+    """Hessian of the Lagrangian at z = 0: of the objective less the reactions' work on the gaps (linear in X_RM)."""
+    energy = criterion(nominal, group, method, moments, raw, poses, z).energy
+    work = ca.dot(bend, ca.vertcat(*(X_RM.vector() for X_RM in _pairs(nominal, group, poses))))
+    H, _ = ca.hessian(energy - work, z)
+    return ca.substitute(H, z, ca.SX.zeros(z.shape))
+
+
+def _is_convex(Q: ca.SX) -> ca.SX:
+    """Whether the diagonal blocks of Q are positive definite; a NaN among the pivots is not."""
+    blocks = (ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS]) for k in range(0, Q.size1(), FREEDOMS))
+    pivots = ca.vertcat(*(ca.diag(ca.chol(block)) for block in blocks))
+    return ca.mmin(ca.if_else(pivots > 0, 1, 0))
 
 
 def _pairs(nominal: Nominal, group: Group, poses: Sequence[Pose]) -> list[Pose]:

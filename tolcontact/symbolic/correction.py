@@ -60,6 +60,14 @@ def rigid(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
     return X
 
 
+def quadratic(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+    """What `rigid` gives, to second order in the increments."""
+    for mover in reversed(part.movers):
+        K = ca.skew(movers[mover].W)
+        X = movers[mover].moving(X, ca.SX.eye(3) + K + K @ K / 2)
+    return X
+
+
 def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
     """Paper (12), which keeps the linearized gap exactly; but a part that others rest on turns by exp([W]x).
 
