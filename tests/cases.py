@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
+from scipy.stats import uniform
 
 import tolcontact as tc
 
@@ -189,4 +190,40 @@ def rollers(tangential: float = 6.0) -> tc.Assembly:
     sides = {"moving": upper.face(lambda c, n: n[:, 1] < -0.5), "reference": lower.face(lambda c, n: n[:, 1] > 0.5)}
     a.contact("line", **sides, points=400, within=20)
     a.measure("height", upper.point(0, 0, 0), along="y", tolerance=1)
+    return a
+
+
+def square_pins() -> tc.Assembly:
+    """CASES C6: a plate with two square pins, free to slide along x only; each face of pins and slots is off and askew.
+
+    A face is a part of its own. Off by u with sigma t/6 and askew by gamma with sigma t/30 is the same as two independent
+    deviations with sigma t/6 sqrt(2) at y = -5 and +5. A push along x finds its rest where both pins fit.
+    """
+    t = 0.16
+    a = tc.Assembly("C6")
+    plate = a.part("plate", tc.Box(130, 40, 5), at=(0, -20, 10), fixed=False)
+    guides = {
+        "A1": ((10, 5, 0), "z"),
+        "A2": ((120, 5, 0), "z"),
+        "A3": ((65, 35, 0), "z"),
+        "B1": ((10, 0, 2), "y"),
+        "B2": ((120, 0, 2), "y"),
+    }
+    stop = tc.Locator("stop", (0, 20, 2), "x", uniform(-1, 1e-9), one_sided=True)
+    a.locate(plate, [*(tc.Locator(name, p, along, 0) for name, (p, along) in guides.items()), stop])
+    a.force("push", at=plate.point(0, 20, 2), vector=(1.0, 0, 0))
+
+    def wall(name, x, on=None):
+        part = a.part(name, tc.Box(1, 10, 10), at=(x, -5, 0), fixed=True)
+        held = {"Z1": ((0, 0, 0), "z"), "Z2": ((1, 0, 0), "z"), "Z3": ((0, 10, 0), "z"), "Y": ((0, 0, 0), "y")}
+        varying = [tc.Locator(f"X{y}", (0, y, 0), "x", np.sqrt(2) * t) for y in (0, 10)]
+        a.locate(part, [*(tc.Locator(key, p, along, 0) for key, (p, along) in held.items()), *varying], on=on)
+        return part
+
+    for k, x in enumerate((30, 100)):
+        left = wall(f"pin {k} left", x - 5, plate), wall(f"slot {k} left", x - 6.1)
+        right = wall(f"pin {k} right", x + 4, plate), wall(f"slot {k} right", x + 5.1)
+        a.contact(f"left {k}", moving=left[0].face("-x"), reference=left[1].face("+x"), points="vertices")
+        a.contact(f"right {k}", moving=right[0].face("+x"), reference=right[1].face("-x"), points="vertices")
+    a.measure("slide", plate.point(0, 0, 0), along="x", tolerance=1)
     return a

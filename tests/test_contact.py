@@ -165,9 +165,16 @@ def test_one_dimensional_contact(base_tolerance):
     assert abs(touched - 0.5) < 3.3 * 0.5 / np.sqrt(samples)
 
 
+METHODS = [
+    tc.Method(resolution=resolution, objective=objective)
+    for resolution in ("linearized", "exact")
+    for objective in ("active points", "all points", "locator stiffness")
+]
+
+
 @pytest.mark.parametrize("case", [cases.ra1, cases.stack], ids=["ra1", "stack"])
 class TestInvariance:
-    """CASES C9."""
+    """CASES C9. Seating: tests/test_seating.py."""
 
     @pytest.mark.parametrize(
         "frame",
@@ -178,16 +185,18 @@ class TestInvariance:
         ],
         ids=["shifted", "turned", "both"],
     )
-    def test_moving_the_whole_assembly_changes_no_measure(self, case, frame):
-        _, still = simulate(case())
-        _, moved = simulate(case(frame))
+    @pytest.mark.parametrize("method", METHODS, ids=lambda m: f"{m.resolution}-{m.objective}")
+    def test_moving_the_whole_assembly_changes_no_measure(self, case, frame, method):
+        _, still = simulate(case(), method=method)
+        _, moved = simulate(case(frame), method=method)
         assert np.abs(moved["measured"] - still["measured"]).max() < 1e-8
         assert np.abs(moved["gap_min"] - still["gap_min"]).max() < 1e-8
 
-    def test_doubling_every_length_doubles_every_length(self, case):
-        _, single = simulate(case())
-        _, double = simulate(case(cases.Frame(scale=2.0)))
-        assert np.abs(double["measured"] - 2 * single["measured"]).max() < 1e-9
+    @pytest.mark.parametrize("method", METHODS, ids=lambda m: f"{m.resolution}-{m.objective}")
+    def test_doubling_every_length_doubles_every_length(self, case, method):
+        _, single = simulate(case(), method=method)
+        _, double = simulate(case(cases.Frame(scale=2.0)), method=method)
+        assert np.abs(double["measured"] - 2 * single["measured"]).max() < 1e-8
 
     def test_the_papers_eta_identity_depends_on_the_origin(self, case):
         method = tc.Method(regularization="identity")
@@ -196,11 +205,12 @@ class TestInvariance:
         assert np.abs(moved["measured"] - still["measured"]).max() > 1e-3
 
 
-def test_the_order_of_parts_and_pairs_changes_nothing():
-    _, forward = simulate(cases.stack())
-    _, backward = simulate(cases.stack(reverse=True))
-    assert np.abs(forward["measured"] - backward["measured"]).max() < 1e-9
-    assert np.abs(forward["gap_min"] - backward["gap_min"][..., ::-1]).max() < 1e-9
+@pytest.mark.parametrize("method", METHODS, ids=lambda m: f"{m.resolution}-{m.objective}")
+def test_the_order_of_parts_and_pairs_changes_nothing(method):
+    _, forward = simulate(cases.stack(), method=method)
+    _, backward = simulate(cases.stack(reverse=True), method=method)
+    assert np.abs(forward["measured"] - backward["measured"]).max() < 1e-8
+    assert np.abs(forward["gap_min"] - backward["gap_min"][..., ::-1]).max() < 1e-8
 
 
 def test_rows_that_contradict_each_other_are_reported_and_nothing_is_dropped():

@@ -19,6 +19,7 @@ from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 STEPS = 200
+HEAVY = 30.0  # largest damping
 FREE_STEPS = 8  # later ones count the curvature, and are damped where they grow
 SEARCHES = 40
 CLUSTERS = 6
@@ -205,7 +206,7 @@ class ContactResolver:
                 return
             scaled, damping, last = scaled[on], damping[on], last[on]
             if not free:
-                damping = np.where(scaled > last, np.maximum(2 * damping, 1), damping / 2)
+                damping = np.where(scaled > last, np.clip(2 * damping, 1, HEAVY), damping / 2)
                 self._keep_best(best, task, result, scans, moving)
             last = scaled
         in_conflict = (result.slack[moving] > self._tolerance).any(axis=1)

@@ -1,0 +1,117 @@
+"""The exact resolution against ipopt on the true problem, and on assemblies of many bodies and opposed faces."""
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from tests import cases, referee
+from tests.nonlinear import TrueProblem
+from tests.test_contact import R_t, simulate
+from tests.test_seating import table
+from tolcontact.simulation import CORRECTED, RAW, Status
+
+JUDGED = {
+    "ra1": (cases.ra1, "active points"),
+    "stack": (cases.stack, "all points"),
+    "jaws": (cases.jaws, "locator stiffness"),
+    "ring": (cases.ring, "all points"),
+    "table": (table, "seating"),
+}
+
+
+@pytest.mark.parametrize("name", JUDGED)
+def test_no_nonlinear_solver_does_better(name):
+    """200 realizations: objective within 1e-6 of ipopt's or lower, no gap, and a KKT residual found without our multipliers."""
+    make, objective = JUDGED[name]
+    program, run = simulate(make(), samples=200, solver="daqp", method=tc.Method(resolution="exact", objective=objective))
+    problem = TrueProblem(program.nominal, objective)
+    content = 0
+    for k in np.flatnonzero(run["status"] != Status.UNTOUCHED):
+        assert run["status"][k] == Status.RESOLVED
+        raw, poses, deviations = run["poses"][k, RAW], run["poses"][k, CORRECTED], run["deviations"][k]
+        weights = problem.weights(raw, deviations)
+        energy, gap, residual = problem.judge(raw, poses, deviations, weights)
+        assert gap > -1e-9
+        assert residual < 1e-6
+        least, solved = problem.solve(raw, deviations, weights)
+        content += solved
+        assert not solved or energy <= least + 1e-6 * abs(least)
+    assert content > 0.9 * (run["status"] != Status.UNTOUCHED).sum()
+
+
+def certified(program, run):
+    """The least gaps, recomputed by the paper's formula from the poses alone; rotations that are rotations."""
+    R, t = R_t(run["poses"][:, CORRECTED])
+    assert np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max() < 1e-12
+    least = [[referee.gaps(pair, R[k], t[k]).min() for pair in program.nominal.pairs] for k in range(len(R))]
+    assert np.abs(np.array(least) - run["gap_min"][:, CORRECTED]).max() < 1e-9
+    return np.min(least, axis=1)
+
+
+@pytest.mark.parametrize("objective", ["active points", "all points", "locator stiffness"])
+@pytest.mark.parametrize("make", [cases.tower, cases.ring, cases.jaws], ids=["tower", "ring", "jaws"])
+def test_many_bodies_are_resolved(make, objective):
+    program, run = simulate(make(), samples=500, solver="daqp", method=tc.Method(resolution="exact", objective=objective))
+    assert (run["gap_min"][:, RAW].min(axis=1) < -0.01).all()
+    assert (run["status"] == Status.RESOLVED).all()
+    assert certified(program, run).min() > -1e-9
+    assert (run["carrying"].sum(axis=1) > 0).all()
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "daqp"])
+def test_opposed_faces_without_clearance(solver):
+    """CASES C8: one linear step cannot open all gaps, repeated ones always do. The pose there is a slide along y."""
+    samples = 10_000 if solver == "daqp" else 1000
+    method = tc.Method(resolution="exact")
+    program, run = simulate(cases.model("channel"), samples=samples, solver=solver, method=method)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert run["gap_min"][:, CORRECTED].min() > -1e-6
+    R, t = R_t(run["poses"][:, CORRECTED, program.nominal.assembly.parts.index(program.nominal.parts[1].part)])
+    assert np.abs(t[:, 0]).max() < 1e-6
+    assert np.abs(R[:, 0, 1]).max() < 1e-6
+    _, linear = simulate(cases.model("channel"), samples=1000, solver=solver)
+    assert (linear["status"] == Status.NOT_CONVERGED).mean() > 0.4
+    assert linear["gap_min"][:, CORRECTED].min() < -0.1
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "daqp"])
+def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
+    program, run = simulate(cases.tab(), samples=100, solver=solver, method=tc.Method(resolution="exact"))
+    assert (run["status"] == Status.NOT_ASSEMBLABLE).all()
+    # The excess of 0.1 mm is shared by both sides, and the floor has no part in it.
+    sides, floor = run["gap_min"][:, CORRECTED, :2], run["gap_min"][:, CORRECTED, 2]
+    assert np.abs(sides + 0.05).max() < 1e-6
+    assert floor.min() > -1e-8
+    _, fits = simulate(cases.tab(slot=10.0), samples=100, solver=solver, method=tc.Method(resolution="exact"))
+    assert (fits["status"] == Status.RESOLVED).all()
+
+
+def test_share_of_square_pins_that_do_not_fit():
+    """CASES C6: 0.049133 of the draws cannot be assembled."""
+    samples = 20_000
+    method = tc.Method(resolution="exact", objective="seating")
+    _, run = simulate(cases.square_pins(), samples=samples, method=method)
+    assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
+    share = (run["status"] == Status.NOT_ASSEMBLABLE).mean()
+    assert abs(share - 0.049133) < 3.3 * np.sqrt(0.049133 * (1 - 0.049133) / samples)
+
+
+def test_searching_again_follows_curved_surfaces():
+    """A roller set down beside the top of another: its axis must end 20 mm from the other's, to the mesh's chord error."""
+    away = {}
+    for search in ("fixed", "iterated"):
+        _, run = simulate(cases.rollers(), samples=300, solver="daqp", method=tc.Method(resolution="exact", search=search))
+        assert np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
+        R, t = R_t(run["poses"][:, CORRECTED, 1])
+        axis = R @ [0, 20, 0] + t
+        away[search] = np.linalg.norm(axis[run["status"] == Status.RESOLVED, :2], axis=1) - 20
+    assert away["fixed"].max() > 0.3  # nominal contact points keep parts apart that turned away from them
+    assert np.abs(away["iterated"]).max() < 2e-3
+
+
+def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_not():
+    _, linear = simulate(cases.stack(), samples=1000, solver="daqp")
+    _, exact = simulate(cases.stack(), samples=1000, solver="daqp", method=tc.Method(resolution="exact"))
+    assert linear["gap_min"][:, CORRECTED].min() < -1e-3
+    assert exact["gap_min"][:, CORRECTED].min() > -1e-9
+    assert (linear["iterations"] <= 1).all()
