@@ -14,6 +14,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
+from tests.test_seating import table
 from tolcontact.errors import ArchiveError
 
 DATA = ("measured", "translation", "rotation", "gap_min", "active", "status", "kkt_residual")
@@ -65,7 +66,7 @@ def test_it_follows_the_cf_conventions(archive):
         groups = [file, *file.groups.values(), *file["field"].groups.values()]
         for variable in (v for group in groups for v in group.variables.values()):
             assert variable.long_name
-            is_label = variable.dtype is str or variable.name in ("faces", "status") or "part" in variable.name
+            is_label = "_Encoding" in variable.ncattrs() or variable.name in ("faces", "status") or "part" in variable.name
             assert (
                 is_label
                 or variable.name.endswith("of_point")
@@ -116,6 +117,37 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
     for name in DATA:
         assert (first[name].values == second[name].values).all(), name
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
+
+
+def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
+    path, method = tmp_path / "table.nc", tc.Method(resolution="exact", objective="seating", search="iterated")
+    first = tc.run(table(), samples=100, seed=2, solver="daqp", method=method, out=path).load()
+    second = tc.run(tc.model_of(first), samples=100, seed=2, solver="daqp", method=method)
+    for name in (*DATA, "carrying", "reaction", "iterations"):
+        assert (first[name].values == second[name].values).all(), name
+    root, contact, sample = (xr.load_dataset(path, group=group) for group in (None, "contact", "sample"))
+    assert [root.attrs[word] for word in ("resolution", "objective", "search")] == ["exact", "seating", "iterated"]
+    assert root.reaction.attrs["units"] == "N"
+    assert list(contact.reference_part) == [-1]
+    feet = root.rotation.isel(part=0).values @ contact.moving_point.values.T + root.translation.isel(part=0).values[..., None]
+    apart = ((feet.swapaxes(2, 3) - contact.reference_point.values) * contact.reference_normal.values).sum(axis=3)
+    gaps = apart - sample.deviation.values[:, None, contact.locator_of_point.values]
+    assert np.abs(gaps.min(axis=2) - root.gap_min.isel(pair=0).values).max() < 1e-9
+
+
+def test_it_may_be_read_while_its_results_are_open(tmp_path):
+    """The netCDF library crashed on that while labels were text of variable length."""
+    path = tmp_path / "open.nc"
+    code = f"""
+import sys, xarray as xr, tolcontact as tc
+from tests import cases
+held = tc.run(cases.stack(), samples=20, out={str(path)!r})
+for _ in range(3):
+    for group in (None, "contact", "sample"):
+        xr.load_dataset({str(path)!r}, group=group)
+assert list(held["part"].values) == ["bottom", "middle", "upper"]
+"""
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
 def test_a_run_in_memory_is_the_same_as_its_archive(archive):
@@ -169,6 +201,9 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
         tc.run(cases.stack(), samples=300, seed=4, solver="daqp", out=archive, resume=True)
     with pytest.raises(ArchiveError, match="another model"):
         tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
+    with pytest.raises(ArchiveError, match="resolution = linearized, now it is exact"):
+        method = tc.Method(resolution="exact")
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=method, out=archive, resume=True)
     with pytest.raises(ArchiveError, match="exists"):
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
     assert archive.read_bytes() == before

@@ -66,6 +66,29 @@ MODELS = {
         ['part "extra"', "notes.obj"],
     ),
     "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measure "height"', "2 times"]),
+    "distribution that gives NaN": (
+        {"top": GOOD["top"].replace("tolerance=10", "tolerance=__import__('scipy.stats').stats.norm(math.nan, 1)")},
+        ['part "top"', "finite"],
+    ),
+    "stiffness of zero": (
+        {"top": GOOD["top"] + "    a.locate(base, [tc.Locator('A', (0, 0, 0), 'z', stiffness=0.0)])\n"},
+        ["stiffness", "above 0"],
+    ),
+    "force on an unknown part": (
+        {
+            "measure": GOOD["measure"]
+            + "    a.force('push', at=tc.Assembly('B').part('lid', tc.Box(1, 1, 1)).point(0, 0, 0), vector=(1, 0, 0))\n"
+        },
+        ['force "push"', 'unknown part "lid"'],
+    ),
+    "force without size": (
+        {"measure": GOOD["measure"] + "    a.force('push', at=top.point(0, 0, 0), vector=(0, 0, 0))\n"},
+        ['force "push"'],
+    ),
+    "seven two-sided locators": (
+        {"top": COLLINEAR.replace("(0, 10, 5)]", "(0, 10, 5), (5, 20, 0)]").replace("zzzyyx", "zzzyyxz")},
+        ['part "top"', "7 locators", "no more than six"],
+    ),
     "no measure": ({"measure": ""}, ["measures nothing"]),
     "no assembly() at all": ({"whole": "x = 1\n"}, ["model.py", "no function assembly()"]),
     "assembly() returns something else": ({"whole": "def assembly():\n    return 3\n"}, ["returned a int"]),
@@ -123,6 +146,9 @@ def test_all_faults_of_a_model_are_reported_at_once(tmp_path):
 
 
 OPTIONS = {
+    "unknown resolution": (["--resolution", "precise"], ["resolution", "precise", "linearized, exact"]),
+    "unknown objective": (["--objective", "least effort"], ["objective", "least effort", "locator stiffness"]),
+    "seating without a force": (["--objective", "seating"], ["force"]),
     "unknown solver": (["--solver", "simplex"], ["simplex", "qpoases"]),
     "refused solver": (["--solver", "superscs"], ["refused", "wrong answers", "daqp"]),
     "too few samples": (["--samples", "0"], ["samples is 0"]),
@@ -193,6 +219,12 @@ def assembly():
     done = call(tmp_path, "run", model, "--samples", "50")
     assert done.returncode == 1
     assert "50 realizations" in done.stderr
+    assert "use --resolution exact" in " ".join(done.stdout.split())
+    done = call(tmp_path, "run", model, "--samples", "50", "--resolution", "exact")
+    assert done.returncode == 1
+    told = " ".join(done.stdout.split())
+    for words in ("50 not_assemblable", "pairs in conflict there: left side (50), right side (50)", "resolution: exact"):
+        assert words in told
 
 
 def test_a_model_script_runs_by_itself(tmp_path):
@@ -203,6 +235,13 @@ def test_a_model_script_runs_by_itself(tmp_path):
 
 
 def test_a_method_that_does_not_exist_is_refused():
-    for wrong in ({"regularization": "ridge"}, {"active_set": "some"}, {"eta": 0.0}, {"activity": -1.0}):
+    for wrong in (
+        {"regularization": "ridge"},
+        {"active_set": "some"},
+        {"eta": 0.0},
+        {"activity": -1.0},
+        {"search": "often"},
+        {"search": "iterated"},
+    ):
         with pytest.raises(tc.TolcontactError, match=next(iter(wrong))):
             tc.Method(**wrong)

@@ -76,7 +76,7 @@ def test_opposed_faces_without_clearance(solver):
 
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
-    program, run = simulate(cases.tab(), samples=100, solver=solver, method=tc.Method(resolution="exact"))
+    _, run = simulate(cases.tab(), samples=100, solver=solver, method=tc.Method(resolution="exact"))
     assert (run["status"] == Status.NOT_ASSEMBLABLE).all()
     # The excess of 0.1 mm is shared by both sides, and the floor has no part in it.
     sides, floor = run["gap_min"][:, CORRECTED, :2], run["gap_min"][:, CORRECTED, 2]

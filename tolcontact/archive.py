@@ -264,9 +264,10 @@ def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str
     for name, values in labels.items():
         file.createDimension(name, len(values))
     for coordinate in words.COORDINATES:
-        _define(file, coordinate)
         if coordinate.name in labels:
-            _fill(file, coordinate, labels[coordinate.name])
+            _write(file, coordinate, labels[coordinate.name])
+        else:
+            _define(file, coordinate)
     for variable in words.ROWS:
         _define(file, variable)
     file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
@@ -334,6 +335,7 @@ def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
 
 
 def _define(group: netCDF4.Dataset, variable: Variable) -> None:
+    """A variable of numbers, without values yet."""
     options: dict[str, Any] = {}
     if words.REALIZATION in variable.dims:
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
@@ -353,13 +355,20 @@ def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
     return _dimension(group.parent, name)
 
 
-def _fill(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+def _write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
     if variable.kind is str:
-        values = np.array(values, dtype=object)
+        _write_text(group, variable, values)
+        return
+    _define(group, variable)
     if np.size(values):
         group[variable.name][...] = values
 
 
-def _write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
-    _define(group, variable)
-    _fill(group, variable, values)
+def _write_text(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+    """Text as characters. The netCDF library crashes where text of variable length is read through two open handles."""
+    text = np.char.encode(np.array(values, dtype=str), "utf-8")
+    length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
+    created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))
+    if text.size:
+        created[...] = text.reshape(*text.shape, 1).view("S1") if text.dtype.itemsize else ""
+    created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})

@@ -43,6 +43,8 @@ class Tolerance:
             )
         elif self.range is not None:
             yield "a range is given beside a scipy.stats distribution, which has its own width; leave the range out"
+        elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
+            yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
 
     def __str__(self) -> str:
         if isinstance(self.distribution, str):

@@ -16,6 +16,8 @@ RAW, CORRECTED = "raw", "corrected"
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
 MAX_DECIMALS = 6
+MAX_DECIMALS_PERCENT = 2
+NAME_WIDTH = 12  # of names and labels; longer ones may be wrapped
 ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
 WIDTH = 80
 
@@ -45,7 +47,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
         rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for k, column in enumerate(columns):
-        table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0)
+        least = min(widths[0], NAME_WIDTH) if k == 0 else None
+        table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=least)
     for row in rows:
         table.add_row(*row)
     return table
@@ -88,7 +91,7 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield f"status: {by_status}"
     stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
     if stuck:
-        yield f"not assemblable: {percent(summary['not_assemblable'].values)}"
+        yield f"not assemblable: {percent(summary['not_assemblable'].values)}; their poses of least penetration count above"
         yield f"pairs in conflict there: {', '.join(stuck)}"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
@@ -108,18 +111,20 @@ def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
         yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, or not converged; use --resolution exact"
 
 
-def number(values: object, *, sign: bool = False) -> str:
-    """`estimate [lower, upper]`, with as many decimals as the interval's width deserves; "-" where there is none."""
+def number(values: object, *, sign: bool = False, most: int = MAX_DECIMALS) -> str:
+    """`estimate [lower, upper]`, with as many decimals (`most` at most) as its width deserves; "-" where there is none."""
     estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
     if not math.isfinite(estimate):
         return "-"
     finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
     width = max(finite, default=0.0)
     decimals = (
-        min(max(_digits(width) - math.floor(math.log10(width)), 0), MAX_DECIMALS) if width > 0 else (0 if estimate == 0 else 4)
+        min(max(_digits(width) - math.floor(math.log10(width)), 0), most)
+        if width > 0
+        else (0 if estimate == 0 else min(4, most))
     )
     plus = "+" if sign else ""
-    return f"{estimate:{plus}.{decimals}f} [{_bound(lower, decimals)}, {_bound(upper, decimals)}]"
+    return f"{_rounded(estimate, decimals):{plus}.{decimals}f} [{_bound(lower, decimals)}, {_bound(upper, decimals)}]"
 
 
 def _digits(width: float) -> int:
@@ -130,9 +135,14 @@ def _digits(width: float) -> int:
 def percent(values: object, *, sign: bool = False) -> str:
     """`number` of shares, in percent."""
     estimate, lower, upper = (100 * float(v) for v in values)  # type: ignore[attr-defined]
-    text = number((estimate, lower, upper), sign=sign)
+    text = number((estimate, lower, upper), sign=sign, most=MAX_DECIMALS_PERCENT)
     return text if text == "-" else text.replace(" [", " % [")
 
 
 def _bound(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if math.isfinite(value) else ("-inf" if value < 0 else "inf")
+    return f"{_rounded(value, decimals):.{decimals}f}" if math.isfinite(value) else ("-inf" if value < 0 else "inf")
+
+
+def _rounded(value: float, decimals: int) -> float:
+    """Rounded, and never -0."""
+    return round(value, decimals) + 0.0
