@@ -1,7 +1,7 @@
 """A U-channel pushed into a U-channel without clearance: two opposed pairs of flanges and a web.
 
 One linear step cannot open all gaps here: it lets a part that turns grow, and a part that grows does not fit. Resolve it with
---resolution exact. Lengths in mm. A tolerance is the full width of its zone.
+--resolution exact. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
 """
 
 import numpy as np
@@ -12,12 +12,12 @@ import tolcontact as tc
 WIDTH, DEPTH, HEIGHT, SHEET = 100.0, 50.0, 30.0, 3.0
 
 
-def channel(half_width: float, floor: float) -> trimesh.Trimesh:
-    """A U of sheet metal: outer faces at x = +-half_width and z = floor, open upwards, along y."""
-    w, t = half_width, SHEET
-    outer = [(-w, HEIGHT), (-w, floor), (w, floor), (w, HEIGHT)]
-    inner = [(w - t, HEIGHT), (w - t, floor + t), (-w + t, floor + t), (-w + t, HEIGHT)]
-    profile = np.array(outer + inner)
+def channel(half_width: float, floor: float, opening: float) -> trimesh.Trimesh:
+    """A U of sheet metal along y: outer faces at z = `floor` and, where z = 0, x = +-half_width; flanges open upwards."""
+    right = [(half_width + np.tan(np.radians(opening)) * z, z) for z in (floor, HEIGHT)]
+    inside = [(half_width - SHEET + np.tan(np.radians(opening)) * z, z) for z in (HEIGHT, floor + SHEET)]
+    half = right + inside
+    profile = np.array([(-x, z) for x, z in half[1::-1]] + half + [(-x, z) for x, z in half[:1:-1]])
     corners = np.array([(x, y, z) for y in (0.0, DEPTH) for x, z in profile])
     front = [(0, 1, 6), (0, 6, 7), (1, 2, 5), (1, 5, 6), (2, 3, 4), (2, 4, 5)]
     back = [(a + 8, c + 8, b + 8) for a, b, c in front]
@@ -25,10 +25,11 @@ def channel(half_width: float, floor: float) -> trimesh.Trimesh:
     return trimesh.Trimesh(corners, front + back + around, process=False)
 
 
-def assembly() -> tc.Assembly:
+def assembly(opening: float = 0.0) -> tc.Assembly:
+    """`opening`: by how much the flanges lean outwards. Those that lean let a part escape upwards; vertical ones do not."""
     model = tc.Assembly("channel")
-    outer = model.part("outer", tc.Mesh(channel(WIDTH / 2 + SHEET, -SHEET)), fixed=True)
-    inner = model.part("inner", tc.Mesh(channel(WIDTH / 2, 0)))
+    outer = model.part("outer", tc.Mesh(channel(WIDTH / 2 + SHEET, -SHEET, opening)), fixed=True)
+    inner = model.part("inner", tc.Mesh(channel(WIDTH / 2, 0, opening)))
     model.locate(
         inner,
         [
@@ -51,8 +52,9 @@ def assembly() -> tc.Assembly:
             reference=outer.face(lambda c, n, sign=sign: (n[:, 0] * sign < -0.9) & (c[:, 0] * sign > 49)),
             points=100,
         )
-    model.measure("edge height", inner.point(50, 50, 30), along="z", tolerance=1)
-    model.measure("edge offset", inner.point(50, 50, 30), along="x", tolerance=1)
+    edge = inner.point(WIDTH / 2 + np.tan(np.radians(opening)) * HEIGHT, DEPTH, HEIGHT)
+    model.measure("edge height", edge, along="z", tolerance=1)
+    model.measure("edge offset", edge, along="x", tolerance=1)
     return model
 
 

@@ -4,6 +4,7 @@ Sums run over points in a fixed order, one realization independent of the others
 how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -89,3 +90,8 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
         seeds.append(int(np.argmax(distance2)))
         np.minimum(distance2, ((points - points[seeds[-1]]) ** 2).sum(axis=1), out=distance2)
     return np.asarray(cKDTree(points[seeds]).query(points)[1])
+
+
+def gaps_of(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray]:
+    """Gaps (row, point) [mm] of each pair at X_RM (row, pair, 12)."""
+    return [scan.gaps(relative[:, k], deviations) for k, scan in enumerate(scans)]

@@ -1,0 +1,152 @@
+"""What one linear step leaves, and what repeated steps cost: the tables of this folder's README.
+
+Usage: python studies/exact/tables.py [--samples N]
+"""
+
+import argparse
+import importlib.util
+import time
+from pathlib import Path
+
+import numpy as np
+
+import tolcontact as tc
+from tolcontact.simulation import CORRECTED, RAW, Status, simulate_blocks
+from tolcontact.statistics import intervals
+
+MODELS = Path(__file__).resolve().parents[2] / "models"
+EXACT = tc.Method(resolution="exact")
+FAR = (1000.0, 0.0, 0.0)
+
+
+def model(name: str):
+    spec = importlib.util.spec_from_file_location(name, MODELS / f"{name}.py")
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = None, solver: str = "daqp"):
+    """Arrays of all realizations by name, and the time [s] from draws to measures."""
+    program = tc.build(assembly, solver=solver, method=method)
+    start = time.perf_counter()
+    blocks = list(simulate_blocks(program, samples=samples, seed=1))
+    taken = time.perf_counter() - start
+    names = ("measured", "gap_min", "status", "iterations")
+    return {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}, taken
+
+
+def shifted(assembly: tc.Assembly, by=FAR) -> tc.Assembly:
+    """The same assembly, standing elsewhere."""
+    for part in assembly.parts:
+        object.__setattr__(part, "at", tuple(np.add(part.at, by)))
+    return assembly
+
+
+def spread(x: np.ndarray) -> str:
+    estimate, lower, upper = intervals.standard_deviation(x, times=6)
+    return f"{estimate:.4f} [{lower:.4f}, {upper:.4f}]"
+
+
+def linearized_against_exact(samples: int) -> None:
+    print("| model, measure | 6 sigma, linearized | 6 sigma, exact | difference, median | largest | penetration left | steps |")
+    print("|---|---|---|---|---|---|---|")
+    for name, assembly in {
+        "RA1": model("ra1").assembly(),
+        "channel": model("channel").assembly(),
+        "channel, flanges open by 15 degrees": model("channel").assembly(15),
+    }.items():
+        linear, _ = simulate(assembly, samples)
+        exact, _ = simulate(assembly, samples, method=EXACT)
+        apart = np.abs(exact["measured"] - linear["measured"])[:, CORRECTED]
+        left = [max(0.0, -run["gap_min"][:, CORRECTED].min()) for run in (linear, exact)]
+        steps = exact["iterations"][exact["status"] != Status.UNTOUCHED]
+        for k, measure in enumerate(assembly.measures):
+            print(
+                f"| {name}, {measure.name} | {spread(linear['measured'][:, CORRECTED, k])} | "
+                f"{spread(exact['measured'][:, CORRECTED, k])} | {np.median(apart[:, k]):.4f} | {apart[:, k].max():.3f} | "
+                f"{left[0]:.2g}, {left[1]:.1g} | {np.median(steps):g}, {steps.max()} |"
+            )
+
+
+def opposed_faces(samples: int) -> None:
+    print("| channel | constrained points | solver | without slack infeasible | resolved | least gap (mm) | steps |")
+    print("|---|---|---|---|---|---|---|")
+    initial = tc.Method(active_set="initial")
+    for method, points in ((initial, "active at first"), (tc.Method(), "all"), (EXACT, "all")):
+        for solver in ("qpoases", "daqp"):
+            run, _ = simulate(model("channel").assembly(), samples, method=method, solver=solver)
+            infeasible = intervals.share(run["status"] == Status.NOT_CONVERGED)
+            resolved = (run["status"] == Status.RESOLVED).mean()
+            print(
+                f"| {method.resolution} | {points} | {solver} | {100 * infeasible[0]:.1f} % "
+                f"[{100 * infeasible[1]:.1f}, {100 * infeasible[2]:.1f}] | {100 * resolved:.2f} % | "
+                f"{run['gap_min'][:, CORRECTED].min():.2g} | {np.median(run['iterations']):g}, {run['iterations'].max()} |"
+            )
+
+
+def where_it_stands(samples: int) -> None:
+    print("| model, measure | regularization | resolution | largest difference (mm) | 6 sigma | 6 sigma, 1 m away |")
+    print("|---|---|---|---|---|---|")
+    cases = {"RA1": model("ra1").assembly, "channel, 15 degrees": lambda: model("channel").assembly(15)}
+    for name, make in cases.items():
+        for method in (
+            tc.Method(regularization="identity"), tc.Method(), tc.Method(regularization="identity", resolution="exact"), EXACT,
+        ):  # fmt: skip
+            still, _ = simulate(make(), samples, method=method)
+            moved, _ = simulate(shifted(make()), samples, method=method)
+            apart = np.abs(moved["measured"] - still["measured"])[:, CORRECTED]
+            for k, measure in enumerate(make().measures):
+                print(
+                    f"| {name}, {measure.name} | {method.regularization} | {method.resolution} | {apart[:, k].max():.2g} | "
+                    f"{spread(still['measured'][:, CORRECTED, k])} | {spread(moved['measured'][:, CORRECTED, k])} |"
+                )
+
+
+def tower(blocks: int) -> tc.Assembly:
+    """Free blocks, each resting on the one below, the lowest on a fixed one."""
+    a = tc.Assembly("tower")
+    below = a.part("block 0", tc.Box(40, 40, 10), fixed=True)
+    for k in range(1, blocks + 1):
+        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k), fixed=False)
+        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=1)
+        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
+        below = block
+    a.measure("top", below.point(20, 20, 10), along="z", tolerance=1)
+    return a
+
+
+def many_bodies(samples: int) -> None:
+    print("| free bodies | solver | linearized (us) | exact (us) | exact / linearized | steps | resolved, exact |")
+    print("|---|---|---|---|---|---|---|")
+    for blocks in (1, 2, 5, 10, 20):
+        for solver in ("daqp", "qpoases"):
+            cost, runs = {}, {}
+            for method in (tc.Method(), EXACT):
+                taken = []
+                for _ in range(3):
+                    runs[method.resolution], seconds = simulate(tower(blocks), samples, method=method, solver=solver)
+                    taken.append(1e6 * seconds / samples)
+                cost[method.resolution] = np.median(taken)
+            exact = runs["exact"]
+            moved = exact["status"] != Status.UNTOUCHED
+            assert (exact["gap_min"][moved, RAW].min(axis=1) < 0).all()
+            print(
+                f"| {blocks} | {solver} | {cost['linearized']:.0f} | {cost['exact']:.0f} | "
+                f"{cost['exact'] / cost['linearized']:.1f} | {np.median(exact['iterations'][moved]):g}, "
+                f"{exact['iterations'].max()} | {100 * (exact['status'][moved] == Status.RESOLVED).mean():.1f} % |"
+            )
+
+
+if __name__ == "__main__":
+    arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    arguments.add_argument("--samples", type=int, default=10_000)
+    samples = arguments.parse_args().samples
+    for title, table, count in (
+        ("Linearized against exact", linearized_against_exact, samples),
+        ("Opposed faces", opposed_faces, samples),
+        ("The same assembly 1 m away", where_it_stands, samples),
+        ("Cost against the number of bodies", many_bodies, samples // 50),
+    ):
+        print(f"\n## {title}, N = {count}\n")
+        table(count)

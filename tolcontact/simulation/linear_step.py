@@ -1,0 +1,141 @@
+"""One linear step: constraint generation around the compiled QP of a group.
+
+The QP has a few slots for rows. All gaps are scanned, the deepest point of each cluster gets a slot, the QP is solved, and
+realizations in which another point is still inside enter again with their carrying points kept. Each round raises the
+optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tolcontact.simulation.resolution import Resolution, Task
+from tolcontact.simulation.scan import PairScan, gaps_of
+from tolcontact.simulation.slots import Slots
+from tolcontact.symbolic import ENTRIES, ContactGroup, Program
+
+ROUNDS = 60
+PENETRATION = 1e-10  # mm: less than this is no penetration
+
+
+class LinearStep:
+    """The QP of one group, ready to be solved for many realizations."""
+
+    def __init__(self, program: Program, group: ContactGroup) -> None:
+        self._solve = group.solve
+        self._parts = len(group.group.parts)
+        self._accuracy = program.plugin.accuracy
+        self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
+
+    def take(
+        self,
+        task: Task,
+        result: Resolution,
+        scans: Sequence[PairScan],
+        moving: np.ndarray,
+        damping: np.ndarray,
+        newton: bool = False,
+    ) -> np.ndarray:
+        """One linear step of the rows `moving`: the QP in which every point has its row.
+
+        Returns its size (2, row) [mm]: that of the largest increment, and in the norm of the objective.
+        """
+        now = result.poses[moving]
+        gaps = gaps_of(scans, result.relative[moving], task.deviations[moving])
+        slots = before = [s.take(moving) for s in result.slots]
+        bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, slots, strict=True)], axis=1)
+        step = np.zeros((2, len(moving)))
+        open_ = np.arange(len(moving))
+        for number in range(ROUNDS):
+            more = np.full(len(open_), number == 0)
+            for k, scan in enumerate(scans):
+                candidates = np.where(task.may_carry[k][moving[open_]], gaps[k], np.inf)
+                slots[k], grown = slots[k].with_deepest(*scan.deepest(candidates), self.tolerance)
+                more |= grown
+            open_, gaps = open_[more], [gap[more] for gap in gaps]
+            slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
+            if not open_.size:
+                break
+            firm = [b.take(open_).reactions_of(s.points) for b, s in zip(before, slots, strict=True)]
+            curved = {
+                "newton": np.full(len(open_), float(newton)),
+                "bend": bend[open_],
+                "firm": np.concatenate(firm, axis=1),
+                "damping": damping[open_],
+            }
+            gaps, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
+        result.iterations[moving] += 1
+        return step
+
+    def _solve_round(
+        self,
+        task: Task,
+        result: Resolution,
+        scans: Sequence[PairScan],
+        rows: np.ndarray,
+        now: np.ndarray,
+        slots: list[Slots],
+        curved: dict[str, np.ndarray],
+    ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
+        """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
+        deviations = task.deviations[rows]
+        held = zip(*(scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)), strict=True)
+        P_m, P_r, n_r = (np.concatenate(arrays, axis=1) for arrays in held)
+        answer = self._answer(
+            poses=now,
+            raw=task.raw[rows],
+            moments=task.moments[rows],
+            deviations=deviations,
+            **curved,
+            P_m=P_m,
+            P_r=P_r,
+            n_r=n_r,
+            filled=np.concatenate([s.filled for s in slots], axis=1),
+        )
+        linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
+        gaps = gaps_of(scans, linearized, deviations)
+        inside = [np.where(task.may_carry[k][rows], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
+        slack = np.maximum(answer["slack"], 0)
+        # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
+        residual = np.maximum(_residual(answer), np.max(np.transpose(inside) - slack, axis=1))
+        solved = np.isfinite(residual)
+        result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), self._parts, ENTRIES)[solved]
+        result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
+        result.residual[rows] = np.where(solved, residual, np.inf)
+        result.slack[rows[solved]] = slack[solved]
+        slots = [s.carrying(m) for s, m in zip(slots, np.split(answer["multipliers"], len(slots), axis=1), strict=True)]
+        for kept, s in zip(result.slots, slots, strict=True):
+            kept.put(rows, s)
+        gaps = [np.where(solved[:, None], gap + slack[:, k, None], np.inf) for k, gap in enumerate(gaps)]
+        return gaps, slots, np.where(solved, answer["step"].T, 0.0)
+
+    def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
+        """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
+
+        qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there.
+        """
+        answer, _ = self._solve(**problems)
+        for k in np.flatnonzero(~(_residual(answer) <= self._accuracy)):
+            one = {name: values[k : k + 1] for name, values in problems.items()}
+            one["newton"] = np.zeros(1)
+            self._solve(**{**one, "filled": np.zeros_like(one["filled"])})
+            again, _ = self._solve(**one)
+            if _residual(again)[0] < _residual(answer)[k]:
+                for name, values in again.items():
+                    answer[name][k] = values[0]
+        return answer
+
+
+def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
+    """The reactions' sum of the gaps' gradients by the entries of X_RM, (row, 12)."""
+    P_m, _, n_r = scan.rows(slots.points, deviations)
+    weighted = slots.reactions[..., None] * n_r
+    turning = (weighted[..., :, None] * P_m[..., None, :]).sum(axis=1)
+    return np.concatenate([turning.reshape(len(turning), 9), weighted.sum(axis=1)], axis=1)
+
+
+def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:
+    """KKT residual (row,) [mm]; infinite where the solver gave nothing usable."""
+    residual = np.maximum(answer["stationarity"], answer["natural_residual"])[:, 0]
+    usable = np.isfinite(residual) & np.isfinite(answer["corrected"]).all(axis=1)
+    return np.where(usable, residual, np.inf)

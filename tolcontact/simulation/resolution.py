@@ -1,0 +1,64 @@
+"""What a group is asked to resolve, and what became of it: plain arrays, filled as the steps go on."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.simulation.slots import Slots
+
+CARRIES = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """What stays the same while the realizations `rows` are resolved; first dimension of the arrays: the row.
+
+    raw          (row, part of the group, 12)
+    deviations   (row, locator) [mm]
+    moments      (row, side, moment) of the points that count in the objective
+    may_carry    (row, point) for each pair of the group
+    """
+
+    raw: np.ndarray
+    deviations: np.ndarray
+    moments: np.ndarray
+    may_carry: list[np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Resolution:
+    """What became of the realizations `rows` of a block, as far as one group is concerned.
+
+    poses       (row, part of the group, 12), corrected
+    relative    (row, pair of the group, 12): X_RM, corrected
+    residual    (row,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution in the norm
+                of the objective
+    slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
+                for it, the true penetration at the best poses on the way, which are kept
+    iterations  (row,): linear steps taken
+    slots       which points carry, and their reactions; one for each pair of the group
+
+    and of all realizations of the block:
+
+    gap_min     (realization, state, pair of the group) [mm]: least true gap
+    active      (realization, pair of the group): number of active contact points in the raw state
+    """
+
+    rows: np.ndarray
+    poses: np.ndarray
+    relative: np.ndarray
+    residual: np.ndarray
+    slack: np.ndarray
+    iterations: np.ndarray
+    slots: list[Slots]
+    gap_min: np.ndarray
+    active: np.ndarray
+
+    def reactions(self) -> np.ndarray:
+        """Sum of the reactions of each pair, (row, pair)."""
+        return np.stack([slots.reactions.sum(axis=1) for slots in self.slots], axis=1)
+
+    def carrying(self) -> np.ndarray:
+        """Number of carrying points of each pair, (row, pair); smaller reactions only oppose the regularization."""
+        least = CARRIES * np.max([slots.reactions.max(axis=1) for slots in self.slots], axis=0)
+        return np.stack([(slots.reactions > least[:, None]).sum(axis=1) for slots in self.slots], axis=1)
