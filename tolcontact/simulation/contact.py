@@ -1,9 +1,9 @@
 """Resolve contact, step by step.
 
 The linearized resolution takes one linear step. The exact one goes on from the poses reached, with their true gaps, until
-they stay: a sequence of QPs. The first steps are those of the paper; later ones count the curvature of objective and gaps, and
-are damped while they grow. With an iterated search, contact points are then projected again, and all of this repeated
-until the poses stay.
+they stay: a sequence of QPs. The first steps are like the paper's. What has not come to rest by then has freedoms that next to
+nothing holds, while the curvature of gaps and objective counts: it goes on with Newton steps, and holds those freedoms
+firmly first. With an iterated search, contact points are then projected again, and all of this repeated until the poses stay.
 """
 
 from collections.abc import Sequence
@@ -17,9 +17,8 @@ from tolcontact.simulation.search import placed, search
 from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ContactGroup, Program
 
-STEPS = 200
-HEAVY = 30.0  # largest damping
-FREE_STEPS = 8  # later ones count the curvature, and are damped where they grow
+LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
+CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
 SEARCHES = 40
 CLUSTERS = 6
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
@@ -129,16 +128,14 @@ class ContactResolver:
 
     def _repeat(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> None:
         """Linear steps of the rows `moving` (`scans` are theirs) until they are at rest; in the linearized resolution one."""
-        damping = np.zeros(len(moving))
         if self._method.resolution == "linearized":
-            self._step.take(task, result, scans, moving, damping)
+            self._step.take(task, result, scans, moving)
             return
-        last = np.full(len(moving), np.inf)
         best = result.poses.copy(), result.relative.copy(), np.full(result.slack.shape, np.inf)
-        for number in range(STEPS):
-            free = number < FREE_STEPS
-            step, scaled = self._step.take(task, result, scans, moving, damping, newton=not free) * (1 + damping)
-            on = (step > self._at_rest) & (free | (scaled > NOISE))
+        for number, firmness in enumerate(LINEAR + CURVED):
+            curved = number >= len(LINEAR)
+            step, scaled = self._step.take(task, result, scans, moving, firmness=firmness, newton=curved)
+            on = (firmness > 1) | ((step > self._at_rest) & ((scaled > NOISE) | (not curved)))
             result.residual[moving[~on]] = np.maximum(result.residual[moving[~on]], scaled[~on])
             if self._method.objective == "seating":
                 lost = on & (self._drift(task, result, moving) > LOST)
@@ -147,15 +144,12 @@ class ContactResolver:
             moving, scans = moving[on], [scan.take(on) for scan in scans]
             if not moving.size:
                 return
-            scaled, damping, last = scaled[on], damping[on], last[on]
-            if not free:
-                damping = np.where(scaled > last, np.clip(2 * damping, 1, HEAVY), damping / 2)
+            if curved:
                 self._keep_best(best, task, result, scans, moving)
-            last = scaled
         in_conflict = (result.slack[moving] > self._step.tolerance).any(axis=1)
         stuck = moving[in_conflict]
         result.poses[stuck], result.relative[stuck], result.slack[stuck] = (kept[stuck] for kept in best)
-        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, scaled))
+        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, scaled[on]))
 
     def _keep_best(
         self, best: tuple[np.ndarray, ...], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray

@@ -33,17 +33,20 @@ class LinearStep:
         result: Resolution,
         scans: Sequence[PairScan],
         moving: np.ndarray,
-        damping: np.ndarray,
+        *,
+        firmness: float = 1.0,
         newton: bool = False,
     ) -> np.ndarray:
         """One linear step of the rows `moving`: the QP in which every point has its row.
 
-        Returns its size (2, row) [mm]: that of the largest increment, and in the norm of the objective.
+        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization. Returns the step's size
+        (2, row) [mm]: that of the largest increment, and in the norm of the objective.
         """
         now = result.poses[moving]
         gaps = gaps_of(scans, result.relative[moving], task.deviations[moving])
-        slots = before = [s.take(moving) for s in result.slots]
-        bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, slots, strict=True)], axis=1)
+        before = [s.take(moving) for s in result.slots]
+        bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, before, strict=True)], axis=1)
+        slots = list(before)
         step = np.zeros((2, len(moving)))
         open_ = np.arange(len(moving))
         for number in range(ROUNDS):
@@ -56,12 +59,12 @@ class LinearStep:
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            firm = [b.take(open_).reactions_of(s.points) for b, s in zip(before, slots, strict=True)]
+            reactions = [b.take(open_).reactions_of(s.points) for b, s in zip(before, slots, strict=True)]
             curved = {
+                "firmness": np.full(len(open_), firmness),
                 "newton": np.full(len(open_), float(newton)),
                 "bend": bend[open_],
-                "firm": np.concatenate(firm, axis=1),
-                "damping": damping[open_],
+                "reactions": np.concatenate(reactions, axis=1),
             }
             gaps, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
         result.iterations[moving] += 1

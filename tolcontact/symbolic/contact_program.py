@@ -28,7 +28,7 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "newton", "bend", "firm", "damping", "P_m", "P_r", "n_r", "filled")
+INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "bend", "reactions", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
@@ -39,10 +39,10 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (l)       of all locators of the model [mm]
+    firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     bend (12 q)          where it counts: the reactions' sum of the gaps' gradients by the entries of X_RM
-    firm (k)             where it counts: the reaction that a slot's point had before
-    damping              share of itself by which the Hessian is raised, for shorter steps
+    reactions (k)        where it counts: the reaction that a slot's point had before
     P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
     filled (k)           1 where a slot holds a point, 0 where it is empty
 
@@ -60,10 +60,10 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
         ca.SX.sym("raw", ENTRIES * len(group.parts)),
         ca.SX.sym("moments", MOMENTS, len(group.sides)),
         ca.SX.sym("deviations", len(nominal.locator_labels)),
+        ca.SX.sym("firmness"),
         ca.SX.sym("newton"),
         ca.SX.sym("bend", ENTRIES * len(group.pairs)),
-        ca.SX.sym("firm", rows),
-        ca.SX.sym("damping"),
+        ca.SX.sym("reactions", rows),
         *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", rows),
     ]
@@ -84,7 +84,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
 
 def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
     """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, newton, bend, firm, damping, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, firmness, newton, bend, reactions, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -105,14 +105,14 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
             constants.append(ca.substitute(g, X, before.vector()))
     slots = len(rows)
     held, elongation = _held(nominal, group, moved, deviations, z) if method.objective == "seating" else (0, ca.SX(0, 1))
-    goal = criterion(nominal, group, method, moments, raw, moved, z)
+    goal = criterion(nominal, group, method, moments, firmness, raw, moved, z)
     Q, pull = (ca.substitute(each, z, at_rest) for each in ca.hessian(goal.energy, z))
     A, g = ca.vertcat(*rows), ca.vertcat(*constants)
     if method.resolution == "exact":
         curved = [quadratic(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
-        curvature = _curvature(nominal, group, method, moments, raw, curved, z, bend / goal.scale) - Q
+        curvature = _curvature(nominal, group, method, moments, firmness, raw, curved, z, bend / goal.scale) - Q
         # Rows that carry are held in the objective, too: it does not change the answer, and makes it convex again.
-        hold = (1 + 2 * ca.sum1(firm) / goal.scale / group.length) * ca.if_else(firm > 0, filled, 0)
+        hold = (1 + 2 * ca.sum1(reactions) / goal.scale / group.length) * ca.if_else(reactions > 0, filled, 0)
         curvature += A.T @ ca.diag(hold) @ A
         counts = ca.logic_and(newton, _is_convex(Q + curvature))
         Q += ca.if_else(counts, curvature, 0)
@@ -128,7 +128,7 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     lower = ca.vertcat(ca.if_else(filled, -g, -FAR * group.length), rest)
     upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
     f = ca.vertcat(whiten.T @ pull, ca.DM(np.full(pairs, group.length)))
-    H = ca.diagcat((1 + damping) * H, ca.SX.eye(pairs))
+    H = ca.diagcat(H, ca.SX.eye(pairs))
     assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
 
     size = z.numel() + pairs
@@ -160,13 +160,14 @@ def _curvature(
     group: Group,
     method: Method,
     moments: ca.SX,
+    firmness: ca.SX,
     raw: Sequence[Pose],
     poses: Sequence[Pose],
     z: ca.SX,
     bend: ca.SX,
 ) -> ca.SX:
     """Hessian of the Lagrangian at z = 0: of the objective less the reactions' work on the gaps (linear in X_RM)."""
-    energy = criterion(nominal, group, method, moments, raw, poses, z).energy
+    energy = criterion(nominal, group, method, moments, firmness, raw, poses, z).energy
     work = ca.dot(bend, ca.vertcat(*(X_RM.vector() for X_RM in _pairs(nominal, group, poses))))
     H, _ = ca.hessian(energy - work, z)
     return ca.substitute(H, z, ca.SX.zeros(z.shape))

@@ -34,17 +34,27 @@ class Criterion:
 
 
 def criterion(
-    nominal: Nominal, group: Group, method: Method, moments: ca.SX, raw: Sequence[Pose], now: Sequence[Pose], z: ca.SX
+    nominal: Nominal,
+    group: Group,
+    method: Method,
+    moments: ca.SX,
+    firmness: ca.SX,
+    raw: Sequence[Pose],
+    now: Sequence[Pose],
+    z: ca.SX,
 ) -> Criterion:
-    """The objective at the poses `now`, affine in `z`, of the group's parts; `moments` are of the points that count."""
-    held = _regularization(group, method, raw, now, z)
+    """The objective at the poses `now`, affine in `z`, of the group's parts; `moments` are of the points that count.
+
+    `firmness` multiplies what holds the freedoms that the objective leaves open: it is 1 in the end.
+    """
+    held = firmness * _regularization(group, method, raw, now, z)
     count = sum(len(side.points) for side in group.sides)
     if method.objective == "locator stiffness":
         springs, total = _springs(nominal, group, raw, now, z)
         return Criterion(springs / total + held / count, ca.SX(total))
     if method.objective == "seating":
         work, total = _work(nominal, group, raw, now)
-        return Criterion(YIELD * proximity(group, raw, now, z) / group.length - work / total, ca.SX(total))
+        return Criterion(firmness * YIELD * proximity(group, raw, now, z) / group.length - work / total, ca.SX(total))
     energy = held
     for k, side in enumerate(group.sides):
         energy += displacement_energy(moments[:, k], side.centre, raw[side.part], now[side.part])
