@@ -48,9 +48,17 @@ def spread(x: np.ndarray) -> str:
     return f"{estimate:.4f} [{lower:.4f}, {upper:.4f}]"
 
 
+def ratio(after: dict, before: dict, measure: int) -> str:
+    """Of the standard deviations, from the same draws."""
+    values = intervals.variance_ratio(*(run["measured"][:, CORRECTED, measure] for run in (after, before)))
+    return "{:.4f} [{:.4f}, {:.4f}]".format(*np.sqrt(values))
+
+
 def linearized_against_exact(samples: int) -> None:
-    print("| model, measure | 6 sigma, linearized | 6 sigma, exact | difference, median | largest | penetration left | steps |")
-    print("|---|---|---|---|---|---|---|")
+    print(
+        "| model, measure | 6 sigma, linearized | 6 sigma, exact | exact / linearized | difference, median | largest | penetration left | steps |"
+    )
+    print("|---|---|---|---|---|---|---|---|")
     for name, assembly in {
         "RA1": model("ra1").assembly(),
         "channel": model("channel").assembly(),
@@ -64,7 +72,8 @@ def linearized_against_exact(samples: int) -> None:
         for k, measure in enumerate(assembly.measures):
             print(
                 f"| {name}, {measure.name} | {spread(linear['measured'][:, CORRECTED, k])} | "
-                f"{spread(exact['measured'][:, CORRECTED, k])} | {np.median(apart[:, k]):.4f} | {apart[:, k].max():.3f} | "
+                f"{spread(exact['measured'][:, CORRECTED, k])} | {ratio(exact, linear, k)} | "
+                f"{np.median(apart[:, k]):.4f} | {apart[:, k].max():.3f} | "
                 f"{left[0]:.2g}, {left[1]:.1g} | {np.median(steps):g}, {steps.max()} |"
             )
 
