@@ -56,7 +56,8 @@ def ratio(after: dict, before: dict, measure: int) -> str:
 
 def linearized_against_exact(samples: int) -> None:
     print(
-        "| model, measure | 6 sigma, linearized | 6 sigma, exact | exact / linearized | difference, median | largest | penetration left | steps |"
+        "| model, measure | 6 sigma, linearized | 6 sigma, exact | exact / linearized | difference, median | largest "
+        "| penetration left | steps |"
     )
     print("|---|---|---|---|---|---|---|---|")
     for name, assembly in {
