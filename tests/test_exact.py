@@ -115,3 +115,13 @@ def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_no
     assert linear["gap_min"][:, CORRECTED].min() < -1e-3
     assert exact["gap_min"][:, CORRECTED].min() > -1e-9
     assert (linear["iterations"] <= 1).all()
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "proxqp"])
+@pytest.mark.parametrize("make", [cases.ra1, cases.stack, cases.jaws], ids=["ra1", "stack", "jaws"])
+def test_solvers_come_to_the_same_exact_poses(make, solver):
+    method = tc.Method(resolution="exact")
+    _, reference = simulate(make(), samples=100, solver="daqp", method=method)
+    _, run = simulate(make(), samples=100, solver=solver, method=method)
+    assert (run["status"] == reference["status"]).all()
+    assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-7)
