@@ -109,6 +109,43 @@ def test_searching_again_follows_curved_surfaces():
     assert np.abs(away["iterated"]).max() < 2e-3
 
 
+def test_searching_again_forgets_points_that_slid_beyond_the_rim():
+    """A block tips over a ledge and slides 30 mm against a wall: in the end it rests on the ledge's present points."""
+    a = tc.Assembly("ledge")
+    ledge = a.part("ledge", tc.Box(50, 40, 10), at=(0, 0, -9), fixed=True)
+    wall = a.part("wall", tc.Box(10, 40, 30), at=(130, 0, -10), fixed=True)
+    block = a.part("block", tc.Box(100, 40, 10))
+    supports = {"A1": ((95, 5, 0), "z"), "A2": ((95, 35, 0), "z"), "A3": ((5, 20, 0), "z"), "C": ((0, 20, 5), "x")}
+    guides = [tc.Locator("B1", (5, 0, 5), "y", 0), tc.Locator("B2", (95, 0, 5), "y", 0)]
+    a.locate(block, [*(tc.Locator(name, *place, 0, one_sided=True) for name, place in supports.items()), *guides])
+    a.force("down", at=block.point(85, 20, 5), vector=(0, 0, -100))
+    a.force("push", at=block.point(0, 20, 5), vector=(1, 0, 0))
+    a.contact("ledge", moving=block.face("-z"), reference=ledge.face("+z"), spacing=2)
+    a.contact("wall", moving=block.face("+x"), reference=wall.face("-x"), points=9, within=50)
+    a.measure("slide", block.point(0, 0, 0), along="x", tolerance=1)
+    method = tc.Method(resolution="exact", objective="seating", search="iterated")
+    _, run = simulate(a, samples=2, solver="daqp", method=method)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert (run["measured"][:, CORRECTED] > 29).all()
+    assert (np.abs(run["gap_min"][:, CORRECTED])[run["carrying"] > 0] < 1e-6).all()
+
+
+def test_a_small_contact_may_be_far_from_where_it_comes_to_rest():
+    a = tc.Assembly("pin")
+    wall = a.part("wall", tc.Box(10, 40, 40), at=(58, 0, 0), fixed=True)
+    pin = a.part("pin", tc.Box(50, 0.2, 0.2), at=(0, 20, 20))
+    places = {"A1": ((5, 0.1, 0), "z"), "A2": ((45, 0.1, 0), "z"), "A3": ((25, 0.2, 0), "z")}
+    places |= {"B1": ((5, 0, 0.1), "y"), "B2": ((45, 0, 0.1), "y")}
+    stop = tc.Locator("stop", (50, 0.1, 0.1), "x", 0.01, one_sided=True)
+    a.locate(pin, [*(tc.Locator(name, *place, 0) for name, place in places.items()), stop])
+    a.contact("tip", moving=pin.face("+x"), reference=wall.face("-x"), points=9, within=10)
+    a.force("push", at=pin.point(0, 0.1, 0.1), vector=(5, 0, 0))
+    a.measure("slide", pin.point(0, 0, 0), along="x", tolerance=1)
+    _, run = simulate(a, samples=5, solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    assert (run["status"] == Status.RESOLVED).all()
+    assert np.abs(run["measured"][:, CORRECTED] - 8).max() < 1e-9
+
+
 def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_not():
     _, linear = simulate(cases.stack(), samples=1000, solver="daqp")
     _, exact = simulate(cases.stack(), samples=1000, solver="daqp", method=tc.Method(resolution="exact"))

@@ -24,8 +24,8 @@ CLUSTERS = 6
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
 NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
 SETTLED = 1e-6  # mm: poses that move less after a search have settled
-ADRIFT = 10  # lengths of the group: a part that came so far has found nothing to rest on
-LOST = 1e5  # lengths of the group: no step will bring it back
+ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
+LOST = 1e5  # sizes of the parts: no step will bring it back
 
 
 class ContactResolver:
@@ -35,6 +35,7 @@ class ContactResolver:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
+        self._size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._slots = group.slots
         self._step = LinearStep(program, group)
         self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
@@ -117,6 +118,8 @@ class ContactResolver:
         searching = np.arange(len(task.raw))
         for _ in range(SEARCHES):
             before = result.poses[searching]
+            for slots in result.slots:  # what carried before may now be beyond the rim
+                slots.put(searching, Slots.empty(len(searching), self._slots))
             self._repeat(task, result, self._found(result.relative[searching]), searching)
             moved = self._displacements(before, result.poses[searching])
             searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]
@@ -162,8 +165,8 @@ class ContactResolver:
             kept[rows[better]] = new[better]
 
     def _drift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
-        """How far `rows` have come from their raw pose, in lengths of the group. A force may find nothing to rest on."""
-        return self._displacements(task.raw[rows], result.poses[rows]) / self._group.length
+        """How far `rows` have come from their raw pose, in sizes of the parts. A force may find nothing to rest on."""
+        return self._displacements(task.raw[rows], result.poses[rows]) / self._size
 
     def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""
