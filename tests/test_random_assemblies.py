@@ -47,7 +47,6 @@ def assemblies(draw) -> tc.Assembly:
         ]
         on = draw(st.sampled_from([None, None, *boxes])) if boxes else None
         a.locate(part, [*feet, *sides], on=on)
-        a.force(f"push{k}", at=part.point(sx / 2, sy / 2, sz / 2), vector=(-1.0, 0.0, -2.0))
         boxes.append(part)
     for k, (left, right) in enumerate(itertools.pairwise(boxes)):
         sides = [left.face("+x"), right.face("-x")]
@@ -55,6 +54,10 @@ def assemblies(draw) -> tc.Assembly:
             sides.reverse()
         if any(part.fixed is None for part in (left, right)):
             a.contact(f"joint{k}", moving=sides[0], reference=sides[1], points=draw(st.sampled_from([1, 5, 30])), within=5.0)
+    for pair in a.pairs:
+        pushed = pair.moving.part
+        if pushed.fixed is None:
+            a.force(f"push{pair.name}", at=pushed.point(1, 1, 1), vector=(-1.0, 0.0, -2.0))
     a.measure("end", boxes[-1].point(0, 0, 0), along="x", tolerance=1)
     return a
 

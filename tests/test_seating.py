@@ -14,12 +14,14 @@ LEGS = np.array([(5, 5), (95, 5), (95, 55), (5, 55)], dtype=float)
 WEIGHT = np.array([52.0, 31.0])
 
 
-def table(frame=cases.STILL, *, weight=100.0, legs=LEGS) -> tc.Assembly:
+def table(frame=cases.STILL, *, weight=100.0, legs=LEGS, tolerance=2.0) -> tc.Assembly:
     """A plate on one-sided supports of uneven height, guided sideways, under its weight."""
     s = frame.scale
     a = tc.Assembly("table")
     plate = a.part("plate", frame.box(100, 60, 5), **frame.place(0, 0, 40))
-    supports = [tc.Locator(f"leg{k}", (s * x, s * y, -40 * s), "z", 2 * s, one_sided=True) for k, (x, y) in enumerate(legs)]
+    supports = [
+        tc.Locator(f"leg{k}", (s * x, s * y, -40 * s), "z", tolerance * s, one_sided=True) for k, (x, y) in enumerate(legs)
+    ]
     guides = [
         tc.Locator("B1", (20 * s, 0, 2 * s), "y", 0),
         tc.Locator("B2", (80 * s, 0, 2 * s), "y", 0),
@@ -105,6 +107,23 @@ def test_a_force_that_finds_nothing_to_rest_on_is_reported():
         _, run = simulate(table(weight=-100.0), samples=20, method=method)
         assert (run["status"] == Status.NOT_CONVERGED).all()
         assert np.isfinite(run["poses"]).all()
+
+
+def test_a_force_that_moves_nothing_is_refused():
+    a = table()
+    block = a.part("block", tc.Box(10, 10, 10), at=(200, 0, 0), fixed=True)
+    a.force("idle", at=block.point(5, 5, 10), vector=(0, 0, -1))
+    with pytest.raises(tc.TolcontactError, match='force "idle" acts on part "block"'):
+        tc.build(a, method=SEATED)
+
+
+@pytest.mark.parametrize("solver", ["daqp", "qpoases", "osqp"])
+def test_reactions_balance_the_weight_however_many_supports_share_it(solver):
+    legs = np.array([(5 + 18 * k, y) for k in range(6) for y in (5, 55)], dtype=float)
+    a = table(legs=legs, tolerance=0.0)
+    _, run = simulate(a, samples=3, solver=solver, method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert np.abs(run["reaction"].sum(axis=1) - 100).max() < 0.05
 
 
 def test_seating_does_not_depend_on_where_the_assembly_stands():

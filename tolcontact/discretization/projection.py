@@ -18,12 +18,14 @@ class Surface:
         self._smooth = np.asarray(mesh.vertex_normals, dtype=np.float64)
         self._is_rim = _rims(mesh)
 
-    def project(self, points: np.ndarray, *, smooth: bool = False) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def project(
+        self, points: np.ndarray, *, smooth: bool = False, margin: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Project `points` (point, 3) [mm] onto the surface.
 
         Returns the nearest points (point, 3) [mm], the outward unit normals there (point, 3), and a mask (point,) of the
-        points that lie over the surface, that is do not overhang its rim. Normals are those of the facets; `smooth`
-        interpolates between those at the vertices, so that they change steadily as a point moves.
+        points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. Normals are those of
+        the facets; `smooth` interpolates between those at the vertices, so that they change steadily as a point moves.
         """
         _, triangle, nearest = self._tree.squared_distance(
             self._vertices, self._faces, np.ascontiguousarray(points, dtype=np.float64)
@@ -34,7 +36,7 @@ class Surface:
         barycentric = trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], nearest)
         # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero.
         on_edge = np.abs(barycentric[:, [2, 0, 1]]) < 1e-9
-        overhangs = (sideways > 1e-6 * self.mesh.scale) & (on_edge & self._is_rim[triangle]).any(axis=1)
+        overhangs = (sideways > max(margin, 1e-6 * self.mesh.scale)) & (on_edge & self._is_rim[triangle]).any(axis=1)
         if not smooth:
             return nearest, facet, ~overhangs
         normals = (barycentric[..., None] * self._smooth[self._faces[triangle]]).sum(axis=1)

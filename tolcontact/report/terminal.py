@@ -85,14 +85,14 @@ def _field_table(summary: xr.Dataset) -> Table:
 
 def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
-    by_status = ", ".join(
-        f"{int(n)} {m}" for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)
-    )
-    yield f"status: {by_status}"
+    by_status = _by_status(summary)
+    yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items())
     stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
     if stuck:
         yield f"not assemblable: {percent(summary['not_assemblable'].values)}; their poses of least penetration count above"
         yield f"pairs in conflict there: {', '.join(stuck)}"
+    if unsure := by_status["not_converged"]:
+        yield f"not converged: {unsure} of {count}; the poses where their steps ended count above"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
@@ -104,11 +104,14 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     """What to do about penetration that a linear step, or the paper's set of active points, has left."""
     limit = ADVISED * summary.attrs["smallest_range"]
-    by_status = dict(zip(summary["status_meaning"].values, summary["by_status"].values, strict=True))
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield f"advice: points that were not active at first penetrate by up to {penetration:.3g} mm; use the closed active set"
-    elif summary.attrs["resolution"] == "linearized" and (penetration > limit or by_status["not_converged"]):
+    elif summary.attrs["resolution"] == "linearized" and (penetration > limit or _by_status(summary)["not_converged"]):
         yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, or not converged; use --resolution exact"
+
+
+def _by_status(summary: xr.Dataset) -> dict[str, int]:
+    return {str(m): int(n) for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)}
 
 
 def number(values: object, *, sign: bool = False, most: int = MAX_DECIMALS) -> str:

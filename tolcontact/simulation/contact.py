@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact.simulation.linear_step import LinearStep
 from tolcontact.simulation.resolution import Resolution, Task
 from tolcontact.simulation.scan import PairScan, gaps_of, pair_scan
-from tolcontact.simulation.search import placed, search
+from tolcontact.simulation.search import placed, reach, search
 from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ContactGroup, Program
 
@@ -50,6 +50,7 @@ class ContactResolver:
             )
             for position, pair in enumerate(group.group.pairs)
         ]
+        self._reaches = [reach(scan) for scan in self._scans]
 
     def resolve(self, poses: np.ndarray, relative: np.ndarray, deviations: np.ndarray) -> Resolution:
         """Correct the realizations of a block that this group does not leave as they are.
@@ -71,6 +72,7 @@ class ContactResolver:
             residual=np.full(len(rows), np.inf),
             slack=np.full((len(rows), len(scans)), np.inf),
             iterations=np.zeros(len(rows), dtype=int),
+            multipliers=np.zeros((len(rows), len(scans), self._slots)),
             slots=[Slots.empty(len(rows), self._slots) for _ in scans],
             gap_min=np.stack([least, least], axis=1),
             active=np.stack([on.sum(axis=1) for on in active], axis=1),
@@ -81,7 +83,11 @@ class ContactResolver:
         if self._method.search == "iterated":
             scans = self._settle(task, result)
         if self._method.objective == "seating":
-            result.residual[self._drift(task, result, np.arange(len(rows))) > ADRIFT] = np.inf
+            # Nothing holds them: they are left where they were.
+            adrift = self._drift(task, result, np.arange(len(rows))) > ADRIFT
+            result.residual[adrift], result.slack[adrift], result.multipliers[adrift] = np.inf, 0, 0
+            result.poses[adrift], result.relative[adrift] = task.raw[adrift], relative[rows][adrift]
+            scans = self._found(result.relative) if self._method.search == "iterated" else scans
         least = np.stack([g.min(axis=1) for g in gaps_of(scans, result.relative, task.deviations)], axis=1)
         result.gap_min[rows, 1] = least
         if self._method.resolution == "exact" and self._method.active_set == "closed":
@@ -93,7 +99,8 @@ class ContactResolver:
         """The scans for X_RM (realization, pair, 12), their contact points projected again if the method says so."""
         if self._method.search == "fixed":
             return self._scans
-        return [search(*both, relative[:, k]) for k, both in enumerate(zip(self._scans, self._surfaces, strict=True))]
+        each = zip(self._scans, self._surfaces, self._reaches, strict=True)
+        return [search(scan, surface, relative[:, k], margin) for k, (scan, surface, margin) in enumerate(each)]
 
     def _task(self, raw: np.ndarray, deviations: np.ndarray, active: list[np.ndarray]) -> Task:
         counts = [self._counts(scan, on) for scan, on in zip(self._scans, active, strict=True)]

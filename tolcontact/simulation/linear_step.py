@@ -106,7 +106,9 @@ class LinearStep:
         result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
         result.residual[rows] = np.where(solved, residual, np.inf)
         result.slack[rows[solved]] = slack[solved]
-        slots = [s.carrying(m) for s, m in zip(slots, np.split(answer["multipliers"], len(slots), axis=1), strict=True)]
+        multipliers = np.maximum(answer["multipliers"], 0)
+        result.multipliers[rows[solved]] = multipliers.reshape(len(rows), len(slots), -1)[solved]
+        slots = [s.carrying(m) for s, m in zip(slots, np.split(multipliers, len(slots), axis=1), strict=True)]
         for kept, s in zip(result.slots, slots, strict=True):
             kept.put(rows, s)
         gaps = [np.where(solved[:, None], gap + slack[:, k, None], np.inf) for k, gap in enumerate(gaps)]

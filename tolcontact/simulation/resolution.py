@@ -36,7 +36,8 @@ class Resolution:
     slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
                 for it, the true penetration at the best poses on the way, which are kept
     iterations  (row,): linear steps taken
-    slots       which points carry, and their reactions; one for each pair of the group
+    multipliers (row, pair of the group, slot): reactions of the rows of the last QP
+    slots       the points that carry most, for the next QP to start with; one for each pair of the group
 
     and of all realizations of the block:
 
@@ -50,15 +51,16 @@ class Resolution:
     residual: np.ndarray
     slack: np.ndarray
     iterations: np.ndarray
+    multipliers: np.ndarray
     slots: list[Slots]
     gap_min: np.ndarray
     active: np.ndarray
 
     def reactions(self) -> np.ndarray:
         """Sum of the reactions of each pair, (row, pair)."""
-        return np.stack([slots.reactions.sum(axis=1) for slots in self.slots], axis=1)
+        return np.asarray(self.multipliers.sum(axis=2))
 
     def carrying(self) -> np.ndarray:
         """Number of carrying points of each pair, (row, pair); smaller reactions only oppose the regularization."""
-        least = CARRIES * np.max([slots.reactions.max(axis=1) for slots in self.slots], axis=0)
-        return np.stack([(slots.reactions > least[:, None]).sum(axis=1) for slots in self.slots], axis=1)
+        least = CARRIES * self.multipliers.max(axis=(1, 2), initial=0)
+        return np.asarray((self.multipliers > least[:, None, None]).sum(axis=2))

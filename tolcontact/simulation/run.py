@@ -26,13 +26,14 @@ def simulate_block(
     """Raw and corrected states for given deviations (realization, locator) [mm]."""
     if resolvers is None:
         resolvers = [ContactResolver(program, group) for group in program.groups]
-    nominal, count = program.nominal, len(deviations)
+    nominal, count, accuracy = program.nominal, len(deviations), program.plugin.accuracy
     placed, _ = program.place(deviations=deviations)
     raw = placed["poses"].reshape(count, len(nominal.parts), ENTRIES)
     measured_raw, relative_raw = _observe(program, raw)
 
     poses = raw.copy()
-    touched, residual, slack = np.zeros(count, dtype=bool), np.zeros(count), np.zeros(count)
+    touched, stuck, solved = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
+    residual = np.zeros(count)
     iterations, carrying = np.zeros(count, dtype=int), np.zeros((count, len(nominal.pairs)), dtype=int)
     reaction, active = np.zeros((count, len(nominal.pairs))), np.zeros((count, len(nominal.pairs)), dtype=int)
     gap_min = np.empty((count, 2, len(nominal.pairs)))
@@ -42,19 +43,18 @@ def simulate_block(
         gap_min[:, :, resolver.pairs], active[:, resolver.pairs] = found.gap_min, found.active
         touched[found.rows] = True
         residual[found.rows] = np.maximum(residual[found.rows], found.residual)
-        slack[found.rows] = np.maximum(slack[found.rows], found.slack.max(axis=1))
+        slack = found.slack.max(axis=1)
+        stuck[found.rows] |= slack > accuracy
+        # A conflict is believed where it exceeds what the solver left undone.
+        solved[found.rows] &= np.isfinite(found.residual) & (found.residual <= np.maximum(accuracy, slack))
         iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
         carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying()
         reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions()
     measured = measured_raw.copy()
     measured[touched], _ = _observe(program, poses[touched])
 
-    accuracy = program.plugin.accuracy
-    stuck = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
-    status = np.where(slack <= accuracy, Status.RESOLVED, stuck)
-    # A conflict is believed where it exceeds what the solver left undone.
-    believed = np.isfinite(residual) & (residual <= np.maximum(accuracy, slack))
-    status = np.where(believed, status, Status.NOT_CONVERGED)
+    conflict = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
+    status = np.where(solved, np.where(stuck, conflict, Status.RESOLVED), Status.NOT_CONVERGED)
     status = np.where(touched, status, Status.UNTOUCHED)
     return Block(
         start=start,

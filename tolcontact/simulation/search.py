@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from tolcontact.discretization.projection import Surface
 from tolcontact.simulation.scan import PairScan
@@ -34,12 +35,23 @@ class FoundScan(PairScan):
         return self.P_m[points], *(np.take_along_axis(values, chosen, axis=1) for values in (self.feet, self.normals))
 
 
-def search(scan: PairScan, surface: Surface | None, relative: np.ndarray) -> PairScan:
-    """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are."""
+def reach(scan: PairScan) -> float:
+    """How far a contact point stands for its surroundings [mm]: half the usual distance of two of them."""
+    if len(scan.P_m) < 2:
+        return 0.0
+    distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)
+    return float(np.median(distance[:, 1])) / 2
+
+
+def search(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin: float) -> PairScan:
+    """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
+
+    Points that overhang the rim by up to `margin` [mm] still count: else those at the rim would come and go with every step.
+    """
     if surface is None:
         return scan
     shape = (len(relative), len(scan.P_m), 3)
-    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), smooth=True)
+    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), smooth=True, margin=margin)
     return FoundScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),

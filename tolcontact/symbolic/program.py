@@ -54,15 +54,11 @@ class Program:
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """Build all Functions of a model.
 
-    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails.
+    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or where the objective
+    is seating for forces that are missing or move nothing.
     """
     with quiet():
         chosen = plugin(solver)
-        if method.objective == "seating" and not nominal.assembly.forces:
-            raise ModelError(
-                nominal.assembly.name,
-                ['nothing presses its parts, but the objective is "seating"; declare a force with assembly.force(...)'],
-            )
         d = ca.SX.sym("deviations", len(nominal.locator_labels))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
@@ -76,6 +72,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
         )
         groups = contact_groups(nominal)
+        if method.objective == "seating":
+            _check_forces(nominal, groups)
         return Program(
             nominal=nominal,
             method=method,
@@ -91,6 +89,20 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 if not measure.points
             },
         )
+
+
+def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
+    moved = {part for group in groups for part, carried in zip(group.parts, group.carried, strict=True) if carried.movers}
+    faults = [
+        f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
+        "leave the force out, or declare the part free and its contacts"
+        for force in nominal.assembly.forces
+        if nominal.part_index(force.at.part) not in moved
+    ]
+    if not nominal.assembly.forces:
+        faults = ['nothing presses its parts, but the objective is "seating"; declare a force with assembly.force(...)']
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
 
 
 def _at_rest(parts: int) -> np.ndarray:
