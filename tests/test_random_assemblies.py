@@ -74,8 +74,8 @@ def test_certificates_hold(assembly, solver, resolution, objective):
     try:
         program, run = simulate(assembly, samples=20, solver=solver, method=method)
     except tc.TolcontactError as error:
-        # Some random models cannot be: no free side, or faces that do not meet. That is said, and nothing is run.
-        assert "contact" in str(error)
+        # Some random models cannot be: no free side, faces that do not meet, nothing to press. That is said, nothing is run.
+        assert "contact" in str(error) or (objective == "seating" and "presses" in str(error))
         event("refused")
         return
     event(f"{resolution}, {objective}: {sorted({Status(s).name for s in run['status']})}")

@@ -24,7 +24,6 @@ from tolcontact import vocabulary as words
 from tolcontact.assembly import Assembly, Mesh
 from tolcontact.assembly.document import from_document, to_document
 from tolcontact.discretization import Nominal
-from tolcontact.discretization.solids import select
 from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments
@@ -216,12 +215,7 @@ def _now() -> str:
 
 
 def _declaration(program: Program) -> str:
-    nominal = program.nominal
-
-    def triangles(face: Any) -> list[int]:
-        return [int(k) for k in select(nominal.parts[nominal.part_index(face.part)].mesh, face)]
-
-    return json.dumps(to_document(nominal.assembly, triangles, program.tapes))
+    return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
 
 
 def _check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any]) -> None:

@@ -5,9 +5,10 @@ Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad
 
 import inspect
 import sys
+import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 import xarray as xr
@@ -107,13 +108,19 @@ def main(assembly: Callable[[], Assembly]) -> None:
 def command_line(arguments: list[str] | None = None) -> None:
     """The console script: `app`, with errors as one message and exit code 2."""
     try:
-        app(arguments)
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            app(arguments)
     except TolcontactError as error:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
     except OSError as error:
         typer.echo(f"error: the system refused: {error}; an archive that was begun goes on with --resume", err=True)
         sys.exit(2)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    typer.echo(f"warning: {message}", err=True)
 
 
 def _print_summary(results: xr.DataTree) -> None:

@@ -30,3 +30,7 @@ class OptionError(TolcontactError):
 
 class ArchiveError(TolcontactError):
     """An archive cannot be written, or a file is not an archive of tolcontact."""
+
+
+class UnitsWarning(UserWarning):
+    """A part has a strange size, and nobody said in which units its file counts."""

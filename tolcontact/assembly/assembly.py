@@ -166,10 +166,14 @@ class Assembly:
             yield from _named("part", part, self._location_faults(part))
         for location in self._locations:
             yield from _named("part", location.part, location.faults(), location.declared_at)
-            yield from self._strangers(f'locators of "{location.part.name}"', location.declared_at, location.part, location.on)
+            yield from self._strangers(
+                f'locators of "{location.part.name}"', location.declared_at, location.part, location.on, *location.mentioned
+            )
         for pair in self._pairs:
             yield from _named("contact pair", pair, pair.faults())
-            yield from self._strangers(f'contact pair "{pair.name}"', pair.declared_at, pair.moving.part, pair.reference.part)
+            yield from self._strangers(
+                f'contact pair "{pair.name}"', pair.declared_at, *pair.moving.parts, *pair.reference.parts
+            )
         for force in self._forces:
             yield from _named("force", force, force.faults())
             yield from self._strangers(f'force "{force.name}"', force.declared_at, force.at.part)

@@ -12,6 +12,7 @@ from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
 from tolcontact.assembly.measure import Measure
 from tolcontact.assembly.part import Face, Part, Point
+from tolcontact.assembly.selection import Facing, Inside, Triangles
 from tolcontact.assembly.tolerance import Tolerance
 
 Document = dict[str, Any]
@@ -22,13 +23,17 @@ def to_document(
 ) -> Document:
     """The document of an assembly.
 
-    `triangles` gives the indices of a face that a function picks, `tapes` the steps of the users' own expressions.
+    `triangles` gives the indices of a face that is more than a direction, `tapes` the steps of the users' own expressions.
     Shapes of meshes are not in it; `from_document` wants them beside it.
     """
 
     def face(face: Face) -> Document:
-        chosen = {"direction": face.selection} if isinstance(face.selection, str) else {"triangles": triangles(face)}
-        return {"part": face.part.name, **chosen}
+        boxes = [[s.lower, s.upper] for s in face.selections if isinstance(s, Inside)]
+        rest = [s for s in face.selections if not isinstance(s, Inside)]
+        only = rest[0] if len(rest) == 1 else None
+        plain = isinstance(only, Facing) and only == Facing(str(only.direction))
+        chosen = {"direction": str(only)} if plain else {"triangles": triangles(face)}
+        return {"part": face.part.name, **chosen, "inside": boxes}
 
     def measure(measure: Measure) -> Document:
         points = {"of": _point(measure.of)} if isinstance(measure.of, Point) else {"tape": tapes[measure.name]}
@@ -79,7 +84,8 @@ def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
     parts: dict[str, Part] = {}
 
     def face(said: Document) -> Face:
-        return Face(parts[said["part"]], said["direction"] if "direction" in said else tuple(said["triangles"]))
+        chosen = Facing(said["direction"]) if "direction" in said else Triangles(tuple(said["triangles"]))
+        return Face(parts[said["part"]], (chosen, *(Inside(*corners) for corners in said["inside"])))
 
     def point(said: Document) -> Point:
         return Point(parts[said["part"]], tuple(said["position"]))

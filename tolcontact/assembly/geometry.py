@@ -25,17 +25,28 @@ class Box:
         return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
 
 
+UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """A triangle mesh, coordinates in mm: a file that trimesh reads, or a `trimesh.Trimesh`."""
+    """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
+
+    `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
+    file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
+    2 um, and keep their boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`.
+    """
 
     source: Any
+    units: str | None = None
 
     def faults(self) -> Iterator[str]:
+        if self.units is not None and self.units not in UNITS:
+            yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
         if isinstance(self.source, str | Path):
             path = Path(self.source)
             if not path.is_file():
-                yield f'mesh file "{path}" does not exist; give the path of a file that trimesh reads (STL, OBJ, PLY, GLB)'
+                yield f'mesh file "{path}" does not exist; give the path of an STL, OBJ, PLY, GLB or STEP file'
         elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"
 

@@ -105,6 +105,12 @@ class Location:
     on: Part | None
     declared_at: str
 
+    @property
+    def mentioned(self) -> tuple[Part, ...]:
+        """The parts that the faces of its scheme speak of."""
+        faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
+        return tuple(part for face in faces for part in face.parts)
+
     def faults(self) -> Iterator[str]:
         if isinstance(self.scheme, ThreeTwoOne):
             yield from self.scheme.faults()

@@ -1,16 +1,15 @@
 """Parts, and the points and faces that other declarations pick from them."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tolcontact.assembly.geometry import Box, Mesh
-from tolcontact.assembly.words import DIRECTIONS, Vector, direction, is_finite, script_line, vector
+from tolcontact.assembly.selection import Near, Selection, criterion
+from tolcontact.assembly.words import Vector, is_finite, script_line, vector
 
 if TYPE_CHECKING:
-    import numpy as np
-
-    FaceFilter = Callable[[np.ndarray, np.ndarray], np.ndarray]
+    from tolcontact.assembly.selection import Picker
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +32,14 @@ class Part:
         """The point (x, y, z) [mm] of this part, in its own frame."""
         return Point(self, vector((x, y, z)))
 
-    def face(self, selection: "str | Sequence[int] | FaceFilter") -> "Face":
-        """A surface of this part.
+    def face(self, *selections: "str | Sequence[int] | Picker | Selection") -> "Face":
+        """The surface of this part that meets all of the given criteria; without any, the whole surface.
 
-        `selection` is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
-        frame), the indices of triangles, or a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -].
+        A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
+        frame), `tc.Facing`, `tc.Inside` a box, `tc.Near` another part, `tc.Brep` (a face of a STEP file), the indices
+        of triangles, or a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -].
         """
-        return Face(self, selection if isinstance(selection, str) or callable(selection) else tuple(selection))
+        return Face(self, tuple(map(criterion, selections)))
 
     def faults(self) -> Iterator[str]:
         yield from self.geometry.faults()
@@ -70,25 +70,19 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Face:
-    """A surface of a part: a direction, triangle indices, or a function that picks triangles."""
+    """What of a part's surface meets all criteria."""
 
     part: Part
-    selection: Any
+    selections: tuple[Selection, ...]
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The part itself, and those that its criteria speak of."""
+        return (self.part, *(selection.part for selection in self.selections if isinstance(selection, Near)))
 
     def faults(self) -> Iterator[str]:
-        if isinstance(self.selection, str) and not is_finite(direction(self.selection)):
-            yield (
-                f'unknown face "{self.selection}" of part "{self.part.name}"; '
-                f"expected one of {', '.join(DIRECTIONS)}, triangle indices, or a function of centres and normals"
-            )
-        if isinstance(self.selection, tuple) and not all(
-            isinstance(index, int) or hasattr(index, "__index__") for index in self.selection
-        ):
-            yield f'face of part "{self.part.name}": triangle indices must be whole numbers'
+        for selection in self.selections:
+            yield from (f'face of part "{self.part.name}": {fault}' for fault in selection.faults())
 
     def __str__(self) -> str:
-        if isinstance(self.selection, str):
-            return f"{self.part.name} {self.selection}"
-        if isinstance(self.selection, tuple):
-            return f"{self.part.name} ({len(self.selection)} triangles)"
-        return f"{self.part.name} (selected)"
+        return " ".join([self.part.name, *map(str, self.selections)])

@@ -1,21 +1,21 @@
 """A 3-2-1 scheme on three faces becomes six locators."""
 
 import numpy as np
-import trimesh
 
-from tolcontact.assembly import Locator, ThreeTwoOne
-from tolcontact.discretization.solids import GeometryFault, patch, select
+from tolcontact.assembly import Face, Locator, ThreeTwoOne
+from tolcontact.discretization.faces import Meshes, patch
+from tolcontact.discretization.fault import GeometryFault
 
 LABELS = ("A1", "A2", "A3", "B1", "B2", "C1")
 
 
-def lay_out(mesh: trimesh.Trimesh, scheme: ThreeTwoOne) -> tuple[Locator, ...]:
+def lay_out(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
     """The six locators of a 3-2-1 scheme, in the part's own frame; directions point into the part.
 
     Each face is taken as its bounding rectangle along the edges that it shares with the other two.
     Raises GeometryFault where the faces are not three independent ones, or the inset leaves no room.
     """
-    corners, normals = zip(*(_frame(mesh, face) for face in scheme.faces), strict=True)
+    corners, normals = zip(*(_frame(face, meshes) for face in scheme.faces), strict=True)
     outward = np.array(normals)
     if abs(np.linalg.det(outward)) < 0.1:
         raise GeometryFault(
@@ -41,10 +41,10 @@ def lay_out(mesh: trimesh.Trimesh, scheme: ThreeTwoOne) -> tuple[Locator, ...]:
     return tuple(Locator(label, p, n) for label, p, n in zip(LABELS, points, directions, strict=True))
 
 
-def _frame(mesh: trimesh.Trimesh, face: object) -> tuple[np.ndarray, np.ndarray]:
-    triangles = patch(mesh, select(mesh, face))  # type: ignore[arg-type]
-    normal = triangles.area_faces @ triangles.face_normals
-    return np.asarray(triangles.vertices), normal / np.linalg.norm(normal)
+def _frame(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.ndarray]:
+    own = patch(face, meshes).mesh
+    normal = own.area_faces @ own.face_normals
+    return np.asarray(own.vertices), normal / np.linalg.norm(normal)
 
 
 def _stations(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:

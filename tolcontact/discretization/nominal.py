@@ -1,6 +1,6 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +9,13 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
+from tolcontact.discretization.faces import Meshes, patch, triangles
+from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.layout import lay_out
-from tolcontact.discretization.projection import Surface
-from tolcontact.discretization.solids import GeometryFault, field_surface, patch, select, surface
+from tolcontact.discretization.solids import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
+from tolcontact.discretization.surface import Surface
+from tolcontact.discretization.units import warn_of_units
 from tolcontact.errors import ModelError
 
 CONDITION_LIMIT = 1e8
@@ -92,6 +95,10 @@ class Nominal:
     def part_index(self, part: Part) -> int:
         return self.assembly.parts.index(part)
 
+    def triangles(self, face: Face) -> list[int]:
+        """Indices of the triangles, in their part's mesh, of which a face consists or is cut."""
+        return [int(k) for k in triangles(face, {part.part: part.mesh for part in self.parts})]
+
     def place(self, point: Point) -> np.ndarray:
         """Nominal assembly coordinates (3,) [mm] of a declared point."""
         return self.parts[self.part_index(point.part)].place(np.array(point.position))
@@ -104,17 +111,19 @@ def discretize(assembly: Assembly) -> Nominal:
     """
     faults = list(assembly.faults())
     clean = not faults
-    meshes = {
-        part: _attempt(faults, _where("part", part), surface, part.geometry)
+    attempts = {
+        part: _attempt(faults, _where("part", part), shape, part.geometry)
         for part in assembly.parts
         if not any(part.geometry.faults())
     }
-    parts = [_nominal_part(assembly, part, meshes.get(part), faults) for part in assembly.parts]
+    shapes = {part: found for part, found in attempts.items() if found is not None}
+    meshes = {part: found.mesh for part, found in shapes.items()}
+    parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]
     placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
     pairs = [
-        _attempt(faults, _where("contact pair", pair), _contact_points, assembly, pair, placed)
+        _attempt(faults, _where("contact pair", pair), _contact_points, assembly, pair, placed, meshes)
         for pair in assembly.pairs
-        if not any(pair.faults())
+        if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
     if clean:
         faults.extend(_immovable(assembly))
@@ -131,6 +140,7 @@ def discretize(assembly: Assembly) -> Nominal:
     )
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
+    warn_of_units(assembly, shapes)
     found = tuple(part for part in parts if part is not None)
     return Nominal(assembly, found, (*(pair for pair in pairs if pair is not None), *_support_pairs(found)), assembly.measures)
 
@@ -163,9 +173,10 @@ def _where(kind: str, thing: Part | ContactPair) -> str:
     return f'{kind} "{thing.name}" ({thing.declared_at})'
 
 
-def _nominal_part(assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, faults: list[str]) -> NominalPart | None:
-    if mesh is None or any(part.faults()):
+def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[str]) -> NominalPart | None:
+    if part not in meshes or any(part.faults()):
         return None
+    mesh = meshes[part]
     R_WP = Rotation.from_rotvec(part.rotation).as_matrix()
     t_WP = np.array(part.at)
     vertices, faces = field_surface(mesh)
@@ -173,7 +184,8 @@ def _nominal_part(assembly: Assembly, part: Part, mesh: trimesh.Trimesh | None, 
     locators: tuple[Locator, ...] = ()
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
-            locators = _attempt(faults, _where("part", part), lay_out, mesh, location.scheme) or ()
+            if all(mentioned in meshes for mentioned in location.mentioned):
+                locators = _attempt(faults, _where("part", part), lay_out, location.scheme, meshes) or ()
         else:
             locators = location.scheme
     points = np.array([locator.point for locator in locators]).reshape(-1, 3) @ R_WP.T + t_WP
@@ -237,13 +249,11 @@ def _check_independent(points: np.ndarray, directions: np.ndarray, one_sided: np
         )
 
 
-def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, NominalPart]) -> ContactPoints | None:
-    if pair.moving.part not in placed or pair.reference.part not in placed:
-        return None
+def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes) -> ContactPoints:
     moving, reference = placed[pair.moving.part], placed[pair.reference.part]
-    own = patch(moving.mesh, select(moving.mesh, pair.moving))
-    target = _face_in_place(reference, pair.reference)
-    sampled = own_vertices(own) if isinstance(pair.points, str) else spread(own, pair.points, pair.spacing)
+    own = patch(pair.moving, meshes)
+    target = patch(pair.reference, meshes).placed(*reference.placement)
+    sampled = own_vertices(own.mesh) if isinstance(pair.points, str) else spread(own.mesh, pair.points, pair.spacing)
     P_m = moving.place(sampled)
     P_r, n_r, over = target.project(P_m)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
@@ -256,7 +266,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
             + (" and overhangs the rim" if not over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
-    _, normals, _ = _face_in_place(moving, pair.moving).project(P_m[kept])
+    _, normals, _ = own.placed(*moving.placement).project(P_m[kept])
     if ((normals * n_r[kept]).sum(axis=1) > 0).all():
         raise GeometryFault(
             f"its faces {pair.moving} and {pair.reference} look the same way, so one cannot rest on the other; "
@@ -271,11 +281,6 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: dict[Part, No
         n_r[kept],
         surface=target,
     )
-
-
-def _face_in_place(part: NominalPart, face: Face) -> Surface:
-    own = patch(part.mesh, select(part.mesh, face))
-    return Surface(trimesh.Trimesh(part.place(np.asarray(own.vertices)), own.faces, process=False))
 
 
 def _immovable(assembly: Assembly) -> list[str]:

@@ -1,87 +1,87 @@
-"""Geometry to triangle surfaces, and faces to the triangles that they name. Part's own frame, mm."""
+"""Geometry to triangle surfaces whose normals point outward. Part's own frame, mm."""
 
-from pathlib import Path
+from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 
-from tolcontact.assembly import Box, Face, Mesh
-from tolcontact.assembly.words import direction
+from tolcontact.assembly import Box, Mesh
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.reading import read
 
-FACE_ANGLE = np.radians(1.0)
 FIELD_STATIONS = 12
 
 
-class GeometryFault(Exception):
-    """One sentence on what is wrong with a shape; collected with the other faults of a model."""
+@dataclass(frozen=True)
+class Shape:
+    """A part's surface. `unsure`: nobody says in which units its file counts; mm are taken."""
+
+    mesh: trimesh.Trimesh
+    unsure: bool = False
 
 
-def surface(geometry: Box | Mesh) -> trimesh.Trimesh:
+def shape(geometry: Box | Mesh) -> Shape:
     """The closed or open triangle surface of a geometry.
 
-    Raises GeometryFault where a mesh cannot be read, is empty, or is not finite.
+    Raises GeometryFault where a mesh cannot be read, is empty, is not finite, or has no outside.
     """
     if isinstance(geometry, Box):
-        box: trimesh.Trimesh = trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]])
-        return box
-    if isinstance(geometry.source, str | Path):
-        return _read(Path(geometry.source))
-    return _checked(trimesh.Trimesh(geometry.source.vertices, geometry.source.faces, process=False), str(geometry))
-
-
-def _read(path: Path) -> trimesh.Trimesh:
-    try:
-        loaded = trimesh.load(path, force="mesh")
-    except Exception as error:  # trimesh's readers raise whatever their format's parser raises
-        raise GeometryFault(
-            f'"{path}" cannot be read as a mesh ({type(error).__name__}: {error}); '
-            "expected a triangle mesh in STL, OBJ, PLY or GLB"
-        ) from error
-    return _checked(loaded, f'"{path}"')
-
-
-def _checked(mesh: trimesh.Trimesh, who: str) -> trimesh.Trimesh:
-    if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
-        raise GeometryFault(f"{who} holds no triangles; expected a triangle mesh")
+        return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
+    source = read(geometry)
+    mesh = source.mesh
+    if len(mesh.faces) == 0:
+        raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
     if not np.isfinite(mesh.vertices).all():
-        raise GeometryFault(f"{who} holds vertices that are not finite numbers")
+        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers")
     if not mesh.area > 0:
-        raise GeometryFault(f"{who} has no area: all its triangles are degenerate")
-    return mesh
+        raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
+    _check_outward(mesh, geometry)
+    return Shape(mesh, source.unsure)
 
 
-def select(mesh: trimesh.Trimesh, face: Face) -> np.ndarray:
-    """Indices of the triangles that `face` names, shape (triangle,).
-
-    Raises GeometryFault where there are none.
-    """
-    if isinstance(face.selection, str):
-        chosen = mesh.face_normals @ np.array(direction(face.selection)) > np.cos(FACE_ANGLE)
-    elif isinstance(face.selection, tuple):
-        indices = np.asarray(face.selection, dtype=int)
-        if indices.size and not (0 <= indices.min() and indices.max() < len(mesh.faces)):
-            raise GeometryFault(f"face {face}: triangle indices must lie between 0 and {len(mesh.faces) - 1}")
-        chosen = np.isin(np.arange(len(mesh.faces)), indices)
-    else:
-        try:
-            chosen = np.asarray(face.selection(mesh.triangles_center, mesh.face_normals))
-        except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
-            raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
-        if chosen.shape != (len(mesh.faces),) or chosen.dtype != bool:
+def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
+    """Refuse what has no outside: neighbours turned against each other, and closed bodies turned inside out."""
+    edge, turn, times = _edges(mesh)
+    shared = times[edge] == 2
+    against = int(np.count_nonzero(np.abs(np.bincount(edge[shared], turn[shared], len(times))) == 2))
+    if against:
+        raise GeometryFault(
+            f"{geometry}: at {against} edges two neighbouring triangles are turned against each other, so its normals do "
+            "not point outward; repair it (trimesh.repair.fix_normals), or export it again"
+        )
+    neighbours = np.asarray(mesh.face_adjacency)
+    body = trimesh.graph.connected_component_labels(neighbours, node_count=len(mesh.faces))
+    count = int(body.max()) + 1
+    is_open = np.bincount(body, (times[edge] == 1).reshape(-1, 3).any(axis=1), count) > 0
+    corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
+    volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
+    # A body whose normals point inward is a cavity where another one is around it, else a mistake.
+    lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
+    for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
+        around = (volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1)
+        if not around.any():
+            which = "it is" if count == 1 else f"its body {k + 1} of {count} is"
             raise GeometryFault(
-                f"face {face}: its function gave an array of shape {chosen.shape} and type {chosen.dtype}; "
-                f"expected one True or False per triangle, shape ({len(mesh.faces)},)"
+                f"{geometry}: {which} inside out (volume {volume[k]:.4g} mm3), so its normals point inward; "
+                "turn it (trimesh's invert()), or export it again"
             )
-    chosen &= mesh.area_faces > 0
-    if not chosen.any():
-        raise GeometryFault(f"face {face} has no triangles; choose another direction or selection")
-    return np.flatnonzero(chosen)
 
 
-def patch(mesh: trimesh.Trimesh, triangles: np.ndarray) -> trimesh.Trimesh:
-    """The chosen triangles as a surface of their own, with the vertices in the order of the mesh."""
-    used, faces = np.unique(mesh.faces[triangles], return_inverse=True)
-    return trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False)
+def _edges(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of each triangle's three edges, flat: which edge it is, the sense (+-1) in which it runs; and how often each edge occurs.
+
+    Degenerate triangles count, too: they carry the sense across from one neighbour to the other.
+    """
+    ends = np.asarray(mesh.edges, dtype=np.int64)
+    key = ends.min(axis=1) * len(mesh.vertices) + ends.max(axis=1)
+    _, edge, times = np.unique(key, return_inverse=True, return_counts=True)
+    return edge, np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0), times
+
+
+def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int) -> np.ndarray:
+    found = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
+    limit.at(found, body, limit.reduce(corners, axis=1))
+    return found
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:

@@ -4,6 +4,7 @@ import numpy as np
 import trimesh
 
 CANDIDATES_PER_SPACING = 2.0
+CROWD = 50  # candidates for each point, from which on some are left out
 CORNER_ANGLE = np.radians(30.0)
 
 
@@ -15,12 +16,14 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     many as it takes until every spot is within `spacing` [mm] of one.
     """
     step = spacing if spacing is not None else float(np.sqrt(surface.area / count))  # type: ignore[operator]
-    vertices, _ = trimesh.remesh.subdivide_to_size(
+    vertices, faces = trimesh.remesh.subdivide_to_size(
         surface.vertices, surface.faces, max_edge=step / CANDIDATES_PER_SPACING, max_iter=30
     )
     candidates = np.asarray(vertices)
+    if len(candidates) > CROWD * max(surface.area / step**2, 1):
+        candidates = _thinned(candidates, np.asarray(faces), step / (2 * CANDIDATES_PER_SPACING))
     centre = (candidates.min(axis=0) + candidates.max(axis=0)) / 2
-    chosen = list(_rim_corners(surface))
+    chosen = _apart(_rim_corners(surface), step / CANDIDATES_PER_SPACING)
     if not chosen or (count is not None and len(chosen) > count):
         chosen = [candidates[np.argmax(((candidates - centre) ** 2).sum(axis=1))]]
     distance2 = np.min([((candidates - point) ** 2).sum(axis=1) for point in chosen], axis=0)
@@ -30,6 +33,25 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
             return np.array(chosen)
         chosen.append(candidates[farthest])
         np.minimum(distance2, ((candidates - candidates[farthest]) ** 2).sum(axis=1), out=distance2)
+
+
+def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
+    """One of the points (point, 3) in each cube of side `cell` [mm], on the rim where one is."""
+    edges, counts = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
+    inner = np.ones(len(points), dtype=bool)
+    inner[edges[counts == 1].ravel()] = False
+    points = points[np.argsort(inner, kind="stable")]
+    _, first = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_index=True)
+    return np.asarray(points[np.sort(first)])
+
+
+def _apart(points: np.ndarray, least: float) -> list[np.ndarray]:
+    """Those of the points (point, 3) that stand `least` [mm] or more from those before: a jagged rim has no corners."""
+    chosen: list[np.ndarray] = []
+    for point in points:
+        if all(((point - other) ** 2).sum() >= least**2 for other in chosen):
+            chosen.append(point)
+    return chosen
 
 
 def _rim_corners(surface: trimesh.Trimesh) -> np.ndarray:

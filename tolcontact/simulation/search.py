@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
-from tolcontact.discretization.projection import Surface
+from tolcontact.discretization.surface import Surface
 from tolcontact.simulation.scan import PairScan
 
 
@@ -51,7 +51,7 @@ def search(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin
     if surface is None:
         return scan
     shape = (len(relative), len(scan.P_m), 3)
-    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), smooth=True, margin=margin)
+    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), margin=margin)
     return FoundScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),

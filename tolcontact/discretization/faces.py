@@ -1,0 +1,156 @@
+"""Faces: the triangles of a part that meet all of a face's criteria, as a surface of their own. Part's own frame, mm."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from tolcontact.assembly import Brep, Face, Facing, Inside, Near, Part, Picked, Triangles
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.reading import BREP
+from tolcontact.discretization.surface import Surface
+
+NEAR_STATIONS = 100
+BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
+LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that look at each other
+CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box counts as inside
+
+Meshes = Mapping[Part, trimesh.Trimesh]
+
+
+def patch(face: Face, meshes: Meshes) -> Surface:
+    """The surface that a face names. `meshes` holds each part's surface in that part's own frame.
+
+    Raises GeometryFault where there is none, or where it has no direction to be pushed in.
+    """
+    mesh = meshes[face.part]
+    used, faces = np.unique(mesh.faces[triangles(face, meshes)], return_inverse=True)
+    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False))
+    for selection in face.selections:
+        if isinstance(selection, Inside):
+            own = _cut(own, selection, CUT_MARGIN * mesh.scale)
+            if len(own.mesh.faces) == 0:
+                raise GeometryFault(f"face {face}: nothing of it lies there; the part spans {_span(mesh)}")
+    sheets = _double(own.mesh)
+    if sheets:
+        raise GeometryFault(
+            f"face {face}: {sheets} pairs of its triangles coincide and look opposite ways, so it has no outside; "
+            "remove one of the two sheets, or choose a direction"
+        )
+    return own
+
+
+def triangles(face: Face, meshes: Meshes) -> np.ndarray:
+    """Indices (triangle,) of the triangles that meet all criteria but the boxes, which may cut them.
+
+    Raises GeometryFault where there are none.
+    """
+    mesh = meshes[face.part]
+    chosen = np.asarray(mesh.area_faces) > 0
+    for selection in face.selections:
+        match selection:
+            case Facing():
+                chosen = chosen & (mesh.face_normals @ np.array(selection.axis) > np.cos(selection.angle))
+            case Triangles():
+                chosen = chosen & _by_index(face, mesh, selection)
+            case Picked():
+                chosen = chosen & _by_function(face, mesh, selection)
+            case Brep():
+                chosen = chosen & _by_brep(face, mesh, selection)
+            case Near():
+                chosen = chosen & _by_nearness(face, meshes, selection)
+    if not chosen.any():
+        raise GeometryFault(f"face {face} has no triangles; choose another direction or selection")
+    return np.flatnonzero(chosen)
+
+
+def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.ndarray:
+    indices = np.asarray(selection.indices, dtype=int)
+    if indices.size and not (0 <= indices.min() and indices.max() < len(mesh.faces)):
+        raise GeometryFault(f"face {face}: triangle indices must lie between 0 and {len(mesh.faces) - 1}")
+    return np.isin(np.arange(len(mesh.faces)), indices)
+
+
+def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.ndarray:
+    try:
+        chosen = np.asarray(selection.function(mesh.triangles_center, mesh.face_normals))
+    except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
+        raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
+    if chosen.shape != (len(mesh.faces),) or chosen.dtype != bool:
+        raise GeometryFault(
+            f"face {face}: its function gave an array of shape {chosen.shape} and type {chosen.dtype}; "
+            f"expected one True or False per triangle, shape ({len(mesh.faces)},)"
+        )
+    return np.asarray(chosen)
+
+
+def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
+    brep = mesh.face_attributes.get(BREP)
+    if brep is None:
+        raise GeometryFault(f"face {face}: its part is no STEP file, so it has no B-rep faces; choose it another way")
+    brep = np.asarray(brep).ravel()
+    point = np.tile(selection.at, (len(brep), 1))
+    distance = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, point) - point, axis=1)
+    if distance.min() > BREP_REACH * mesh.scale:
+        raise GeometryFault(
+            f"face {face}: the point is {distance.min():.4g} mm away from the part, which spans {_span(mesh)}; "
+            "give a point on the face"
+        )
+    chosen = np.unique(brep[distance < distance.min() + CUT_MARGIN * mesh.scale])
+    if len(chosen) > 1:
+        raise GeometryFault(f"face {face}: the point lies where {len(chosen)} faces meet; give a point inside one of them")
+    return np.asarray(brep == chosen[0])
+
+
+def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
+    mesh = meshes[face.part]
+    step = max(selection.within, mesh.scale / NEAR_STATIONS)
+    vertices, faces, origin = trimesh.remesh.subdivide_to_size(
+        mesh.vertices, mesh.faces, max_edge=step, max_iter=30, return_index=True
+    )
+    fine = trimesh.Trimesh(vertices, faces, process=False)
+    R_W, R_O = (Rotation.from_rotvec(part.rotation).as_matrix() for part in (face.part, selection.part))
+    spots = (fine.triangles_center @ R_W.T + np.array(face.part.at) - np.array(selection.part.at)) @ R_O
+    nearest, normals, _ = Surface(meshes[selection.part]).project(spots)
+    looks_at = ((fine.face_normals @ R_W.T @ R_O) * normals).sum(axis=1) < LOOKS_AT
+    near = looks_at & (np.linalg.norm(spots - nearest, axis=1) <= selection.within)
+    chosen = np.zeros(len(mesh.faces), dtype=bool)
+    chosen[origin[near]] = True
+    for flat in mesh.facets:  # a flat face is one thing, however it is cut into triangles
+        chosen[flat] = chosen[flat].any()
+    return chosen
+
+
+def _cut(own: Surface, box: Inside, margin: float) -> Surface:
+    vertices, faces = np.asarray(own.mesh.vertices), np.asarray(own.mesh.faces)
+    for corner, inward in ((box.lower, 1.0), (box.upper, -1.0)):
+        for axis in np.eye(3):
+            origin = np.array(corner) - inward * margin * axis
+            vertices, faces, _ = trimesh.intersections.slice_faces_plane(vertices, faces, inward * axis, origin)
+    cut = trimesh.Trimesh(vertices, faces, process=False)
+    cut.merge_vertices()
+    cut.update_faces(cut.area_faces > 0)
+    cut.remove_unreferenced_vertices()
+    if len(cut.faces) == 0:
+        return Surface(cut, np.zeros((0, 3, 3)))
+    # A cut does not change the face: the normals are still those of the whole, also where its triangles end now.
+    origin, _ = own.nearest(cut.triangles_center)
+    return Surface(cut, np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1))
+
+
+def _double(own: trimesh.Trimesh) -> int:
+    """How many pairs of triangles have the same corners and opposite normals."""
+    corners = np.sort(own.faces, axis=1)
+    _, alike, times = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    doubled = times[alike.ravel()] > 1
+    if not doubled.any():
+        return 0
+    group, normals = alike.ravel()[doubled], np.asarray(own.face_normals)[doubled]
+    total = np.stack([np.bincount(group, normals[:, k], len(times)) for k in range(3)], axis=1)
+    return int((np.linalg.norm(total, axis=1) < times - 0.5)[times > 1].sum())
+
+
+def _span(mesh: trimesh.Trimesh) -> str:
+    lower, upper = ("({})".format(", ".join(f"{c:g}" for c in corner)) for corner in mesh.bounds)
+    return f"{lower} to {upper}"

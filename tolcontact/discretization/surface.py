@@ -1,0 +1,95 @@
+"""Faces as surfaces: nearest points on them, with normals (paper, 2.2)."""
+
+from functools import cached_property
+
+import igl
+import numpy as np
+import trimesh
+from scipy.sparse import csr_array
+
+CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they stand for one curved face
+
+
+class Surface:
+    """A triangle surface, ready to be asked for its nearest points as often as need be.
+
+    corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated.
+                     Without them they follow from the facets around.
+    """
+
+    def __init__(self, mesh: trimesh.Trimesh, corner_normals: np.ndarray | None = None) -> None:
+        self.mesh = mesh
+        self.corner_normals = _corner_normals(mesh) if corner_normals is None else corner_normals
+        self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
+        self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+
+    @cached_property
+    def _tree(self) -> igl.AABB:
+        tree = igl.AABB()
+        tree.init(self._vertices, self._faces)
+        return tree
+
+    @cached_property
+    def _is_rim(self) -> np.ndarray:
+        return _rims(self.mesh)
+
+    def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The triangle (point,) and the place on it (point, 3) [mm] that is nearest to each of `points` (point, 3) [mm]."""
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        _, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
+        return triangle, nearest
+
+    def normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Outward unit normals (point, 3) at `points` (point, 3) [mm] on the given triangles (point,)."""
+        barycentric = self._barycentric(triangle, points)
+        normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
+        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+    def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
+        """The surface turned by R (3, 3), then moved by t (3,) [mm]."""
+        moved = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
+        return Surface(moved, self.corner_normals @ R.T)
+
+    def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        return np.asarray(trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points))
+
+    def project(self, points: np.ndarray, *, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Project `points` (point, 3) [mm] onto the surface.
+
+        Returns the nearest points (point, 3) [mm], the outward unit normals there (point, 3), and a mask (point,) of the
+        points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. On curved faces the
+        normals are interpolated between the corners of a facet: they change steadily as a point moves.
+        """
+        triangle, nearest = self.nearest(points)
+        facet = np.asarray(self.mesh.face_normals)[triangle]
+        offset = points - nearest
+        sideways = np.linalg.norm(offset - (offset * facet).sum(axis=1, keepdims=True) * facet, axis=1)
+        # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero.
+        on_edge = np.abs(self._barycentric(triangle, nearest)[:, [2, 0, 1]]) < 1e-9
+        overhangs = (sideways > max(margin, 1e-6 * self.mesh.scale)) & (on_edge & self._is_rim[triangle]).any(axis=1)
+        return nearest, self.normals(triangle, nearest), ~overhangs
+
+
+def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Normals at the corners of each triangle (face, 3, 3): those of the facets around, but for what lies across a crease.
+
+    Weighted by the facets' angles there, so that they do not depend on the triangulation. A flat face keeps its own, exactly.
+    """
+    facet, corner = np.asarray(mesh.face_normals), np.asarray(mesh.faces).ravel()
+    of_vertex = csr_array((np.ones(len(corner)), (np.arange(len(corner)), corner)), shape=(len(corner), len(mesh.vertices)))
+    here, there = (of_vertex @ of_vertex.T).nonzero()
+    cosine = (facet[here // 3] * facet[there // 3]).sum(axis=1)
+    here, there, flat = here[cosine > CREASE], there[cosine > CREASE], cosine[cosine > CREASE] > 1 - 1e-14
+    weight = np.asarray(mesh.face_angles).ravel()[there]
+    turn = np.where(flat[:, None], 0, facet[there // 3] - facet[here // 3]) * weight[:, None]
+    total = np.bincount(here, weight, len(corner))
+    mean = facet.repeat(3, axis=0)
+    mean += np.stack([np.bincount(here, turn[:, k], len(corner)) for k in range(3)], axis=1) / total[:, None]
+    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True)).reshape(-1, 3, 3)
+
+
+def _rims(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Which edges (face, edge) belong to one triangle only."""
+    edges = np.sort(mesh.edges, axis=1).reshape(-1, 2)
+    _, first, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    return np.asarray((counts[first.ravel()] == 1).reshape(-1, 3))
