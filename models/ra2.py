@@ -9,6 +9,7 @@ narrows by 2 degrees to each side, so that contact pushes the inner plate toward
 Needs the extra `tolcontact[solids]`. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
 """
 
+import manifold3d
 import numpy as np
 import trimesh
 
@@ -40,8 +41,16 @@ def plate(outside: float) -> trimesh.Trimesh:
         across = trimesh.geometry.align_vectors((0, 0, 1), (NARROW, sign, -LEAN))
         across[:3, 3] = (x, sign * side(x, z), z)
         stamps.append(trimesh.creation.cylinder(5, 20, transform=across))
-    solids = [trough(outside, HEIGHT), trough(outside - SHEET, HEIGHT + 1, over=1), *stamps]
-    return trimesh.boolean.difference(solids, engine="manifold")
+    cut = solid(trough(outside, HEIGHT))
+    for tool in (trough(outside - SHEET, HEIGHT + 1, over=1), *stamps):
+        cut -= solid(tool)
+    made = cut.to_mesh64()
+    return trimesh.Trimesh(made.vert_properties[:, :3], made.tri_verts)
+
+
+def solid(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
+    """The solid within a mesh, in double precision: the booleans of trimesh pass through single, which tilts faces."""
+    return manifold3d.Manifold(manifold3d.Mesh64(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.uint64)))
 
 
 def assembly() -> tc.Assembly:

@@ -227,3 +227,18 @@ def square_pins() -> tc.Assembly:
         a.contact(f"right {k}", moving=right[0].face("+x"), reference=right[1].face("-x"), points="vertices")
     a.measure("slide", plate.point(0, 0, 0), along="x", tolerance=1)
     return a
+
+
+def bar_in_a_half_pipe(spacing: float) -> tc.Assembly:
+    """A bar of radius 20 in the lower half of a pipe of radius 20.2: curved against curved."""
+    a = tc.Assembly("pipe")
+    pipe = a.part("pipe", tc.Mesh(trimesh.creation.annulus(20.2, 24, 80, sections=256)), fixed=True)
+    bar = a.part("bar", tc.Mesh(trimesh.creation.cylinder(20, 60, sections=256)))
+    ends = [(0, 0, 25), (0, 0, -25)]
+    held = [tc.Locator("Z", (0, 0, -30), "z"), tc.Locator("T", (20, 0, 0), "y", 0)]
+    a.locate(bar, [*(tc.Locator(f"{n}{k}", p, n) for n in "xy" for k, p in enumerate(ends)), *held], tolerance=1)
+    inner = pipe.face(lambda c, n: (abs(n[:, 2]) < 0.1) & (np.hypot(c[:, 0], c[:, 1]) < 21) & (c[:, 1] < 0))
+    a.contact("inside", moving=bar.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=inner, spacing=spacing)
+    a.measure("height", bar.point(0, 0, 30), along="y")
+    a.measure("aside", bar.point(0, 0, 30), along="x")
+    return a

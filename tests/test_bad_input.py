@@ -7,8 +7,10 @@ import sys
 from dataclasses import dataclass
 
 import pytest
+import trimesh
 
 import tolcontact as tc
+from tests import cases
 from tolcontact.cli import command_line
 
 HEADER = """
@@ -65,6 +67,50 @@ MODELS = {
         {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('notes.obj'), fixed=True)\n"},
         ['part "extra"', "notes.obj"],
     ),
+    "STEP file cut off in the middle": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('cut.step'), fixed=True)\n"},
+        ['part "extra"', "cut.step", "cut off", "export it again"],
+    ),
+    "STL file of zero triangles": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('none.stl'), fixed=True)\n"},
+        ['part "extra"', "none.stl"],
+    ),
+    "ten million triangles": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('huge.stl'), fixed=True)\n"},
+        ['part "extra"', "huge.stl", "10000000 triangles", "2000000"],
+    ),
+    "unknown kind of mesh file": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('model.py'), fixed=True)\n"},
+        ['part "extra"', "model.py", ".stl", ".step"],
+    ),
+    "unknown units": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('none.stl', units='inch'), fixed=True)\n"},
+        ['part "extra"', "'inch'", "mm", "in"],
+    ),
+    "coincident faces, one of them inverted": (
+        {
+            "contact": GOOD["contact"]
+            .replace("base.face('+z')", "lid.face('+z')")
+            .replace("    a.", "    lid = a.part('lid', tc.Mesh('inverted.stl'), fixed=True)\n    a.", 1)
+        },
+        ['part "lid"', "inverted.stl", "inside out", "volume -50000"],
+    ),
+    "empty box": (
+        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.Inside((0, 0, 9), (9, 9, 8))")},
+        ['contact pair "interface"', 'part "base"', "empty"],
+    ),
+    "box beside the part": (
+        {"contact": GOOD["contact"].replace("'+z'", "'+z', tc.Inside((0, 0, 90), (9, 9, 99))")},
+        ['contact pair "interface"', "base +z", "(100, 50, 10)"],
+    ),
+    "B-rep face of a box": (
+        {"contact": GOOD["contact"].replace("'+z'", "tc.Brep((5, 5, 10))")},
+        ['contact pair "interface"', "no STEP file"],
+    ),
+    "near a part of another assembly": (
+        {"contact": GOOD["contact"].replace("'+z'", "tc.Near(tc.Assembly('B').part('lid', tc.Box(1, 1, 1)), 1)")},
+        ['contact pair "interface"', 'unknown part "lid"'],
+    ),
     "two names alike": ({"measure": 2 * GOOD["measure"]}, ['measure "height"', "2 times"]),
     "distribution that gives NaN": (
         {"top": GOOD["top"].replace("tolerance=10", "tolerance=__import__('scipy.stats').stats.norm(math.nan, 1)")},
@@ -100,6 +146,15 @@ MODELS = {
 def script(folder, changes):
     (folder / "empty.stl").write_bytes(b"")
     (folder / "notes.obj").write_text("these are notes\n")
+    step = cases.MODELS / "housing.step"
+    (folder / "cut.step").write_bytes(step.read_bytes()[: step.stat().st_size // 2])
+    (folder / "none.stl").write_bytes(b"\0" * 84)
+    with (folder / "huge.stl").open("wb") as file:
+        file.write(b"\0" * 80 + (10_000_000).to_bytes(4, "little"))
+        file.truncate(84 + 50 * 10_000_000)
+    inverted = trimesh.creation.box(bounds=[[0, 0, 0], [100, 50, 10]])
+    inverted.invert()
+    inverted.export(folder / "inverted.stl")
     path = folder / "model.py"
     path.write_text(changes.get("whole") or HEADER + "".join({**GOOD, **changes}.values()))
     return path
@@ -135,6 +190,19 @@ def test_a_wrong_model_is_refused(mistake, tmp_path):
         for words in expected:
             assert words in done.stderr, done.stderr
         assert not (tmp_path / "out.nc").exists()
+
+
+def test_a_doubtful_size_is_a_warning_on_stderr(tmp_path):
+    trimesh.creation.box(bounds=[[0, 0, 0], [4, 2, 0.4]]).export(tmp_path / "inches.stl")
+    lid = (
+        "    lid = a.part('lid', tc.Mesh('inches.stl'), at=(5, 5, 10))\n    a.locate(lid, tc.three_two_one(lid.face('-z'), "
+        "lid.face('-y'), lid.face('-x')), tolerance=1)\n"
+        "    a.contact('lid', moving=lid.face('-z'), reference=base.face('+z'))\n"
+    )
+    done = call(tmp_path, "check", script(tmp_path, {"measure": lid + GOOD["measure"]}))
+    assert done.returncode == 0
+    assert done.stderr.startswith('warning: part "lid"') and "4.49 mm across" in done.stderr and 'units="in"' in done.stderr
+    assert done.stdout.endswith("no faults found\n")
 
 
 def test_all_faults_of_a_model_are_reported_at_once(tmp_path):

@@ -8,12 +8,16 @@ import pytest
 import trimesh
 
 import tolcontact as tc
+from tests import cases
+from tests.test_contact import simulate
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.reading import MAX_TRIANGLES, STEP_CHORD
 from tolcontact.discretization.solids import shape
 from tolcontact.errors import UnitsWarning
+from tolcontact.simulation import CORRECTED
+from tolcontact.statistics import intervals
 
 HOUSING = Path(__file__).resolve().parents[1] / "models" / "housing.step"
 BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])
@@ -259,3 +263,15 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
     chord = 10 * (1 - np.cos(np.pi / 96)) if solid == "cylinder" else 10 - np.linalg.norm(inner.triangles_center, axis=1).min()
     assert 10 - radius.min() < chord + 1e-9 and radius.max() < 10 + 1e-9
     assert np.abs(pair.n_r - true / radius[:, None]).max() < 0.005
+
+
+def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_interval():
+    method = tc.Method(resolution="exact", objective="all points", search="iterated")
+    runs = [simulate(cases.bar_in_a_half_pipe(spacing), samples=300, solver="daqp", method=method) for spacing in (6, 3)]
+    few, many = (len(program.nominal.pairs[0].P_m) for program, _ in runs)
+    assert many > 3 * few
+    coarse, fine = (run["measured"][:, CORRECTED] for _, run in runs)
+    for k in range(2):
+        for estimate in (intervals.mean, intervals.standard_deviation):
+            _, lower, upper = estimate(coarse[:, k])
+            assert lower < estimate(fine[:, k])[0] < upper

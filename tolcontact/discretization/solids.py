@@ -62,7 +62,7 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
         if not around.any():
             which = "it is" if count == 1 else f"its body {k + 1} of {count} is"
             raise GeometryFault(
-                f"{geometry}: {which} inside out (volume {volume[k]:.4g} mm3), so its normals point inward; "
+                f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
 

@@ -1,0 +1,102 @@
+"""The models do what their docstrings say."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases, referee
+from tests.test_contact import R_t, simulate
+from tolcontact.simulation import CORRECTED, RAW, Status, simulate_blocks
+
+EXACT = tc.Method(resolution="exact", objective="all points")
+MODELS = {
+    "cells": EXACT,
+    "channel": tc.Method(resolution="exact"),
+    "cover": EXACT,
+    "door": tc.Method(),
+    "ra1": tc.Method(),
+    "ra2": tc.Method(),
+}
+# Table 1: mean, 6 sigma, variance.
+RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_every_model_resolves_all_its_contacts(name):
+    program, run = simulate(cases.model(name), samples=100, solver="daqp", method=MODELS[name])
+    assert np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
+    assert (run["status"] == Status.RESOLVED).mean() > 0.5
+    assert run["gap_min"][:, RAW].min() < -0.1
+    R, t = R_t(run["poses"])
+    for pair in program.nominal.pairs:
+        for k in range(0, 100, 10):
+            assert referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED]).min() > -1e-6
+
+
+def spreads(name, samples=2000):
+    """Mean and standard deviation (measure, state) by measure, on one set of draws."""
+    program, run = simulate(cases.model(name), samples=samples, solver="daqp", method=MODELS[name])
+    x = run["measured"]
+    return {m.name: (x[:, :, k].mean(axis=0), x[:, :, k].std(axis=0, ddof=1)) for k, m in enumerate(program.nominal.measures)}
+
+
+def test_bump_stops_push_a_door_outwards_and_leave_its_gaps():
+    found = spreads("door")
+    for name, (mean, sigma) in found.items():
+        if name.startswith("flush"):
+            assert mean[CORRECTED] - mean[RAW] > 0.05
+            assert sigma[CORRECTED] < 0.6 * sigma[RAW]
+        else:
+            assert abs(sigma[CORRECTED] / sigma[RAW] - 1) < 0.02
+
+
+def test_cells_give_way_most_in_the_middle_and_their_pitch_varies_less():
+    found = {name: sigma[CORRECTED] / sigma[RAW] for name, (_, sigma) in spreads("cells", 500).items()}
+    assert found["first terminal"] < found["middle terminal"] < 0.8
+    assert found["pitch in the middle"] < 0.7
+
+
+def test_a_cover_stays_within_the_clearance_of_its_pins():
+    """The hole stays within half the clearance of its pin, wherever the pin stands."""
+    program, run = simulate(cases.model("cover"), samples=300, solver="daqp", method=EXACT)
+    names = [part.name for part in program.nominal.parts]
+    R, t = R_t(run["poses"][:, CORRECTED])
+    hole, pin = names.index("cover"), names.index("round pin")
+    places = np.array([15.0, 15.0, 44.0])
+    apart = (R[:, hole] @ places + t[:, hole] - R[:, pin] @ places - t[:, pin])[:, :2]
+    # Both are polygons of many sides, which stand within 2 um of the round ones.
+    assert np.linalg.norm(apart, axis=1).max() < 0.05 + 0.005
+    assert np.quantile(np.linalg.norm(apart, axis=1), 0.5) > 0.045
+    raw = run["poses"][:, RAW, hole, 9:11] - run["poses"][:, RAW, pin, 9:11]
+    assert np.linalg.norm(raw, axis=1).max() > 0.2
+
+
+@pytest.fixture(scope="module")
+def ra2():
+    return tc.build(cases.model("ra2"), solver="daqp")
+
+
+def test_ra2_has_3000_contact_points(ra2):
+    assert [len(pair.P_m) for pair in ra2.nominal.pairs] == [1480, 760, 760]
+    for pair in ra2.nominal.pairs:
+        assert np.abs(pair.P_m - pair.P_r).max() < 1e-9
+    lean = np.degrees(np.arccos(np.abs(ra2.nominal.pairs[1].n_r[:, 2])))
+    assert 74 < lean.min() and lean.max() < 76  # flanges are not orthogonal to the web
+
+
+def test_ra2_comes_to_the_papers_figures(ra2):
+    """As for RA1: inside the 95 % prediction interval for one more run of N = 1000, all six figures together."""
+    runs = []
+    for seed in range(1, 11):
+        blocks = list(simulate_blocks(ra2, samples=1000, seed=seed))
+        assert np.concatenate([block.status for block in blocks]).max() == Status.RESOLVED
+        runs.append(np.concatenate([block.measured[..., 0] for block in blocks]))
+    figures = np.array([[(x.mean(), 6 * x.std(ddof=1), x.var(ddof=1)) for x in run.T] for run in runs])
+    reach = stats.t.ppf(1 - 0.025 / 6, len(runs) - 1) * np.sqrt(1 + 1 / len(runs)) * figures.std(axis=0, ddof=1)
+    for state, paper in RA2.items():
+        assert (np.abs(figures.mean(axis=0)[state] - paper) < reach[state]).all()
+    assert (figures[:, CORRECTED, 1] < 0.6 * figures[:, RAW, 1]).all()
+    x = np.concatenate(runs)
+    shift = x[:, CORRECTED] - x[:, RAW]
+    assert shift.mean() + 1.96 * shift.std() / np.sqrt(len(x)) < 0  # towards the wide end
