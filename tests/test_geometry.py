@@ -275,3 +275,14 @@ def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_i
         for estimate in (intervals.mean, intervals.standard_deviation):
             _, lower, upper = estimate(coarse[:, k])
             assert lower < estimate(fine[:, k])[0] < upper
+
+
+def test_the_bodies_of_a_scene_stand_in_their_places(tmp_path):
+    scene = trimesh.Scene()
+    for k in range(3):
+        scene.add_geometry(BLOCK, transform=trimesh.transformations.translation_matrix((20 * k, 0, 5 * k)))
+    scene.export(tmp_path / "three.glb")
+    mesh = shape(tc.Mesh(tmp_path / "three.glb", units="mm")).mesh
+    assert mesh.body_count == 3
+    assert mesh.bounds.tolist() == [[0, 0, 0], [50, 20, 40]]
+    assert mesh.volume == pytest.approx(3 * BLOCK.volume)

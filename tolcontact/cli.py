@@ -94,6 +94,9 @@ def check(model: Model) -> None:
     """Say what is wrong with a model; run nothing."""
     program = build(load_model(model))
     typer.echo(program.nominal.assembly)
+    for part in program.nominal.parts:
+        size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
+        typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
     for pair in program.nominal.pairs:
         typer.echo(f"  contact {pair.name}: {len(pair.P_m)} contact points within reach")
     typer.echo("no faults found")

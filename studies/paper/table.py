@@ -1,50 +1,104 @@
-"""Table 1 of the paper, RA1: the paper's figures beside ours, and what the second order of rotations adds.
+"""Table 1 of the paper and the claims of its section 3.2, beside ours; as Markdown."""
 
-Usage: python studies/paper/table.py [--large N] [--figure FILE.png]
-"""
-
-import argparse
-import importlib.util
-from pathlib import Path
+from collections.abc import Iterator
 
 import numpy as np
+import xarray as xr
+from published import PAPER, SENSITIVE, STATES
 
 import tolcontact as tc
-from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import intervals
 
-HERE = Path(__file__).resolve().parent
-STATES = ("contactless", "contact")
-PAPER = {"contactless": (0.0632, 16.1173, 7.2158), "contact": (0.2734, 9.8223, 2.6799)}
+SEEDS = range(1, 21)
 FIGURES = {
     "mean": intervals.mean,
     "6 sigma": lambda x: intervals.standard_deviation(x, times=6),
     "variance": intervals.variance,
 }
-SEEDS = range(1, 21)
+NAMES = {"raw": "contactless", "corrected": "contact"}
 # RA1's A locators (x, y), the corners of the contact area, and the measured corner, in the assembly frame.
 BASE, TOP = [(5, 5), (95, 5), (50, 45)], [(55, 32.5), (95, 32.5), (75, 17.5)]
 CORNERS, MEASURED = [(50, 12.5), (100, 12.5), (50, 37.5), (100, 37.5)], (100, 12.5)
 
 
-def program(solver: str):
-    spec = importlib.util.spec_from_file_location("ra1", HERE.parents[1] / "models" / "ra1.py")
-    ra1 = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(ra1)
-    return tc.build(ra1.assembly(), solver=solver)
+def heights(run: xr.DataTree) -> np.ndarray:
+    """The first measure's deviation from nominal, (realization, state) [mm]."""
+    return run.measured.isel(measure=0).values - run.measure_nominal.values[0]
 
 
-def heights(built, samples: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """Measured heights (realization, state) [mm] and the first-order prediction of them, on the same draws."""
-    blocks = list(simulate_blocks(built, samples=samples, seed=seed))
-    labels = [f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]
-    columns = [built.nominal.locator_labels.index(label) for label in labels]
-    d = np.concatenate([block.deviations for block in blocks])[:, columns]
-    return np.concatenate([block.measured[..., 0] for block in blocks]), first_order(d)
+def table_1(name: str, runs: list[xr.DataTree], large: xr.DataTree, letter: xr.DataTree) -> Iterator[str]:
+    """One assembly: the paper's figures, ours of one seed and of all, of a large run, and of that with (11) to the letter."""
+    yield f"| {name} | paper | ours, seed 1 | {len(runs)} seeds, least to largest | N = {thousands(large)} | to the letter |"
+    yield "|---|---|---|---|---|---|"
+    samples = [heights(run) for run in runs]
+    many, literal = heights(large), heights(letter)
+    for k, state in enumerate(STATES):
+        for (figure, estimate), paper in zip(FIGURES.items(), PAPER[name].figures[state], strict=True):
+            scatter = [estimate(sample[:, k])[0] for sample in samples]
+            cells = [
+                f"{NAMES[state]} {figure}",
+                f"{paper:.4f}",
+                interval(estimate(samples[0][:, k]), 3),
+                f"{min(scatter):.3f} to {max(scatter):.3f}",
+                interval(estimate(many[:, k]), 4),
+                interval(estimate(literal[:, k]), 4),
+            ]
+            yield f"| {' | '.join(cells)} |"
 
 
-def first_order(d: np.ndarray) -> np.ndarray:
-    """The base's plane where the two faces cut each other within the contact area, else the top's own height."""
+def claims(runs: dict[str, list[xr.DataTree]], large: dict[str, xr.DataTree]) -> Iterator[str]:
+    """What the paper says of both assemblies in words."""
+    yield "| claim | paper | ours, N = 1000, 20 seeds | ours, large |"
+    yield "|---|---|---|---|"
+    for name, run in large.items():
+        yield from (f"| {name}: {' | '.join(cells)} |" for cells in measure_claims(name, runs[name], run))
+        yield from (f"| {name}: {' | '.join(cells)} |" for cells in field_claims(name, runs[name], run))
+
+
+def measure_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> Iterator[tuple[str, ...]]:
+    """Reduced spread and shifted mean of the measure."""
+    paper, x, samples = PAPER[name].figures, heights(large), [heights(run) for run in runs]
+    for column, figure in ((1, "6 sigma"), (2, "variance")):
+        power = column / 2
+        theirs = 1 - paper["corrected"][column] / paper["raw"][column]
+        each = [1 - (sample[:, 1].var() / sample[:, 0].var()) ** power for sample in samples]
+        ours = reduction(intervals.variance_ratio(x[:, 1], x[:, 0]), power)
+        yield f"{figure} reduced by", f"{theirs:.1%}", least_to_largest(each, percent=True), ours
+    theirs = paper["corrected"][0] - paper["raw"][0]
+    shift = [float((sample[:, 1] - sample[:, 0]).mean()) for sample in samples]
+    yield "mean shifted by [mm]", f"{theirs:+.4f}", least_to_largest(shift), interval(intervals.mean(x[:, 1] - x[:, 0]), 4)
+
+
+def field_claims(name: str, runs: list[xr.DataTree], large: xr.DataTree) -> Iterator[tuple[str, ...]]:
+    """Range of the varying part's field, and its reduced maximum."""
+    fields, most = [field_range(run, name) for run in runs], field_range(large, name)
+    scale = "{:g} to {:g} (scale)".format(*PAPER[name].scale)
+    for k, state in enumerate(STATES):
+        for j, extreme in enumerate(("least", "largest")):
+            what = f"{extreme} 6 sigma magnitude of {PAPER[name].part}, {NAMES[state]} [mm]"
+            yield what, scale, least_to_largest([field[k, j] for field in fields]), f"{most[k, j]:.3f}"
+    theirs = f"{SENSITIVE:.1%}" if name == "RA1" else "-"
+    each = [1 - field[1, 1] / field[0, 1] for field in fields]
+    yield "largest reduced by, anywhere", theirs, least_to_largest(each, percent=True), f"{1 - most[1, 1] / most[0, 1]:.1%}"
+    each = [at_the_spot(run, name) for run in runs]
+    yield "largest reduced by, at its spot", theirs, least_to_largest(each, percent=True), f"{at_the_spot(large, name):.1%}"
+
+
+def at_the_spot(run: xr.DataTree, name: str) -> float:
+    """By how much contact reduces the field where it is largest without contact."""
+    raw, corrected = run[f"field/{PAPER[name].part}"].six_sigma.sel(component="magnitude").values
+    return 1 - corrected[raw.argmax()] / raw.max()
+
+
+def field_range(run: xr.DataTree, name: str) -> np.ndarray:
+    """Least and largest 6 sigma of the displacement magnitude on the varying part, (state, 2) [mm]."""
+    field = run[f"field/{PAPER[name].part}"].six_sigma.sel(component="magnitude")
+    return np.stack([field.min("vertex").values, field.max("vertex").values], axis=1)
+
+
+def first_order(run: xr.DataTree) -> Iterator[str]:
+    """RA1 linear in the deviations: the base's plane where both faces cut each other in the contact area, else the top."""
+    d = run["sample"].deviation.sel(locator=[f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]).values
 
     def height(deviations, triangle, x):
         return deviations @ np.linalg.solve(np.vstack([np.transpose(triangle), np.ones(3)]), [*x, 1.0])
@@ -52,59 +106,37 @@ def first_order(d: np.ndarray) -> np.ndarray:
     base, top = d[:, :3], d[:, 3:]
     gap = np.min([height(top, TOP, x) - height(base, BASE, x) for x in CORNERS], axis=0)
     raw = height(top, TOP, MEASURED)
-    return np.stack([raw, np.where(gap < 0, height(base, BASE, MEASURED), raw)], axis=1)
-
-
-def row(name: str, values: object) -> str:
-    estimate, lower, upper = values
-    return f"{name:<34}{estimate:10.4f}  [{lower:.4f}, {upper:.4f}]"
-
-
-def draw_figure(x: np.ndarray, path: Path) -> None:
-    import matplotlib  # noqa: PLC0415
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt  # noqa: PLC0415
-
-    figure, axes = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
-    bins = np.linspace(-10, 10, 101)
-    for k, (state, colour) in enumerate(zip(STATES, ("#9aa7b5", "#c8443a"), strict=True)):
-        label = f"{state}: mean {x[:, k].mean():.2f} mm, 6 sigma {6 * x[:, k].std():.1f} mm"
-        axes.hist(x[:, k], bins, density=True, histtype="stepfilled", alpha=0.65, color=colour, label=label)
-    axes.set(xlabel="height of RA1's corner above nominal [mm]", ylabel="density [1/mm]", xlim=(-10, 10), ylim=(0, 0.36))
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="upper center")
-    figure.savefig(path, dpi=110)
-
-
-def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--large", type=int, default=100_000, help="realizations of the large run")
-    options.add_argument("--figure", type=Path, help="write the histogram of the large run")
-    chosen = options.parse_args()
-
-    qpoases = program("qpoases")
-    runs = [heights(qpoases, 1000, seed)[0] for seed in SEEDS]
-    large, linear = heights(program("daqp"), chosen.large, 1)
+    linear, x = np.stack([raw, np.where(gap < 0, height(base, BASE, MEASURED), raw)], axis=1), heights(run)
+    yield "| RA1, first order in the deviations | mean | variance | second order adds to the mean | variance / first order |"
+    yield "|---|---|---|---|---|"
     for k, state in enumerate(STATES):
-        print(f"\nRA1, {state}{'':<14}{'paper':>10}  {'ours, N = 1000, seed 1':<28}{'20 seeds: least to largest'}")
-        for (name, estimate), paper in zip(FIGURES.items(), PAPER[state], strict=True):
-            first = estimate(runs[0][:, k])
-            scatter = [estimate(run[:, k])[0] for run in runs]
-            ours = f"{first[0]:.3f} [{first[1]:.3f}, {first[2]:.3f}]"
-            print(f"  {name:<24}{paper:>14.4f}  {ours:<28}{min(scatter):.3f} to {max(scatter):.3f}")
-        print(row(f"  N = {chosen.large}: mean", intervals.mean(large[:, k])))
-        print(row("    6 sigma", FIGURES["6 sigma"](large[:, k])))
-        print(row("    variance", intervals.variance(large[:, k])))
-        print(row("    first order: mean", intervals.mean(linear[:, k])))
-        print(row("    first order: variance", intervals.variance(linear[:, k])))
-        print(row("    second order adds to the mean", intervals.mean(large[:, k] - linear[:, k])))
-        print(row("    variance / first order", intervals.variance_ratio(large[:, k], linear[:, k])))
-    print()
-    print(row("6 sigma, contact / contactless", np.sqrt(intervals.variance_ratio(large[:, 1], large[:, 0]))))
-    if chosen.figure:
-        draw_figure(large, chosen.figure)
+        estimates = [
+            intervals.mean(linear[:, k]),
+            intervals.variance(linear[:, k]),
+            intervals.mean(x[:, k] - linear[:, k]),
+            intervals.variance_ratio(x[:, k], linear[:, k]),
+        ]
+        yield f"| {NAMES[state]} | {' | '.join(interval(e, 4) for e in estimates)} |"
 
 
-if __name__ == "__main__":
-    main()
+def simulate(model: tc.Assembly, samples: int, seed: int, solver: str, **method: str) -> xr.DataTree:
+    return tc.run(model, samples=samples, seed=seed, solver=solver, method=tc.Method(**method))
+
+
+def interval(estimate: tuple[float, float, float], decimals: int) -> str:
+    value, lower, upper = (f"{figure:.{decimals}f}" for figure in estimate)
+    return f"{value} [{lower}, {upper}]"
+
+
+def reduction(ratio: tuple[float, float, float], power: float) -> str:
+    value, upper, lower = (f"{100 * (1 - r**power):.1f}" for r in ratio)
+    return f"{value}% [{lower}, {upper}]"
+
+
+def least_to_largest(values: list[float], *, percent: bool = False) -> str:
+    form = "{:.1%}" if percent else "{:.3f}"
+    return f"{form.format(min(values))} to {form.format(max(values))}"
+
+
+def thousands(run: xr.DataTree) -> str:
+    return f"{run.sizes['realization']:,}".replace(",", " ")

@@ -1,0 +1,46 @@
+"""Table 1 and figures 3 to 7 of the paper, from our simulation of its two assemblies.
+
+Usage: python studies/paper/reproduce.py [--large N] [--to FOLDER]
+"""
+
+import argparse
+import importlib.util
+from pathlib import Path
+
+import figures
+import table
+
+import tolcontact as tc
+
+HERE = Path(__file__).resolve().parent
+LETTER = {"regularization": "identity", "active_set": "initial"}  # (11) with eta I, and the points active at first only
+
+
+def model(name: str) -> tc.Assembly:
+    spec = importlib.util.spec_from_file_location(name, HERE.parents[1] / "models" / f"{name.lower()}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.assembly()
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--large", type=int, default=100_000, help="realizations of the large runs")
+    options.add_argument("--to", type=Path, default=HERE, help="folder of the pictures")
+    chosen = options.parse_args()
+
+    runs, large = {}, {}
+    for name in ("RA1", "RA2"):
+        program = tc.build(model(name))
+        runs[name] = [tc.run(program, samples=1000, seed=seed) for seed in table.SEEDS]
+        large[name] = table.simulate(model(name), chosen.large, 1, "daqp")
+        letter = table.simulate(model(name), chosen.large, 1, "daqp", **LETTER)
+        print(*table.table_1(name, runs[name], large[name], letter), "", sep="\n", flush=True)
+        del letter
+    print(*table.claims(runs, large), "", sep="\n")
+    print(*table.first_order(large["RA1"]), "", sep="\n")
+    figures.draw({name: of[0] for name, of in runs.items()}, large["RA1"], chosen.to)
+
+
+if __name__ == "__main__":
+    main()
