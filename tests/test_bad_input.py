@@ -87,6 +87,10 @@ MODELS = {
         {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('none.stl', units='inch'), fixed=True)\n"},
         ['part "extra"', "'inch'", "mm", "in"],
     ),
+    "units of a STEP file": (
+        {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('cut.step', units='in'), fixed=True)\n"},
+        ['part "extra"', "cut.step", "leave units out"],
+    ),
     "coincident faces, one of them inverted": (
         {
             "contact": GOOD["contact"]

@@ -203,10 +203,14 @@ def test_a_mesh_in_inches_taken_as_mm_is_warned_of_by_its_size(tmp_path):
     trimesh.creation.box(bounds=[[0, 0, 0], [8, 6, 1]]).export(path)  # inches
     with pytest.warns(UnitsWarning, match='part "lid".*10.05 mm across, but "table", which it touches, 424.4 mm.*255.3 mm'):
         discretize(lid_on(path))
+    wrongly = lid_on(path, "mm")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        discretize(lid_on(path, "mm"))
+        discretize(wrongly)
         assert discretize(lid_on(path, "in")).parts[0].mesh.extents[0] == pytest.approx(203.2)
+    wrongly.measure("far end", wrongly.parts[0].point(203.2, 0, 0), along="z")
+    with pytest.warns(UnitsWarning, match='10.05 mm across, but the point of measure "far end" lies 195.2 mm away from it'):
+        discretize(wrongly)
 
 
 def tessellated(n):

@@ -25,6 +25,7 @@ class Box:
         return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
 
 
+STEP = (".step", ".stp")
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
 
 
@@ -43,6 +44,8 @@ class Mesh:
     def faults(self) -> Iterator[str]:
         if self.units is not None and self.units not in UNITS:
             yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
+        if self.units is not None and isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP:
+            yield f'"{self.source}" is a STEP file, which says its units itself; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
             if not path.is_file():

@@ -12,7 +12,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.assembly import Mesh
-from tolcontact.assembly.geometry import UNITS
+from tolcontact.assembly.geometry import STEP, UNITS
 from tolcontact.discretization.fault import GeometryFault
 
 try:
@@ -23,13 +23,12 @@ except ImportError:  # an extra: only STEP files need it
 MAX_TRIANGLES = 2_000_000  # some 2 GiB on the way through
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
 BREP = "brep_index"  # cascadio's word: the B-rep face of each triangle
-_STEP = (".step", ".stp")
 _MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 
 
 @dataclass(frozen=True)
 class Source:
-    """A mesh as read, in mm. `unsure`: neither the file nor the model says in which units it counts."""
+    """A mesh as read, in mm. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
 
     mesh: trimesh.Trimesh
     unsure: bool
@@ -43,7 +42,7 @@ def read(geometry: Mesh) -> Source:
     source = geometry.source
     if isinstance(source, str | Path):
         path = Path(source)
-        loaded = _read_step(path) if path.suffix.lower() in _STEP else _read_mesh(path)
+        loaded = _read_step(path) if path.suffix.lower() in STEP else _read_mesh(path)
     else:
         loaded = trimesh.Trimesh(source.vertices, source.faces, process=False)
     if len(loaded.faces) > MAX_TRIANGLES:
@@ -53,7 +52,8 @@ def read(geometry: Mesh) -> Source:
         loaded.apply_scale(UNITS.get(said) or _factor(geometry, said))
     # The vertices of neighbouring triangles are one: rims, smooth normals and bodies are read from what they share.
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
-    return Source(loaded, unsure=said is None and isinstance(source, str | Path))
+    stated = geometry.units or not isinstance(source, str | Path) or Path(source).suffix.lower() in STEP
+    return Source(loaded, unsure=not stated)
 
 
 def _factor(geometry: Mesh, said: str) -> float:
@@ -67,7 +67,7 @@ def _factor(geometry: Mesh, said: str) -> float:
 
 def _read_mesh(path: Path) -> trimesh.Trimesh:
     if path.suffix.lower() not in _MESHES:
-        raise GeometryFault(f'"{path}": unknown kind of file; expected one of {", ".join((*_MESHES, *_STEP))}')
+        raise GeometryFault(f'"{path}": unknown kind of file; expected one of {", ".join((*_MESHES, *STEP))}')
     count = _announced(path)
     if count > MAX_TRIANGLES:
         raise GeometryFault(_too_many(path, count))

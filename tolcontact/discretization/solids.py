@@ -14,7 +14,7 @@ FIELD_STATIONS = 12
 
 @dataclass(frozen=True)
 class Shape:
-    """A part's surface. `unsure`: nobody says in which units its file counts; mm are taken."""
+    """A part's surface. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
 
     mesh: trimesh.Trimesh
     unsure: bool = False
