@@ -1,7 +1,6 @@
 """Counterparts of the paper's figures 3 to 7, drawn from an archive alone. Works without a display."""
 
 import json
-import os
 from pathlib import Path
 
 import matplotlib as mpl
@@ -15,8 +14,7 @@ from published import PAPER, STATES
 from scipy.spatial import Delaunay
 
 mpl.use("Agg")
-if "DISPLAY" not in os.environ:  # else VTK looks for one first, and complains
-    os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkOSOpenGLRenderWindow")
+pv.vtk_verbosity("off")  # without a display VTK says so, and goes on
 GREY, DARK, BLUE, RED, GREEN = "#c9ced6", "#8f98a5", "#2f6fb7", "#d03b30", "#1f8a5b"
 VIEWS = {"RA1": (-1.0, -2.4, 1.5), "RA2": (-1.5, -1.7, 1.5)}
 FINE = 2  # how many times finer a picture is drawn than saved
