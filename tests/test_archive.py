@@ -119,6 +119,16 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
 
 
+def test_faces_of_step_files_are_rebuilt_without_the_files():
+    method = tc.Method(resolution="exact", objective="all points")
+    first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=method)
+    rebuilt = tc.model_of(first)
+    second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=method)
+    for name in (*DATA, "carrying", "iterations"):
+        assert (first[name].values == second[name].values).all(), name
+    assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
+
+
 def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
     path, method = tmp_path / "table.nc", tc.Method(resolution="exact", objective="seating", search="iterated")
     first = tc.run(table(), samples=100, seed=2, solver="daqp", method=method, out=path).load()

@@ -77,7 +77,7 @@ MODELS = {
     ),
     "ten million triangles": (
         {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('huge.stl'), fixed=True)\n"},
-        ['part "extra"', "huge.stl", "10000000 triangles", "2000000"],
+        ['part "extra"', "huge.stl", "10000000 triangles", "1000000"],
     ),
     "unknown kind of mesh file": (
         {"top": GOOD["top"] + "    a.part('extra', tc.Mesh('model.py'), fixed=True)\n"},

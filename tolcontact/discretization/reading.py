@@ -20,7 +20,7 @@ try:
 except ImportError:  # an extra: only STEP files need it
     cascadio = None
 
-MAX_TRIANGLES = 2_000_000  # some 2 GiB on the way through
+MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
 BREP = "brep_index"  # cascadio's word: the B-rep face of each triangle
 _MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
