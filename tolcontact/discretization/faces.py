@@ -141,14 +141,10 @@ def _cut(own: Surface, box: Inside, margin: float) -> Surface:
 
 def _double(own: trimesh.Trimesh) -> int:
     """How many pairs of triangles have the same corners and opposite normals."""
-    corners = np.sort(own.faces, axis=1)
-    _, alike, times = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
-    doubled = times[alike.ravel()] > 1
-    if not doubled.any():
-        return 0
-    group, normals = alike.ravel()[doubled], np.asarray(own.face_normals)[doubled]
-    total = np.stack([np.bincount(group, normals[:, k], len(times)) for k in range(3)], axis=1)
-    return int((np.linalg.norm(total, axis=1) < times - 0.5)[times > 1].sum())
+    _, alike = trimesh.grouping.unique_rows(np.sort(own.faces, axis=1))
+    times = np.bincount(alike)
+    total = np.stack([np.bincount(alike, component) for component in np.asarray(own.face_normals).T], axis=1)
+    return int(((times > 1) & (np.linalg.norm(total, axis=1) < times - 0.5)).sum())
 
 
 def _span(mesh: trimesh.Trimesh) -> str:

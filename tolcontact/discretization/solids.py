@@ -6,6 +6,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.assembly import Box, Mesh
+from tolcontact.discretization.edges import edges
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.reading import read
 
@@ -41,9 +42,9 @@ def shape(geometry: Box | Mesh) -> Shape:
 
 def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     """Refuse what has no outside: neighbours turned against each other, and closed bodies turned inside out."""
-    edge, turn, times = _edges(mesh)
-    shared = times[edge] == 2
-    against = int(np.count_nonzero(np.abs(np.bincount(edge[shared], turn[shared], len(times))) == 2))
+    ends, edge, triangles = edges(mesh.faces)
+    sense = np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0)  # neighbours run along their common edge in opposite senses
+    against = int(np.count_nonzero((triangles == 2) & (np.abs(np.bincount(edge, sense)) == 2)))
     if against:
         raise GeometryFault(
             f"{geometry}: at {against} edges two neighbouring triangles are turned against each other, so its normals do "
@@ -52,7 +53,7 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     neighbours = np.asarray(mesh.face_adjacency)
     body = trimesh.graph.connected_component_labels(neighbours, node_count=len(mesh.faces))
     count = int(body.max()) + 1
-    is_open = np.bincount(body, (times[edge] == 1).reshape(-1, 3).any(axis=1), count) > 0
+    is_open = np.bincount(body, (triangles[edge] == 1).reshape(-1, 3).any(axis=1), count) > 0
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
     # A body whose normals point inward is a cavity where another one is around it, else a mistake.
@@ -65,17 +66,6 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
                 f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
-
-
-def _edges(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of each triangle's three edges, flat: which edge it is, the sense (+-1) in which it runs; and how often each edge occurs.
-
-    Degenerate triangles count, too: they carry the sense across from one neighbour to the other.
-    """
-    ends = np.asarray(mesh.edges, dtype=np.int64)
-    key = ends.min(axis=1) * len(mesh.vertices) + ends.max(axis=1)
-    _, edge, times = np.unique(key, return_inverse=True, return_counts=True)
-    return edge, np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0), times
 
 
 def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int) -> np.ndarray:

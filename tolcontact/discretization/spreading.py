@@ -3,6 +3,8 @@
 import numpy as np
 import trimesh
 
+from tolcontact.discretization.edges import rim
+
 CANDIDATES_PER_SPACING = 2.0
 CROWD = 50  # candidates for each point, from which on some are left out
 CORNER_ANGLE = np.radians(30.0)
@@ -37,11 +39,10 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
 
 def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
     """One of the points (point, 3) in each cube of side `cell` [mm], on the rim where one is."""
-    edges, counts = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_counts=True)
     inner = np.ones(len(points), dtype=bool)
-    inner[edges[counts == 1].ravel()] = False
+    inner[rim(faces).ravel()] = False
     points = points[np.argsort(inner, kind="stable")]
-    _, first = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_index=True)
+    first, _ = trimesh.grouping.unique_rows(np.floor(points / cell).astype(np.int64))
     return np.asarray(points[np.sort(first)])
 
 
@@ -56,8 +57,7 @@ def _apart(points: np.ndarray, least: float) -> list[np.ndarray]:
 
 def _rim_corners(surface: trimesh.Trimesh) -> np.ndarray:
     """Vertices (corner, 3) at which the rim of an open surface turns by more than CORNER_ANGLE."""
-    edges, counts = np.unique(np.sort(surface.edges, axis=1), axis=0, return_counts=True)
-    start, end = edges[counts == 1].T
+    start, end = rim(surface.faces).T
     along = surface.vertices[end] - surface.vertices[start]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     # Where the rim goes straight on, the unit vectors to both neighbours cancel.

@@ -7,6 +7,8 @@ import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
+from tolcontact.discretization.edges import on_rim
+
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they stand for one curved face
 
 
@@ -31,7 +33,7 @@ class Surface:
 
     @cached_property
     def _is_rim(self) -> np.ndarray:
-        return _rims(self.mesh)
+        return on_rim(self.mesh.faces)
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The triangle (point,) and the place on it (point, 3) [mm] that is nearest to each of `points` (point, 3) [mm]."""
@@ -86,10 +88,3 @@ def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:
     mean = facet.repeat(3, axis=0)
     mean += np.stack([np.bincount(here, turn[:, k], len(corner)) for k in range(3)], axis=1) / total[:, None]
     return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True)).reshape(-1, 3, 3)
-
-
-def _rims(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Which edges (face, edge) belong to one triangle only."""
-    edges = np.sort(mesh.edges, axis=1).reshape(-1, 2)
-    _, first, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
-    return np.asarray((counts[first.ravel()] == 1).reshape(-1, 3))
