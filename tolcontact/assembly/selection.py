@@ -11,8 +11,6 @@ from tolcontact.assembly.words import direction as _direction
 if TYPE_CHECKING:
     import numpy as np
 
-    from tolcontact.assembly.part import Part
-
     Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 FACE_ANGLE = math.radians(1.0)
@@ -104,7 +102,7 @@ class Inside:
 class Near:
     """Flat faces, and triangles of curved ones, that look at `part` and come within `within` [mm] of it nominally."""
 
-    part: "Part"
+    part: Any  # a Part, whose module stands above this one
     within: float
 
     def faults(self) -> Iterator[str]:
