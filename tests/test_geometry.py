@@ -112,6 +112,48 @@ def test_the_face_near_another_part_is_the_one_that_looks_at_it():
         patch(block.face(tc.Near(table, 0.1)), meshes)
 
 
+def disc(sections=24):
+    """A disc whose triangles touch the rim with one corner only, as those of CAD kernels do: an ear-cut polygon."""
+    angle = np.linspace(0, 2 * np.pi, sections, endpoint=False)
+    corners = np.c_[20 * np.cos(angle), 20 * np.sin(angle), 0 * angle]
+    ring, faces = list(range(sections)), []
+    while len(ring) > 2:  # every second corner is cut off, round after round
+        for k in range(0, len(ring) - 1, 2):
+            faces.append([ring[k], ring[k + 1], ring[(k + 2) % len(ring)]])
+        ring = ring[::2]
+    return trimesh.Trimesh(corners, faces, process=False)
+
+
+def test_points_beside_a_rim_do_not_count_whatever_the_triangles_are():
+    flat = face_of(disc())
+    assert flat.mesh.area == pytest.approx(12 * 400 * np.sin(2 * np.pi / 24))
+    points = np.c_[np.random.default_rng(0).uniform(-80, 80, (4000, 2)), np.full(4000, 0.1)]
+    _, _, over = flat.project(points)
+    inside = np.hypot(*points[:, :2].T) < 20 * np.cos(np.pi / 24)
+    assert over[inside].all()
+    assert not over[np.hypot(*points[:, :2].T) > 20.001].any()
+
+
+@pytest.mark.parametrize("at", [(0, 0), (333, 217), (701.3, 487.9)])
+def test_a_small_part_is_near_a_large_one_wherever_it_stands(at):
+    a = tc.Assembly("pads")
+    plate = a.part("plate", tc.Box(1000, 700, 2), fixed=True)
+    pad = a.part("pad", tc.Box(4, 4, 2), at=(*at, 2.05))
+    meshes = {part: shape(part.geometry).mesh for part in (plate, pad)}
+    assert patch(plate.face(tc.Near(pad, 0.1)), meshes).mesh.area == pytest.approx(700_000)
+    assert patch(pad.face(tc.Near(plate, 0.1)), meshes).mesh.area == pytest.approx(16)
+
+
+def test_what_is_near_on_a_large_barrel_is_not_the_whole_barrel():
+    a = tc.Assembly("barrel")
+    barrel = a.part("barrel", tc.Mesh(trimesh.creation.cylinder(200, 10, sections=700)), fixed=True)
+    block = a.part("block", tc.Box(10, 10, 10), at=(200.1, -5, -5))
+    meshes = {part: shape(part.geometry).mesh for part in (barrel, block)}
+    near = patch(barrel.face(tc.Near(block, 0.5)), meshes).mesh
+    assert near.bounds[0, 0] > 199
+    assert 100 < near.area < 400
+
+
 def body(shift=0.0, invert=False, size=1.0):
     made = BLOCK.copy().apply_scale(size).apply_translation((shift, 0, 0))
     if invert:
@@ -147,6 +189,15 @@ ACCEPTED = {
     "corners not merged": trimesh.Trimesh(BLOCK.triangles.reshape(-1, 3), np.arange(36).reshape(-1, 3), process=False),
 }
 REFUSED = {
+    "vertices that are not": (trimesh.Trimesh(np.eye(3), [[0, 1, 5]], process=False), "vertices that it does not have"),
+    "inside out beside another": (
+        trimesh.boolean.difference(
+            [trimesh.creation.box(bounds=[[0] * 3, [30] * 3]), trimesh.creation.box(bounds=[[2, 2, -1], [31] * 3])],
+            engine="manifold",
+        )
+        + body(invert=True, size=0.4).apply_translation((12, 12, 5)),
+        "body 2 of 2 is inside out",
+    ),
     "inside out": (body(invert=True), "it is inside out"),
     "one body inside out": (body() + body(20, invert=True), "body 2 of 2 is inside out"),
     "neighbours turned against each other": (twisted(), "3 edges two neighbouring triangles"),
@@ -186,6 +237,33 @@ def test_ten_million_triangles_are_refused_with_their_number_before_they_are_rea
     (tmp_path / "huge.ply").write_bytes(b"ply\nformat ascii 1.0\nelement vertex 3\nelement face 10000000\nend_header\n")
     with pytest.raises(GeometryFault, match="10000000 triangles"):
         shape(tc.Mesh(tmp_path / "huge.ply"))
+
+
+@pytest.mark.parametrize("suffix", ["stl", "ply"])
+def test_files_with_corners_that_are_no_numbers_are_refused(suffix, tmp_path):
+    bad = trimesh.Trimesh(BLOCK.vertices * np.where(np.arange(8) == 3, np.nan, 1)[:, None], BLOCK.faces, process=False)
+    bad.export(tmp_path / f"bad.{suffix}")
+    with pytest.raises(GeometryFault, match="not finite"):
+        shape(tc.Mesh(tmp_path / f"bad.{suffix}"))
+
+
+def test_words_in_a_ply_header_are_not_its_counts(tmp_path):
+    text = "ply\nformat ascii 1.0\ncomment front face 2000000 x\nelement vertex 3\nproperty float x\nproperty float y\n"
+    text += (
+        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n"
+    )
+    (tmp_path / "one.ply").write_text(text)
+    assert len(shape(tc.Mesh(tmp_path / "one.ply")).mesh.faces) == 1
+
+
+def test_a_mask_is_not_taken_for_indices():
+    part = tc.Assembly("mask").part("part", tc.Mesh(BLOCK))
+    mask = BLOCK.face_normals[:, 2] > 0.9
+    assert "np.flatnonzero(mask)" in next(part.face(mask.tolist()).faults())
+    assert "np.flatnonzero(mask)" in next(part.face(mask).faults())
+    assert not list(part.face(np.flatnonzero(mask)).faults())
+    with pytest.raises(TypeError, match="cannot be chosen by 5"):
+        part.face(5)
 
 
 def lid_on(path, units=None):

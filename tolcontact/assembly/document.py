@@ -31,7 +31,7 @@ def to_document(
         boxes = [[s.lower, s.upper] for s in face.selections if isinstance(s, Inside)]
         rest = [s for s in face.selections if not isinstance(s, Inside)]
         only = rest[0] if len(rest) == 1 else None
-        plain = isinstance(only, Facing) and only == Facing(str(only.direction))
+        plain = isinstance(only, Facing) and isinstance(only.direction, str) and only == Facing(only.direction)
         chosen = {"direction": str(only)} if plain else {"triangles": triangles(face)}
         return {"part": face.part.name, **chosen, "inside": boxes}
 

@@ -1,10 +1,11 @@
 """Shapes of parts, in the part's own frame."""
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+from tolcontact.assembly.words import is_length
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Box:
     def faults(self) -> Iterator[str]:
         for axis in "xyz":
             size = getattr(self, axis)
-            if not (isinstance(size, int | float) and math.isfinite(size) and size > 0):
+            if not (is_length(size) and size > 0):
                 yield f"box size along {axis} is {size!r}; expected a length in mm above 0"
 
     def __str__(self) -> str:
@@ -35,7 +36,8 @@ class Mesh:
 
     `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
     file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
-    2 um, and keep their boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`.
+    2 um and what single precision leaves of their coordinates, and keep their boundary representation for `tc.Brep`;
+    that needs the extra `tolcontact[step]`.
     """
 
     source: Any

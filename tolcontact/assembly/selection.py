@@ -56,8 +56,11 @@ class Triangles:
     indices: tuple[int, ...]
 
     def faults(self) -> Iterator[str]:
-        if not all(isinstance(index, int) or hasattr(index, "__index__") for index in self.indices):
-            yield "triangle indices must be whole numbers; for a direction that is no axis use tc.Facing((x, y, z))"
+        if not all(hasattr(index, "__index__") and not isinstance(index, bool) for index in self.indices):
+            yield (
+                "triangle indices must be whole numbers; for a direction that is no axis use tc.Facing((x, y, z)), for a mask "
+                "a function of centres and normals, or np.flatnonzero(mask)"
+            )
 
     def __str__(self) -> str:
         return f"({len(self.indices)} triangles)"
@@ -138,4 +141,10 @@ def criterion(said: Any) -> Selection:
         return said
     if callable(said):
         return Picked(said)
-    return Triangles(tuple(said))
+    try:
+        return Triangles(tuple(said))
+    except TypeError as error:
+        raise TypeError(
+            f'a face cannot be chosen by {said!r}; expected a direction ("+x" to "-z"), a criterion such as tc.Facing(...), '
+            "triangle indices, or a function of centres and normals"
+        ) from error

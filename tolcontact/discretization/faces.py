@@ -13,6 +13,7 @@ from tolcontact.discretization.surface import Surface
 
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
+FLAT = 2e-4  # angle [rad] between neighbouring triangles of one flat face: what single precision leaves of it
 LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that look at each other
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box counts as inside
 
@@ -104,22 +105,28 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
-    mesh = meshes[face.part]
-    step = max(selection.within, mesh.scale / NEAR_STATIONS)
-    vertices, faces, origin = trimesh.remesh.subdivide_to_size(
-        mesh.vertices, mesh.faces, max_edge=step, max_iter=30, return_index=True
-    )
-    fine = trimesh.Trimesh(vertices, faces, process=False)
-    R_W, R_O = (Rotation.from_rotvec(part.rotation).as_matrix() for part in (face.part, selection.part))
-    spots = (fine.triangles_center @ R_W.T + np.array(face.part.at) - np.array(selection.part.at)) @ R_O
-    nearest, normals, _ = Surface(meshes[selection.part]).project(spots)
-    looks_at = ((fine.face_normals @ R_W.T @ R_O) * normals).sum(axis=1) < LOOKS_AT
-    near = looks_at & (np.linalg.norm(spots - nearest, axis=1) <= selection.within)
-    chosen = np.zeros(len(mesh.faces), dtype=bool)
-    chosen[origin[near]] = True
-    for flat in mesh.facets:  # a flat face is one thing, however it is cut into triangles
-        chosen[flat] = chosen[flat].any()
-    return chosen
+    own, other = (_in_place(part, meshes[part]) for part in (face.part, selection.part))
+    chosen = np.zeros(len(own.faces), dtype=bool)
+    # Seen from both sides, since either part may be small beside the other.
+    for seen, by in ((own, other), (other, own)):
+        step = max(selection.within, seen.scale / NEAR_STATIONS)
+        vertices, faces, origin = trimesh.remesh.subdivide_to_size(
+            seen.vertices, seen.faces, max_edge=step, max_iter=30, return_index=True
+        )
+        fine = trimesh.Trimesh(vertices, faces, process=False)
+        hit, nearest = Surface(by).nearest(fine.triangles_center)
+        looks_at = (fine.face_normals * np.asarray(by.face_normals)[hit]).sum(axis=1) < LOOKS_AT
+        near = looks_at & (np.linalg.norm(fine.triangles_center - nearest, axis=1) <= selection.within)
+        chosen[(origin if seen is own else hit)[near]] = True
+    # A flat face is one thing, however it is cut into triangles.
+    flat = np.asarray(own.face_adjacency)[np.asarray(own.face_adjacency_angles) < FLAT]
+    face_of = trimesh.graph.connected_component_labels(flat, node_count=len(own.faces))
+    return np.asarray(np.isin(face_of, face_of[chosen]))
+
+
+def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    R = Rotation.from_rotvec(part.rotation).as_matrix()
+    return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + np.array(part.at), mesh.faces, process=False)
 
 
 def _cut(own: Surface, box: Inside, margin: float) -> Surface:

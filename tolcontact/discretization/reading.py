@@ -1,7 +1,9 @@
 """Files of shapes to triangle meshes in mm."""
 
 import contextlib
+import math
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -45,6 +47,10 @@ def read(geometry: Mesh) -> Source:
         loaded = _read_step(path) if path.suffix.lower() in STEP else _read_mesh(path)
     else:
         loaded = trimesh.Trimesh(source.vertices, source.faces, process=False)
+        if len(loaded.faces) and not 0 <= loaded.faces.min() <= loaded.faces.max() < len(loaded.vertices):
+            raise GeometryFault(
+                f"{geometry}: its triangles name vertices that it does not have ({len(loaded.vertices)} in all)"
+            )
     if len(loaded.faces) > MAX_TRIANGLES:
         raise GeometryFault(_too_many(geometry, len(loaded.faces)))
     said = geometry.units or getattr(loaded if isinstance(source, str | Path) else source, "units", None)
@@ -72,7 +78,7 @@ def _read_mesh(path: Path) -> trimesh.Trimesh:
     if count > MAX_TRIANGLES:
         raise GeometryFault(_too_many(path, count))
     try:
-        loaded = trimesh.load_mesh(path)
+        loaded = trimesh.load_mesh(path, process=False)
     except Exception as error:  # trimesh's readers raise whatever their format's parser raises
         raise GeometryFault(
             f'"{path}" cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB'
@@ -86,9 +92,9 @@ def _announced(path: Path) -> int:
         head = file.read(10_000)
         if path.suffix.lower() == ".stl" and path.stat().st_size == 84 + 50 * int.from_bytes(head[80:84], "little"):
             return int.from_bytes(head[80:84], "little")
-        words = head.split()
-        if path.suffix.lower() == ".ply" and b"face" in words[:-1]:
-            return int(words[words.index(b"face") + 1])
+        if path.suffix.lower() == ".ply":
+            said = re.search(rb"^element face (\d+)", head, re.MULTILINE)
+            return int(said[1]) if said else 0
         file.seek(0)
         mark = {".stl": b"facet", ".obj": b"\nf "}.get(path.suffix.lower())
         if mark is None:
@@ -109,9 +115,13 @@ def _read_step(path: Path) -> trimesh.Trimesh:
         if failed or not converted.is_file():
             raise GeometryFault(f'"{path}" cannot be read as STEP: it is cut off, or not STEP at all; export it again')
         mesh = _one(trimesh.load_scene(converted))
+    mesh.apply_scale(UNITS["m"])
+    mesh.units = "mm"
     # It has passed through single precision. Rounding to what that resolves brings round lengths back, and flat faces.
-    resolved = np.spacing(np.float32(np.abs(mesh.vertices).max(initial=0)))
-    mesh.vertices = np.round(mesh.vertices, -int(np.ceil(np.log10(resolved))))
+    resolved = UNITS["m"] * float(np.spacing(np.float32(np.abs(mesh.vertices).max(initial=0) / UNITS["m"])))
+    power = 10.0 ** math.floor(math.log10(resolved))
+    step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolved)
+    mesh.vertices = np.round(np.round(mesh.vertices / step) * step, 12)
     return mesh
 
 
@@ -149,7 +159,7 @@ def _one(loaded: Any) -> trimesh.Trimesh:
         numbers += int(brep.max(initial=-1)) + 1
     mesh = trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
     mesh.units = loaded.units
-    if any(BREP in body.face_attributes for body in loaded.geometry.values()):
+    if any(BREP in getattr(body, "face_attributes", {}) for body in loaded.geometry.values()):
         mesh.face_attributes[BREP] = np.concatenate(breps)
     return mesh
 

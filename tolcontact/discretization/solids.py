@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import igl
 import numpy as np
 import trimesh
 
@@ -59,13 +60,19 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     # A body whose normals point inward is a cavity where another one is around it, else a mistake.
     lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
     for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
-        around = (volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1)
-        if not around.any():
+        around = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))
+        if not any(_encloses(mesh, body == other, mesh.triangles[body == k][0, :1]) for other in around):
             which = "it is" if count == 1 else f"its body {k + 1} of {count} is"
             raise GeometryFault(
                 f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
+
+
+def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bool:
+    """Whether the body of some `faces` (face,) is around `point` (1, 3)."""
+    turns = igl.winding_number(np.array(mesh.vertices), np.array(mesh.faces[faces], dtype=np.int64), np.array(point))
+    return bool(np.abs(turns).max() > 0.5)
 
 
 def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int) -> np.ndarray:

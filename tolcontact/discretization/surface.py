@@ -7,7 +7,7 @@ import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
-from tolcontact.discretization.edges import on_rim
+from tolcontact.discretization.edges import on_rim, rim
 
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they stand for one curved face
 
@@ -32,8 +32,14 @@ class Surface:
         return tree
 
     @cached_property
-    def _is_rim(self) -> np.ndarray:
-        return on_rim(self.mesh.faces)
+    def _rim_edges(self) -> np.ndarray:
+        """Which edges (face, edge) are on the rim."""
+        return on_rim(self._faces)
+
+    @cached_property
+    def _rim_corners(self) -> np.ndarray:
+        """Which corners (face, corner) are on the rim."""
+        return np.isin(self._faces, rim(self._faces))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The triangle (point,) and the place on it (point, 3) [mm] that is nearest to each of `points` (point, 3) [mm]."""
@@ -66,9 +72,12 @@ class Surface:
         facet = np.asarray(self.mesh.face_normals)[triangle]
         offset = points - nearest
         sideways = np.linalg.norm(offset - (offset * facet).sum(axis=1, keepdims=True) * facet, axis=1)
-        # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero.
-        on_edge = np.abs(self._barycentric(triangle, nearest)[:, [2, 0, 1]]) < 1e-9
-        overhangs = (sideways > max(margin, 1e-6 * self.mesh.scale)) & (on_edge & self._is_rim[triangle]).any(axis=1)
+        coordinates = self._barycentric(triangle, nearest)
+        # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero. A
+        # triangle may also touch the rim with a corner only.
+        at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]
+        at_rim |= (coordinates > 1 - 1e-9) & self._rim_corners[triangle]
+        overhangs = (sideways > max(margin, 1e-6 * self.mesh.scale)) & at_rim.any(axis=1)
         return nearest, self.normals(triangle, nearest), ~overhangs
 
 
