@@ -14,7 +14,7 @@ ROOMS = {
     "matplotlib": ("report/",),
     "plotly": ("report/",),
     "pyvista": ("report/",),
-    "numba": (),
+    "numba": ("simulation/kernel.py",),
     "netCDF4": ("archive.py",),
     "typer": ("cli.py",),
     "trimesh": ("discretization/",),

@@ -12,7 +12,7 @@ import numpy as np
 
 from tolcontact.simulation.linear_step import LinearStep
 from tolcontact.simulation.resolution import Resolution, Task
-from tolcontact.simulation.scan import PairScan, gaps_of, pair_scan
+from tolcontact.simulation.scan import PairScan, Survey, least_gaps, pair_scan
 from tolcontact.simulation.search import placed, reach, search
 from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ContactGroup, Program
@@ -60,11 +60,10 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         scans = self._found(relative)
-        gaps = gaps_of(scans, relative, deviations)
-        inside = np.any([gap.min(axis=1) < -self._step.tolerance for gap in gaps], axis=0)
+        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(scans)]
+        least = np.stack([survey.least for survey in surveys], axis=1)
+        inside = (least < -self._step.tolerance).any(axis=1)
         rows = np.arange(len(poses)) if self._method.objective == "seating" else np.flatnonzero(inside)
-        active = [gap < self._method.activity for gap in gaps]
-        least = np.stack([gap.min(axis=1) for gap in gaps], axis=1)
         result = Resolution(
             rows=rows,
             poses=poses[rows][:, self.parts],
@@ -75,9 +74,14 @@ class ContactResolver:
             multipliers=np.zeros((len(rows), len(scans), self._slots)),
             slots=[Slots.empty(len(rows), self._slots) for _ in scans],
             gap_min=np.stack([least, least], axis=1),
-            active=np.stack([on.sum(axis=1) for on in active], axis=1),
+            active=np.stack([survey.active for survey in surveys], axis=1),
         )
-        task = self._task(result.poses.copy(), deviations[rows], [on[rows] for on in active])
+        task = Task(
+            raw=result.poses.copy(),
+            raw_relative=result.relative.copy(),
+            deviations=deviations[rows],
+            moments=np.concatenate([self._moments(*each)[rows] for each in zip(self._scans, surveys, strict=True)], axis=1),
+        )
         scans = [scan.take(rows) for scan in scans]
         self._repeat(task, result, scans, np.arange(len(rows)))
         if self._method.search == "iterated":
@@ -88,7 +92,7 @@ class ContactResolver:
             result.residual[adrift], result.slack[adrift], result.multipliers[adrift] = np.inf, 0, 0
             result.poses[adrift], result.relative[adrift] = task.raw[adrift], relative[rows][adrift]
             scans = self._found(result.relative) if self._method.search == "iterated" else scans
-        least = np.stack([g.min(axis=1) for g in gaps_of(scans, result.relative, task.deviations)], axis=1)
+        least = least_gaps(scans, result.relative, task.deviations)
         result.gap_min[rows, 1] = least
         if self._method.resolution == "exact" and self._method.active_set == "closed":
             # The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts.
@@ -102,23 +106,14 @@ class ContactResolver:
         each = zip(self._scans, self._surfaces, self._reaches, strict=True)
         return [search(scan, surface, relative[:, k], margin) for k, (scan, surface, margin) in enumerate(each)]
 
-    def _task(self, raw: np.ndarray, deviations: np.ndarray, active: list[np.ndarray]) -> Task:
-        counts = [self._counts(scan, on) for scan, on in zip(self._scans, active, strict=True)]
-        return Task(
-            raw=raw,
-            deviations=deviations,
-            moments=np.concatenate([scan.moments(on) for scan, on in zip(self._scans, counts, strict=True)], axis=1),
-            may_carry=[
-                np.ones_like(on) if self._method.active_set == "closed" or scan.locators is not None else on
-                for scan, on in zip(self._scans, active, strict=True)
-            ],
-        )
-
-    def _counts(self, scan: PairScan, active: np.ndarray) -> np.ndarray:
-        """Which points (row, point) count in the objective. Supports are not among the paper's contact points."""
-        if scan.locators is not None:
-            return np.zeros_like(active)
-        return np.ones_like(active) if self._method.objective == "all points" else active
+    def _moments(self, scan: PairScan, survey: Survey) -> np.ndarray:
+        """Moments (realization, side, moment) of the points that count in the objective."""
+        if scan.locators is not None:  # supports are not among the paper's contact points
+            return np.zeros_like(survey.moments)
+        if self._method.objective != "all points":
+            return survey.moments
+        every = np.array([table.sum(axis=1) for table in scan.tables]).reshape(survey.moments.shape[1:])
+        return np.broadcast_to(every, survey.moments.shape)
 
     def _settle(self, task: Task, result: Resolution) -> list[PairScan]:
         """Search and resolve again until the poses stay; returns the scans of the last search."""
@@ -165,8 +160,7 @@ class ContactResolver:
         self, best: tuple[np.ndarray, ...], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
     ) -> None:
         """Put into `best` (poses, relative, true penetration of each pair) what is better than it."""
-        gaps = gaps_of(scans, result.relative[rows], task.deviations[rows])
-        inside = np.stack([np.maximum(-gap.min(axis=1), 0) for gap in gaps], axis=1)
+        inside = np.maximum(-least_gaps(scans, result.relative[rows], task.deviations[rows]), 0)
         better = inside.max(axis=1) < best[-1][rows].max(axis=1)
         for kept, new in zip(best, (result.poses[rows], result.relative[rows], inside), strict=True):
             kept[rows[better]] = new[better]

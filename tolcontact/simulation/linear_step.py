@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tolcontact.simulation.resolution import Resolution, Task
-from tolcontact.simulation.scan import PairScan, gaps_of
+from tolcontact.simulation.scan import PairScan
 from tolcontact.simulation.slots import Slots
 from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
@@ -25,6 +25,7 @@ class LinearStep:
         self._solve = group.solve
         self._parts = len(group.group.parts)
         self._accuracy = program.plugin.accuracy
+        self._method = program.method
         self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
 
     def take(
@@ -43,7 +44,7 @@ class LinearStep:
         (2, row) [mm]: that of the largest increment, and in the norm of the objective.
         """
         now = result.poses[moving]
-        gaps = gaps_of(scans, result.relative[moving], task.deviations[moving])
+        seen = self._deepest(task, scans, moving, result.relative[moving])
         before = [s.take(moving) for s in result.slots]
         bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, before, strict=True)], axis=1)
         slots = list(before)
@@ -51,11 +52,10 @@ class LinearStep:
         open_ = np.arange(len(moving))
         for number in range(ROUNDS):
             more = np.full(len(open_), number == 0)
-            for k, scan in enumerate(scans):
-                candidates = np.where(task.may_carry[k][moving[open_]], gaps[k], np.inf)
-                slots[k], grown = slots[k].with_deepest(*scan.deepest(candidates), self.tolerance)
+            for k, (points, depth) in enumerate(seen):
+                slots[k], grown = slots[k].with_deepest(points, depth, self.tolerance)
                 more |= grown
-            open_, gaps = open_[more], [gap[more] for gap in gaps]
+            open_ = open_[more]
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
@@ -66,7 +66,7 @@ class LinearStep:
                 "bend": bend[open_],
                 "reactions": np.concatenate(reactions, axis=1),
             }
-            gaps, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
+            seen, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
         result.iterations[moving] += 1
         return step
 
@@ -79,8 +79,11 @@ class LinearStep:
         now: np.ndarray,
         slots: list[Slots],
         curved: dict[str, np.ndarray],
-    ) -> tuple[list[np.ndarray], list[Slots], np.ndarray]:
-        """Solve the QPs of `rows` about the poses `now`, note the answers, return linearized gaps, slots and step sizes."""
+    ) -> tuple[list[tuple[np.ndarray, np.ndarray]], list[Slots], np.ndarray]:
+        """Solve the QPs of `rows` about the poses `now`, note the answers.
+
+        Returns for each pair the deepest points and by how much they are deeper than the slack, slots, and step sizes.
+        """
         deviations = task.deviations[rows]
         held = zip(*(scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)), strict=True)
         P_m, P_r, n_r = (np.concatenate(arrays, axis=1) for arrays in held)
@@ -96,11 +99,11 @@ class LinearStep:
             filled=np.concatenate([s.filled for s in slots], axis=1),
         )
         linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
-        gaps = gaps_of(scans, linearized, deviations)
-        inside = [np.where(task.may_carry[k][rows], -gap, -np.inf).max(axis=1) for k, gap in enumerate(gaps)]
+        seen = self._deepest(task, scans, rows, linearized)
+        inside = np.stack([depth.max(axis=1) for _, depth in seen], axis=1)
         slack = np.maximum(answer["slack"], 0)
         # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
-        residual = np.maximum(_residual(answer), np.max(np.transpose(inside) - slack, axis=1))
+        residual = np.maximum(_residual(answer), np.max(inside - slack, axis=1))
         solved = np.isfinite(residual)
         result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), self._parts, ENTRIES)[solved]
         result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
@@ -111,8 +114,20 @@ class LinearStep:
         slots = [s.carrying(m) for s, m in zip(slots, np.split(multipliers, len(slots), axis=1), strict=True)]
         for kept, s in zip(result.slots, slots, strict=True):
             kept.put(rows, s)
-        gaps = [np.where(solved[:, None], gap + slack[:, k, None], np.inf) for k, gap in enumerate(gaps)]
-        return gaps, slots, np.where(solved, answer["step"].T, 0.0)
+        deeper = [np.where(solved[:, None], depth - slack[:, k, None], -np.inf) for k, (_, depth) in enumerate(seen)]
+        seen = [(points, depth) for (points, _), depth in zip(seen, deeper, strict=True)]
+        return seen, slots, np.where(solved, answer["step"].T, 0.0)
+
+    def _deepest(
+        self, task: Task, scans: Sequence[PairScan], rows: np.ndarray, relative: np.ndarray
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of each pair the deepest points that may carry, (row, cluster), and their depth, at X_RM (row, pair, 12)."""
+        found = []
+        for k, scan in enumerate(scans):
+            limited = self._method.active_set == "initial" and scan.locators is None
+            raw = task.raw_relative[rows, k] if limited else None
+            found.append(scan.deepest(relative[:, k], task.deviations[rows], raw, self._method.activity))
+        return found
 
     def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
         """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.

@@ -13,16 +13,16 @@ CARRIES = 1e-4
 class Task:
     """What stays the same while the realizations `rows` are resolved; first dimension of the arrays: the row.
 
-    raw          (row, part of the group, 12)
-    deviations   (row, locator) [mm]
-    moments      (row, side, moment) of the points that count in the objective
-    may_carry    (row, point) for each pair of the group
+    raw            (row, part of the group, 12)
+    deviations     (row, locator) [mm]
+    raw_relative   (row, pair of the group, 12), X_RM at the raw poses
+    moments        (row, side, moment) of the points that count in the objective
     """
 
     raw: np.ndarray
+    raw_relative: np.ndarray
     deviations: np.ndarray
     moments: np.ndarray
-    may_carry: list[np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,6 +11,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from tolcontact.discretization import ContactPoints
+from tolcontact.simulation import kernel
+from tolcontact.symbolic import ENTRIES, MOMENTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +54,66 @@ class PairScan:
         height = np.take_along_axis(deviations, self.locators[points], axis=1)
         return P_m, P_r + height[..., None] * n_r, n_r
 
-    def moments(self, active: np.ndarray) -> np.ndarray:
-        """Moments (realization, side, moment) of the points where `active` (realization, point)."""
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
+        """What there is to see at X_RM (realization, 12): see Survey."""
+        gaps = self.gaps(relative, deviations)
+        active = gaps < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
-        return np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, 0))
+        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
+        return Survey(gaps.min(axis=1), active.sum(axis=1), moments)
 
-    def deepest(self, gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The deepest point of each cluster and its depth, both (realization, cluster); depth [mm], > 0 inside."""
+    def deepest(
+        self, relative: np.ndarray, deviations: np.ndarray, raw: np.ndarray | None = None, activity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The deepest point of each cluster and its depth, both (realization, cluster); depth [mm], > 0 inside.
+
+        Where `raw` X_RM (realization, 12) are given, only points whose gap is below `activity` there may carry.
+        """
+        gaps = self.gaps(relative, deviations)
+        if raw is not None:
+            gaps = np.where(self.gaps(raw, deviations) < activity, gaps, np.inf)
         points = np.stack([gaps[:, c].argmin(axis=1) + c.start for c in self.clusters], axis=1)
         return points, -np.take_along_axis(gaps, points, axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Survey:
+    """What a pass over the points of a pair finds in each realization.
+
+    least      (realization,) least gap [mm]
+    active     (realization,) number of points whose gap is below the activity
+    moments    (realization, side, moment) of those
+    """
+
+    least: np.ndarray
+    active: np.ndarray
+    moments: np.ndarray
+
+
+class CompiledScan(PairScan):
+    """A scan whose passes are compiled; PairScan is the same in NumPy."""
+
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
+        count = len(relative)
+        found = Survey(np.empty(count), np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS)))
+        tables = np.array(self.tables).reshape(len(self.tables), MOMENTS, len(self.P_m))
+        passed = self._arrays(relative, deviations)
+        kernel.survey(self.matrix, tables, *passed, activity, found.least, found.active, found.moments)
+        return found
+
+    def deepest(
+        self, relative: np.ndarray, deviations: np.ndarray, raw: np.ndarray | None = None, activity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        starts = np.array([*(c.start for c in self.clusters), len(self.P_m)])
+        points = np.empty((len(relative), len(self.clusters)), dtype=np.int64)
+        gaps = np.empty(points.shape)
+        before = np.empty((0, ENTRIES)) if raw is None else np.ascontiguousarray(raw)
+        kernel.deepest(self.matrix, starts, *self._arrays(relative, deviations), before, activity, points, gaps)
+        return points, -gaps
+
+    def _arrays(self, relative: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        locators = np.empty(0, dtype=np.int64) if self.locators is None else np.asarray(self.locators, dtype=np.int64)
+        return np.ascontiguousarray(relative), np.ascontiguousarray(deviations), locators
 
 
 def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray], clusters: int) -> PairScan:
@@ -69,7 +122,7 @@ def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray],
     order = np.argsort(label, kind="stable")
     ends = np.cumsum(np.bincount(label))
     slices = tuple(slice(int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
-    return PairScan(
+    return CompiledScan(
         matrix=np.ascontiguousarray(matrix[:, order]),
         tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
         P_m=pair.P_m[order],
@@ -92,6 +145,7 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
     return np.asarray(cKDTree(points[seeds]).query(points)[1])
 
 
-def gaps_of(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray]:
-    """Gaps (row, point) [mm] of each pair at X_RM (row, pair, 12)."""
-    return [scan.gaps(relative[:, k], deviations) for k, scan in enumerate(scans)]
+def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    """Least gap (row, pair) [mm] of each pair at X_RM (row, pair, 12)."""
+    each = [scan.survey(relative[:, k], deviations, -np.inf).least for k, scan in enumerate(scans)]
+    return np.stack(each, axis=1)
