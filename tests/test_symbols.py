@@ -76,7 +76,7 @@ def test_corrected_pose_moves_points_by_the_increment_to_first_order(update, is_
 
 def placed(assembly, deviations):
     program = tc.build(assembly)
-    poses, _ = program.place(deviations=np.atleast_2d(deviations))
+    poses = program.place(deviations=np.atleast_2d(deviations))
     return program, poses["poses"].reshape(len(np.atleast_2d(deviations)), -1, 12)
 
 
@@ -121,8 +121,8 @@ def test_measures_and_a_users_own_expression():
     a.measure("step", base.point(100, 0, 10), to=top.point(50, 0, 0), along="z")
     program = tc.build(a)
     assert program.nominal_measures == pytest.approx([0, 0, np.linalg.norm([50, 12.5, 10]), 0])
-    poses, _ = program.place(deviations=RNG.normal(size=(5, 12)))
-    values, _ = program.observe(poses=poses["poses"])
+    poses = program.place(deviations=RNG.normal(size=(5, 12)))
+    values = program.observe(poses=poses["poses"])
     for row, pose in zip(values["measured"], poses["poses"].reshape(5, 2, 12), strict=True):
         (R_b, t_b), (R_t, t_t) = ((p[:9].reshape(3, 3), p[9:]) for p in pose)
         corner = R_t @ [100, 12.5, 20] + t_t

@@ -15,6 +15,7 @@ ROOMS = {
     "plotly": ("report/",),
     "pyvista": ("report/",),
     "numba": ("simulation/kernel.py",),
+    "llvmlite": ("symbolic/native.py",),
     "netCDF4": ("archive.py",),
     "typer": ("cli.py",),
     "trimesh": ("discretization/",),

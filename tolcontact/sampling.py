@@ -5,16 +5,24 @@ locators, or on the order in which they were declared.
 """
 
 import hashlib
+from collections.abc import Callable
 
 import numpy as np
-from scipy import stats
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from tolcontact.assembly import Tolerance
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 
 STREAM = 4096
+TAIL = float(ndtr(-3))
+# Quantiles of the named distributions for a zone of width 1.
+SHAPES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "normal": lambda u: ndtri(u) / 6,
+    "uniform": lambda u: u - 0.5,
+    "triangular": lambda u: np.where(u < 0.5, np.sqrt(u / 2) - 0.5, 0.5 - np.sqrt((1 - u) / 2)),
+    "truncated normal": lambda u: ndtri(TAIL + u * (1 - 2 * TAIL)) / 6,
+}
 _BITS = 52
 
 
@@ -41,13 +49,7 @@ def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:
     width = float(tolerance.range or 0.0)
     if width == 0:
         return np.zeros_like(u)
-    shape = {
-        "normal": lambda u: ndtri(u) / 6,
-        "uniform": lambda u: u - 0.5,
-        "triangular": stats.triang(0.5, -0.5, 1).ppf,
-        "truncated normal": stats.truncnorm(-3, 3, 0, 1 / 6).ppf,
-    }[tolerance.distribution]
-    return np.asarray(width * shape(u))
+    return np.asarray(width * SHAPES[tolerance.distribution](u))
 
 
 def _uniform(seed: int, label: str, start: int, stop: int) -> np.ndarray:

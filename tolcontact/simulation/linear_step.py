@@ -134,12 +134,12 @@ class LinearStep:
 
         qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there.
         """
-        answer, _ = self._solve(**problems)
+        answer = self._solve(**problems)
         for k in np.flatnonzero(~(_residual(answer) <= self._accuracy)):
             one = {name: values[k : k + 1] for name, values in problems.items()}
             one["newton"] = np.zeros(1)
             self._solve(**{**one, "filled": np.zeros_like(one["filled"])})
-            again, _ = self._solve(**one)
+            again = self._solve(**one)
             if _residual(again)[0] < _residual(answer)[k]:
                 for name, values in again.items():
                     answer[name][k] = values[0]

@@ -9,7 +9,7 @@ from tolcontact.simulation.block import Block, Status
 from tolcontact.simulation.contact import ContactResolver
 from tolcontact.symbolic import ENTRIES, Program
 
-BLOCK = 1000
+BLOCK = 4096  # as many as sampling draws at once
 
 
 def simulate_blocks(program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK) -> Iterator[Block]:
@@ -27,7 +27,7 @@ def simulate_block(
     if resolvers is None:
         resolvers = [ContactResolver(program, group) for group in program.groups]
     nominal, count, accuracy = program.nominal, len(deviations), program.plugin.accuracy
-    placed, _ = program.place(deviations=deviations)
+    placed = program.place(deviations=deviations)
     raw = placed["poses"].reshape(count, len(nominal.parts), ENTRIES)
     measured_raw, relative_raw = _observe(program, raw)
 
@@ -73,5 +73,5 @@ def simulate_block(
 
 def _observe(program: Program, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
-    seen, _ = program.observe(poses=poses)
+    seen = program.observe(poses=poses)
     return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

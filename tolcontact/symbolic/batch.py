@@ -1,13 +1,35 @@
-"""Calls of a Function for many realizations at once, through preallocated buffers."""
+"""Functions evaluated for many realizations at once."""
 
 import contextlib
 import io
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
+from typing import Protocol
 
 import casadi as ca
 import numpy as np
 
+from tolcontact.symbolic.native import Native, UnknownInstructionError
+
 WIDTH = 64
+LARGEST = 300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
+
+
+class Evaluator(Protocol):
+    """Evaluates a Function on arrays (realization, stored entry).
+
+    Returns its outputs, likewise, and `failed` (realization,): those whose evaluation gave up; their outputs are NaN.
+    """
+
+    def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]: ...
+
+
+def evaluator(function: ca.Function) -> Evaluator:
+    """The fastest way to evaluate a Function of scalar expressions."""
+    if function.n_instructions() <= LARGEST:
+        with contextlib.suppress(UnknownInstructionError):
+            return Native(function)
+    return Mapped(function)
 
 
 @contextlib.contextmanager
@@ -18,30 +40,41 @@ def quiet() -> Iterator[None]:
 
 
 class Batch:
-    """A Function mapped over realizations; every array has the realization as its first dimension.
+    """A Function of scalar expressions, called by name; every array has the realization as its first dimension."""
+
+    def __init__(self, function: ca.Function) -> None:
+        inputs = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
+        outputs = [ca.densify(output) for output in function.call(inputs)]
+        self._names, self._results = function.name_in(), function.name_out()
+        self._evaluate = evaluator(ca.Function(function.name(), inputs, outputs))
+
+    def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
+        """Evaluate for all realizations: `name=(realization, ...)` for each input; outputs by name, (realization, entry)."""
+        outputs, _ = self._evaluate([flat(arrays[name]) for name in self._names])
+        return dict(zip(self._results, outputs, strict=True))
+
+
+def flat(array: np.ndarray) -> np.ndarray:
+    """(realization, entry) of an array that is flat or (column, row), CasADi's order, inside a realization."""
+    return np.ascontiguousarray(array, dtype=float).reshape(len(array), math.prod(array.shape[1:]))
+
+
+class Mapped:
+    """A Function that CasADi evaluates itself, WIDTH realizations in a call; QP solvers above all.
 
     Not to be shared between threads: one evaluation at a time uses its buffers.
     """
 
     def __init__(self, function: ca.Function) -> None:
-        function = _dense(function)
-        self._names = function.name_in()
-        self._results = function.name_out()
-        self._many = _Buffered(function.map(WIDTH), WIDTH)
-        self._one = _Buffered(function, 1)
-        self._solvers = [inner for inner in function.find_functions() if inner.is_a("Conic")]
+        # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
+        inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
+        caller = ca.Function("caller", inputs, function.call(inputs))
+        self._many = _Buffered(caller.map(WIDTH), WIDTH)
+        self._one = _Buffered(caller, 1)
+        self._solvers = [function] if function.is_a("Conic") else []
 
-    def __call__(self, **arrays: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Evaluate for all realizations: `name=(realization, ...)` for each input of the Function.
-
-        Inside a realization arrays are flat or (column, row), CasADi's order. Returns the outputs by name, each
-        (realization, entry), and `failed` (realization,): those whose evaluation gave up; their outputs are NaN.
-        """
-        count = len(next(iter(arrays.values())))
-        flat = [
-            np.ascontiguousarray(arrays[name], dtype=float).reshape(count, size)
-            for name, size in zip(self._names, self._one.sizes_in, strict=True)
-        ]
+    def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+        count = len(inputs[0])
         results = [np.empty((count, size)) for size in self._one.sizes_out]
         failed = np.zeros(count, dtype=bool)
         start = 0
@@ -49,18 +82,18 @@ class Batch:
             width = WIDTH if count - start >= WIDTH else 1
             call = self._many if width == WIDTH else self._one
             rows = slice(start, start + width)
-            if not call([array[rows] for array in flat], [result[rows] for result in results]):
+            if not call([array[rows] for array in inputs], [result[rows] for result in results]):
                 # A plugin that gives up on one realization ends the whole call (qpOASES does), so find out which.
                 self._forget()
                 for k in range(start, start + width):
                     one = slice(k, k + 1)
-                    if not self._one([array[one] for array in flat], [result[one] for result in results]):
+                    if not self._one([array[one] for array in inputs], [result[one] for result in results]):
                         failed[k] = True
                         self._forget()
                         for result in results:
                             result[k] = np.nan
             start += width
-        return dict(zip(self._results, results, strict=True)), failed
+        return results, failed
 
     def _forget(self) -> None:
         """Give the solvers a new memory. qpOASES starts from its last problem, and once it has failed it fails for ever."""
@@ -69,21 +102,13 @@ class Batch:
         self._many.is_new = self._one.is_new = True
 
 
-def _dense(function: ca.Function) -> ca.Function:
-    """The same Function with dense outputs: buffers hold stored entries only, and a structural zero is not one."""
-    inputs = [ca.MX.sym(name, *function.size_in(name)) for name in function.name_in()]
-    outputs = [ca.densify(output) for output in function.call(inputs)]
-    return ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out())
-
-
 class _Buffered:
     """One Function with arrays that stay where they are."""
 
     def __init__(self, function: ca.Function, width: int) -> None:
         self._buffer, self._evaluate = function.buffer()
-        self._inputs = [np.zeros(function.numel_in(i)) for i in range(function.n_in())]
-        self._outputs = [np.zeros(function.numel_out(i)) for i in range(function.n_out())]
-        self.sizes_in = [array.size // width for array in self._inputs]
+        self._inputs = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
+        self._outputs = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
         self.sizes_out = [output.size // width for output in self._outputs]
         for i, array in enumerate(self._inputs):
             self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
@@ -91,7 +116,7 @@ class _Buffered:
             self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
         self.is_new = True
 
-    def __call__(self, inputs: list[np.ndarray], outputs: list[np.ndarray]) -> bool:
+    def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
         """Evaluate; False where the Function gave up."""
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:] = array.ravel()

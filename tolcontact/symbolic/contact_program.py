@@ -11,6 +11,7 @@ objective holds them.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -32,8 +33,21 @@ INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "bend",
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
-def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plugin) -> ca.Function:
-    """The Function of a group; named inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` = q * SLOTS rows.
+@dataclass(frozen=True, eq=False)
+class ContactProgram:
+    """The Functions of a group: `assemble` makes the QP of the inputs, `qp` solves it, `finish` makes the outputs.
+
+    slacks       how many of the QP's last variables are slacks: they are not negative
+    """
+
+    assemble: ca.Function
+    qp: ca.Function
+    finish: ca.Function
+    slacks: int
+
+
+def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plugin) -> ContactProgram:
+    """The Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` = q * SLOTS rows.
 
     poses (12 p)         poses of the group's parts about which the gaps are linearized
     raw (12 p)           their raw poses, from which displacements count
@@ -69,17 +83,7 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     ]
     assemble, finish = _around_the_solver(nominal, group, method, inputs)
     qp = solver(plugin, assemble.sparsity_out("h"), assemble.sparsity_out("a"))
-    arguments = [ca.MX.sym(name, *symbol.shape) for name, symbol in zip(INPUTS, inputs, strict=True)]
-    H, f, A, lower, upper, U = assemble(*arguments)
-    size = H.size1()
-    at_least = np.full(size, -np.inf)
-    at_least[-len(group.pairs) :] = 0.0
-    solved = qp(
-        h=H, g=f, a=A, lba=lower, uba=upper, lbx=at_least, ubx=np.full(size, np.inf),
-        x0=np.zeros(size), lam_x0=np.zeros(size), lam_a0=np.zeros(A.size1()),
-    )  # fmt: skip
-    results = finish(*arguments, H, f, A, lower, U, solved["x"], solved["lam_a"], solved["lam_x"])
-    return ca.Function("contact", arguments, list(results), list(INPUTS), list(OUTPUTS))
+    return ContactProgram(assemble, qp, finish, len(group.pairs))
 
 
 def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
@@ -150,7 +154,7 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
         ca.vertcat(ca.norm_inf(z), ca.norm_inf(y)),
     ]
     step = _whitening(U_in) @ y
-    results = [ca.substitute(result, z, step) for result in results]
+    results = [ca.densify(ca.substitute(result, z, step)) for result in results]
     finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
     return assemble, finish
 

@@ -10,6 +10,7 @@ from tolcontact.errors import ModelError
 from tolcontact.method import Method
 from tolcontact.symbolic.batch import Batch, quiet
 from tolcontact.symbolic.contact_program import SLOTS, contact_program
+from tolcontact.symbolic.contact_solver import ContactSolver
 from tolcontact.symbolic.gap import gap_matrix
 from tolcontact.symbolic.groups import Group, contact_groups
 from tolcontact.symbolic.measure import measured
@@ -21,10 +22,10 @@ from tolcontact.symbolic.tape import Tape, record
 
 @dataclass(frozen=True, eq=False)
 class ContactGroup:
-    """A group of coupled parts and its QP Function (see contact_program)."""
+    """A group of coupled parts and its QP (see contact_program)."""
 
     group: Group
-    solve: Batch
+    solve: ContactSolver
     slots: int = SLOTS
 
 
@@ -81,7 +82,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=Batch(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
             observe=Batch(observe),
             gaps=tuple(gap_matrix(pair) for pair in nominal.pairs),
-            groups=tuple(ContactGroup(g, Batch(contact_program(nominal, g, method, chosen))) for g in groups),
+            groups=tuple(ContactGroup(g, ContactSolver(contact_program(nominal, g, method, chosen))) for g in groups),
             nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
             tapes={
                 measure.name: record(value, entries)
