@@ -61,3 +61,19 @@ def test_fields_equal_the_plain_sums_over_realizations():
     u = np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
     assert np.abs(moments.mean() - u.mean(axis=0)).max() < 1e-10
     assert np.abs(moments.six_sigma() - 6 * u.std(axis=0, ddof=1)).max() < 1e-9
+
+
+def test_intervals_are_those_of_scipys_distributions():
+    rng = np.random.default_rng(2)
+    for n in (2, 7, 100, 5000):
+        x = rng.normal(size=n)
+        assert intervals.mean(x)[1:] == pytest.approx(stats.t.interval(0.95, n - 1, x.mean(), x.std(ddof=1) / np.sqrt(n)))
+        for p in (0.135, 5, 50, 95, 99.865):
+            below, above = stats.binom.ppf([0.025, 0.975], n, p / 100).astype(int)
+            ordered = np.sort(x)
+            expected = (ordered[below - 1] if below >= 1 else -np.inf, ordered[above] if above < n else np.inf)
+            assert intervals.percentile(x, p)[1:] == expected
+        for k in {0, 1, n // 3, n}:
+            hits = np.arange(n) < k
+            bounds = stats.binomtest(k, n).proportion_ci(0.95, method="exact")
+            assert intervals.share(hits) == pytest.approx((k / n, bounds.low, bounds.high))

@@ -26,7 +26,7 @@ NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "errors", "vocabulary", "method", "assembly", "discretization", "symbolic", "sampling", "simulation", "statistics",
-    "archive", "running", "report", "script", "cli", "__init__",
+    "archive", "running", "comparing", "report", "script", "cli", "__init__",
 )  # fmt: skip
 
 

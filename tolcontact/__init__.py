@@ -2,13 +2,14 @@
 
 declare       Assembly, Box, Mesh, Locator, three_two_one, Tolerance
 faces         Facing, Inside, Near, Brep
-run           run, build, Method
+run           run, build, compare, Method
 look          summarize, open_archive, model_of
 """
 
 from tolcontact.archive import model_of, open_archive
 from tolcontact.assembly import Assembly, Box, Brep, Facing, Inside, Locator, Mesh, Near, Tolerance, three_two_one
 from tolcontact.cli import main
+from tolcontact.comparing import compare
 from tolcontact.errors import TolcontactError
 from tolcontact.method import Method
 from tolcontact.running import build, run
@@ -27,6 +28,7 @@ __all__ = [
     "TolcontactError",
     "Tolerance",
     "build",
+    "compare",
     "main",
     "model_of",
     "open_archive",

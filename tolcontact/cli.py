@@ -4,6 +4,7 @@ Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad
 """
 
 import inspect
+import json
 import sys
 import warnings
 from collections.abc import Callable
@@ -17,9 +18,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from tolcontact.archive import open_archive
 from tolcontact.assembly import Assembly
+from tolcontact.comparing import compare as compare_solvers
 from tolcontact.errors import TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
-from tolcontact.report import summary_text
+from tolcontact.report import comparison_text, summary_text
 from tolcontact.running import DEFAULT_SOLVER, build, check_counts, check_writable
 from tolcontact.running import run as run_model
 from tolcontact.script import load_model
@@ -87,6 +89,33 @@ def summary(archive: Archive) -> None:
     """Print the statistics of an archive."""
     with open_archive(archive) as results:
         _print_summary(results)
+
+
+@app.command()
+def compare(
+    model: Model,
+    solvers: Annotated[str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")],
+    samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
+    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
+    resolution: Annotated[str, typer.Option(help=f"One of {_or(RESOLUTIONS)}.")] = "linearized",
+    objective: Annotated[str, typer.Option(help=f"One of {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
+) -> None:
+    """Compare solvers on the same draws: agreement, failures, residuals, time."""
+    if out is not None:
+        check_writable(out, overwrite=False, resume=False)
+    method = Method(resolution=resolution, objective=objective)
+    names = [name.strip() for name in solvers.split(",") if name.strip()]
+    found = compare_solvers(load_model(model), names, samples=samples, seed=seed, method=method)
+    if out is not None:
+        # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
+        texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
+        found.to_netcdf(out, engine="netcdf4", encoding=texts)
+    if as_json:
+        typer.echo(json.dumps(found.to_dict(), allow_nan=True))
+    else:
+        Console(highlight=False, width=80).print(comparison_text(found))
 
 
 @app.command()

@@ -1,9 +1,8 @@
 """An assembly as a plain document (dicts, lists, numbers, texts), and back: what an archive keeps of a model."""
 
+import importlib  # scipy.stats takes longer to import than all the rest: only where it is needed
 from collections.abc import Callable, Mapping
 from typing import Any
-
-from scipy import stats
 
 from tolcontact.assembly.assembly import Assembly
 from tolcontact.assembly.contact import ContactPair
@@ -167,5 +166,7 @@ def _tolerance_of(said: Document | None) -> Tolerance | None:
     if said is None:
         return None
     if "scipy" in said:
-        return Tolerance(distribution=getattr(stats, said["scipy"])(*said["args"], **said["kwds"]))
+        return Tolerance(
+            distribution=getattr(importlib.import_module("scipy.stats"), said["scipy"])(*said["args"], **said["kwds"])
+        )
     return Tolerance(said["range"], said["distribution"])

@@ -5,18 +5,19 @@ distribution: contact cuts distributions off.
 """
 
 import numpy as np
-from scipy import stats
+from scipy import special
 
 CONFIDENCE = 0.95
 Estimate = tuple[float, float, float]
 
-_Z = float(stats.norm.ppf(0.5 + CONFIDENCE / 2))
+_LOWER, _UPPER = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
+_Z = float(special.ndtri(_UPPER))
 
 
 def mean(x: np.ndarray) -> Estimate:
     """Mean, Student's t interval."""
     centre = float(x.mean())
-    half = float(stats.t.ppf(0.5 + CONFIDENCE / 2, len(x) - 1) * x.std(ddof=1) / np.sqrt(len(x)))
+    half = float(special.stdtrit(len(x) - 1, _UPPER) * x.std(ddof=1) / np.sqrt(len(x)))
     return centre, centre - half, centre + half
 
 
@@ -42,7 +43,7 @@ def percentile(x: np.ndarray, percent: float) -> Estimate:
     """
     ordered = np.sort(x)
     p, n = percent / 100, len(x)
-    below, above = stats.binom.ppf([0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], n, p).astype(int)
+    below, above = (_binomial_quantile(q, n, p) for q in (_LOWER, _UPPER))
     lower = ordered[below - 1] if below >= 1 else -np.inf
     upper = ordered[above] if above < n else np.inf
     return float(np.quantile(x, p)), float(lower), float(upper)
@@ -50,9 +51,10 @@ def percentile(x: np.ndarray, percent: float) -> Estimate:
 
 def share(hits: np.ndarray) -> Estimate:
     """Share of True in a sample of booleans, exact (Clopper-Pearson) interval."""
-    test = stats.binomtest(int(hits.sum()), len(hits))
-    bounds = test.proportion_ci(CONFIDENCE, method="exact")
-    return float(test.statistic), float(bounds.low), float(bounds.high)
+    k, n = int(hits.sum()), len(hits)
+    lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
+    upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
+    return k / n, float(lower), float(upper)
 
 
 def variance_ratio(after: np.ndarray, before: np.ndarray) -> Estimate:
@@ -62,6 +64,12 @@ def variance_ratio(after: np.ndarray, before: np.ndarray) -> Estimate:
     ratio = float(after.var(ddof=1) / before.var(ddof=1))
     factor = np.exp(_Z * _standard_error(_variance_influence(after) - _variance_influence(before)))
     return ratio, float(ratio / factor), float(ratio * factor)
+
+
+def _binomial_quantile(q: float, n: int, p: float) -> int:
+    """The least number of hits among n, each of probability p, that is not exceeded with probability `q`."""
+    k = max(int(np.ceil(special.bdtrik(q, n, p))), 0)
+    return k - 1 if k > 0 and special.bdtr(k - 1, n, p) >= q else k
 
 
 def _variance_influence(x: np.ndarray) -> np.ndarray:

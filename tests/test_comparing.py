@@ -1,0 +1,59 @@
+"""Solvers side by side."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tolcontact as tc
+from tests import cases
+from tests.test_bad_input import call
+from tolcontact.comparing import compare
+
+
+def test_solvers_that_agree_are_said_to_agree():
+    found = compare(cases.ra1(), ["daqp", "qpoases", "osqp"], samples=200, seed=3)
+    assert list(found.solver) == ["daqp", "qpoases", "osqp"]
+    assert (found.by_status.sum("status_meaning") == 200).all()
+    assert (found.both_resolved == 200).all()
+    assert (found.pose_difference.sel(solver="daqp") == 0).all()
+    assert 0 < found.pose_difference.sel(solver="qpoases", extent="largest") < 1e-9
+    assert found.pose_difference.sel(solver="qpoases", extent="largest") < found.pose_difference.sel(
+        solver="osqp", extent="largest"
+    )
+    assert (found.measure_difference.sel(extent="typical") <= found.measure_difference.sel(extent="largest")).all()
+    assert (found.seconds > 0).all()
+
+
+def test_the_difference_of_poses_is_that_of_the_furthest_surface_point():
+    """Two objectives cannot be compared by `compare`; two answers of one run can, by its own measure of distance."""
+    found = compare(cases.ra1(), ["daqp", "osqp"], samples=50)
+    tree = {s: tc.run(cases.ra1(), samples=50, solver=s).sel(state="corrected") for s in ("daqp", "osqp")}
+    furthest = 0.0
+    for part in ("base", "top"):
+        v = tree["daqp"][f"field/{part}"].vertices.values
+        moved = [t.rotation.sel(part=part).values @ v.T + t.translation.sel(part=part).values[..., None] for t in tree.values()]
+        furthest = max(furthest, np.linalg.norm(moved[0] - moved[1], axis=1).max())
+    assert float(found.pose_difference.sel(solver="osqp", extent="largest")) == pytest.approx(furthest, rel=1e-3)
+
+
+def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
+    model = cases.MODELS / "ra1.py"
+    options = ("compare", model, "--solvers", "daqp, qpoases", "--samples", "50")
+    done = call(tmp_path, *options, "--out", "both.nc")
+    assert done.returncode == 0
+    assert max(map(len, done.stdout.splitlines())) <= 80
+    assert "qpoases" in done.stdout and "unresolved" in done.stdout
+    with xr.open_dataset(tmp_path / "both.nc") as read:
+        assert list(read.solver.values.astype(str)) == ["daqp", "qpoases"]
+        assert read.seconds.attrs["units"] == "s"
+    assert call(tmp_path, *options, "--out", "both.nc").returncode == 2
+    said = json.loads(call(tmp_path, *options, "--json").stdout)
+    assert said["coords"]["solver"]["data"] == ["daqp", "qpoases"]
+
+
+@pytest.mark.parametrize(("names", "words"), [("daqp,daqp", "each once"), (",", "at least one"), ("daqp,simplex", "simplex")])
+def test_wrong_lists_of_solvers_are_refused(names, words, tmp_path):
+    done = call(tmp_path, "compare", cases.MODELS / "ra1.py", "--solvers", names)
+    assert done.returncode == 2 and words in done.stderr

@@ -1,0 +1,110 @@
+"""Several solvers on the same draws: do they agree, do they fail, how long do they take?"""
+
+import time
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.assembly import Assembly
+from tolcontact.discretization import discretize
+from tolcontact.errors import OptionError
+from tolcontact.method import Method
+from tolcontact.running import check_counts
+from tolcontact.simulation import CORRECTED, Status, simulate_blocks
+from tolcontact.symbolic import compile_program
+
+WARM_UP = 64  # realizations before the clock runs
+QUANTILES = {"typical": 0.5, "largest": 1.0}
+
+
+def compare(
+    assembly: Assembly, solvers: Sequence[str], *, samples: int = 1000, seed: int = 1, method: Method | None = None
+) -> xr.Dataset:
+    """Simulate the same realizations with each solver. Differences are from the first one, in the corrected state.
+
+    seconds           (solver)                         wall time of all realizations, from draws to measures [s]
+    by_status         (solver, status_meaning)         number of realizations
+    kkt_residual      (solver)                         largest of the realizations that count as resolved [mm]
+    penetration       (solver)                         largest true penetration left [mm]
+    pose_difference   (solver, extent)                 largest distance of a part's surface points between both answers [mm]
+    measure_difference (solver, extent, measure)       in the measure's units
+    both_resolved     (solver)                         number of realizations that count in the differences
+
+    Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
+    """
+    check_counts(samples=samples, seed=seed)
+    if not solvers or len(set(solvers)) < len(solvers):
+        raise OptionError(f"solvers are {', '.join(solvers) or 'none'}; name at least one, and each once")
+    nominal, method = discretize(assembly), method or Method()
+    programs = [compile_program(nominal, solver, method) for solver in solvers]
+    corners = np.stack([_corners(part.vertices) for part in nominal.parts])
+    runs = []
+    for program in programs:
+        list(simulate_blocks(program, samples=WARM_UP, seed=seed))
+        start = time.perf_counter()
+        blocks = list(simulate_blocks(program, samples=samples, seed=seed))
+        seconds = time.perf_counter() - start
+        names = ("status", "kkt_residual", "poses", "measured", "gap_min")
+        runs.append({"seconds": seconds, **{n: np.concatenate([getattr(block, n) for block in blocks]) for n in names}})
+    first = runs[0]
+    rows = [_row(run, first, corners) for run in runs]
+    dims = {"by_status": ("status_meaning",), "pose_difference": ("extent",), "measure_difference": ("extent", words.MEASURE)}
+    units = {"seconds": "s", "kkt_residual": "mm", "penetration": "mm", "pose_difference": "mm"}
+    return xr.Dataset(
+        {
+            name: (
+                ("solver", *dims.get(name, ())),
+                np.array([row[name] for row in rows]),
+                {"units": units[name]} if name in units else {},
+            )
+            for name in rows[0]
+        },
+        coords={
+            "solver": list(solvers),
+            "status_meaning": list(words.STATUS_MEANINGS),
+            "extent": list(QUANTILES),
+            words.MEASURE: [measure.name for measure in nominal.measures],
+        },
+        attrs={
+            "title": f"comparison of solvers on {assembly.name}",
+            "reference_solver": solvers[0],
+            "realizations": samples,
+            "seed": seed,
+            "resolution": method.resolution,
+            "objective": method.objective,
+        },
+    )
+
+
+def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
+    resolved = np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED])
+    both = resolved & np.isin(first["status"], [Status.UNTOUCHED, Status.RESOLVED])
+    poses, others = (each["poses"][both, CORRECTED] for each in (run, first))
+    turn = (poses - others)[:, :, :9].reshape(*poses.shape[:2], 3, 3)
+    apart = np.einsum("kpij,pcj->kpci", turn, corners) + (poses - others)[:, :, None, 9:]
+    distance = np.linalg.norm(apart, axis=3).max(axis=(1, 2), initial=0)
+    measured = np.abs(run["measured"] - first["measured"])[both, CORRECTED]
+    return {
+        "seconds": run["seconds"],
+        "by_status": np.bincount(run["status"], minlength=len(words.STATUS_MEANINGS)),
+        "kkt_residual": run["kkt_residual"][resolved].max(initial=0),
+        "penetration": max(0.0, -float(run["gap_min"][:, CORRECTED].min(initial=0))),
+        "pose_difference": _extent(distance),
+        "measure_difference": _extent(measured),
+        "both_resolved": int(both.sum()),
+    }
+
+
+def _extent(values: np.ndarray) -> np.ndarray:
+    """Typical and largest value along the first dimension; NaN where there is none."""
+    if not len(values):
+        return np.full((len(QUANTILES), *values.shape[1:]), np.nan)
+    return np.asarray(np.quantile(values, list(QUANTILES.values()), axis=0))
+
+
+def _corners(vertices: np.ndarray) -> np.ndarray:
+    """The corners (8, 3) of a part's bounding box: no point of the part moves further than the furthest of them."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

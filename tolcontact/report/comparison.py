@@ -1,0 +1,33 @@
+"""A comparison of solvers for the terminal."""
+
+import xarray as xr
+from rich import box
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+
+def comparison_text(comparison: xr.Dataset) -> Group:
+    """A comparison (see compare) as something that rich prints in 80 columns."""
+    count = comparison.attrs["realizations"]
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
+    for column in ("solver", "us each", "unresolved", "residual", "pose, typical", "pose, largest", "measure, largest"):
+        table.add_column(
+            column, justify="left" if column == "solver" else "right", min_width=len(column) if column == "solver" else 0
+        )
+    for solver in comparison["solver"].values:
+        of = comparison.sel(solver=solver)
+        lost = int(of["by_status"].sel(status_meaning=["not_converged", "not_assemblable"]).sum())
+        differences = [of["pose_difference"].sel(extent=extent) for extent in ("typical", "largest")]
+        table.add_row(
+            str(solver),
+            f"{1e6 * float(of['seconds']) / count:.1f}",
+            str(lost),
+            f"{float(of['kkt_residual']):.1g}",
+            *(f"{float(difference):.1g}" for difference in differences),
+            f"{float(of['measure_difference'].sel(extent='largest').max()):.1g}",
+        )
+    heading = f"{comparison.attrs['title']}: {count} realizations, {comparison.attrs['resolution']}"
+    reference = comparison.attrs["reference_solver"]
+    told = f"Residuals, and differences from {reference} in a realization [mm; measures in their units]."
+    return Group(Text(heading, style="bold"), Text(told), Text(), table)
