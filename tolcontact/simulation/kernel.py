@@ -1,13 +1,13 @@
 """Passes over the contact constants of a pair, compiled: no array of size realizations x points is made.
 
-Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are sums of many
-terms in an order of the compiler's, and agree to rounding.
+Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
+another order than NumPy's, and agree to rounding.
 """
 
 import numpy as np
 from numba import njit
 
-CHUNK = 256
+CHUNK, LANES = 256, 8
 INF = np.inf
 
 
@@ -26,15 +26,26 @@ def _gaps(matrix, first, count, X, deviations, locators, gaps):  # type: ignore[
             gaps[j] -= deviations[locators[first + j]]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"reassoc", "nsz"})
-def _add_moments(table, first, count, gaps, activity, counts, moments):  # type: ignore[no-untyped-def]
-    """Add to moments (10,) the columns of `table` (10, point) whose points are active."""
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add_moments(table, first, count, gaps, activity, counts, lanes, moments):  # type: ignore[no-untyped-def]
+    """Add to moments (10,) the columns of `table` (10, point) whose points are active.
+
+    LANES sums side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
+    """
     for j in range(count):
         counts[j] = 1.0 if gaps[j] < activity else 0.0
+    whole = count - count % LANES
     for moment in range(table.shape[0]):
         row = table[moment, first : first + count]
+        for lane in range(LANES):
+            lanes[lane] = 0.0
+        for j in range(0, whole, LANES):
+            for lane in range(LANES):
+                lanes[lane] += counts[j + lane] * row[j + lane]
         total = 0.0
-        for j in range(count):
+        for lane in range(LANES):
+            total += lanes[lane]
+        for j in range(whole, count):
             total += counts[j] * row[j]
         moments[moment] += total
 
@@ -42,7 +53,7 @@ def _add_moments(table, first, count, gaps, activity, counts, moments):  # type:
 @njit(cache=True, nogil=True, error_model="numpy")
 def survey(matrix, tables, relative, deviations, locators, activity, least, active, moments):  # type: ignore[no-untyped-def]
     """For each realization the least gap (n,), the number of points below `activity` (n,), and their moments (n, side, 10)."""
-    gaps, counts = np.empty(CHUNK), np.empty(CHUNK)
+    gaps, counts, lanes = np.empty(CHUNK), np.empty(CHUNK), np.empty(LANES)
     for k in range(relative.shape[0]):
         lowest, number = INF, 0
         for first in range(0, matrix.shape[1], CHUNK):
@@ -54,7 +65,7 @@ def survey(matrix, tables, relative, deviations, locators, activity, least, acti
                 below += gaps[j] < activity
             if below:
                 for side in range(tables.shape[0]):
-                    _add_moments(tables[side], first, count, gaps, activity, counts, moments[k, side])
+                    _add_moments(tables[side], first, count, gaps, activity, counts, lanes, moments[k, side])
             number += below
         least[k], active[k] = lowest, number
 
