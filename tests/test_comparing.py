@@ -22,12 +22,11 @@ def test_solvers_that_agree_are_said_to_agree():
     assert found.pose_difference.sel(solver="qpoases", extent="largest") < found.pose_difference.sel(
         solver="osqp", extent="largest"
     )
-    assert (found.measure_difference.sel(extent="typical") <= found.measure_difference.sel(extent="largest")).all()
+    assert (found.measure_difference.sel(extent="median") <= found.measure_difference.sel(extent="largest")).all()
     assert (found.seconds > 0).all()
 
 
 def test_the_difference_of_poses_is_that_of_the_furthest_surface_point():
-    """Two objectives cannot be compared by `compare`; two answers of one run can, by its own measure of distance."""
     found = compare(cases.ra1(), ["daqp", "osqp"], samples=50)
     tree = {s: tc.run(cases.ra1(), samples=50, solver=s).sel(state="corrected") for s in ("daqp", "osqp")}
     furthest = 0.0
@@ -49,7 +48,8 @@ def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
         assert list(read.solver.values.astype(str)) == ["daqp", "qpoases"]
         assert read.seconds.attrs["units"] == "s"
     assert call(tmp_path, *options, "--out", "both.nc").returncode == 2
-    said = json.loads(call(tmp_path, *options, "--json").stdout)
+    said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
+    assert said["data_vars"]["by_status"]["data"][0] == said["data_vars"]["by_status"]["data"][1]
     assert said["coords"]["solver"]["data"] == ["daqp", "qpoases"]
 
 
@@ -57,3 +57,11 @@ def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
 def test_wrong_lists_of_solvers_are_refused(names, words, tmp_path):
     done = call(tmp_path, "compare", cases.MODELS / "ra1.py", "--solvers", names)
     assert done.returncode == 2 and words in done.stderr
+
+
+def test_where_nothing_can_be_compared_the_json_says_null(tmp_path):
+    """One linear step leaves every realization of the channel unresolved."""
+    done = call(tmp_path, "compare", cases.MODELS / "channel.py", "--solvers", "daqp,qpoases", "--samples", "20", "--json")
+    said = json.loads(done.stdout, parse_constant=pytest.fail)["data_vars"]
+    assert said["both_resolved"]["data"] == [0, 0]
+    assert said["pose_difference"]["data"] == [[None, None], [None, None]]

@@ -164,11 +164,11 @@ def test_solvers_come_to_the_same_exact_poses(make, solver):
     assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-7)
 
 
-@pytest.mark.parametrize("make", [cases.jaws, cases.tab], ids=["jaws", "tab"])
-def test_searching_again_changes_nothing_where_points_stay_over_planes(make):
+@pytest.mark.parametrize(("make", "active_set"), [(cases.jaws, "closed"), (cases.jaws, "initial"), (cases.tab, "closed")])
+def test_searching_again_changes_nothing_where_points_stay_over_planes(make, active_set):
     runs = []
     for search in ("fixed", "iterated"):
-        method = tc.Method(resolution="exact", search=search)
+        method = tc.Method(resolution="exact", search=search, active_set=active_set)
         runs.append(simulate(make(), samples=50, solver="daqp", method=method)[1])
     assert (runs[0]["status"] == runs[1]["status"]).all()
     assert np.abs(runs[0]["gap_min"] - runs[1]["gap_min"])[:, CORRECTED].max() < 1e-6

@@ -113,7 +113,9 @@ def compare(
         texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
         found.to_netcdf(out, engine="netcdf4", encoding=texts)
     if as_json:
-        typer.echo(json.dumps(found.to_dict(), allow_nan=True))
+        # JSON has no NaN: where no realization can be compared a difference is null.
+        readable = found.astype(object).where(found.notnull(), None)
+        typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
     else:
         Console(highlight=False, width=80).print(comparison_text(found))
 

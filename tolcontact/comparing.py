@@ -1,5 +1,6 @@
 """Several solvers on the same draws: do they agree, do they fail, how long do they take?"""
 
+import itertools
 import time
 from collections.abc import Sequence
 
@@ -16,7 +17,7 @@ from tolcontact.simulation import CORRECTED, Status, simulate_blocks
 from tolcontact.symbolic import compile_program
 
 WARM_UP = 64  # realizations before the clock runs
-QUANTILES = {"typical": 0.5, "largest": 1.0}
+QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
 def compare(
@@ -98,7 +99,7 @@ def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
 
 
 def _extent(values: np.ndarray) -> np.ndarray:
-    """Typical and largest value along the first dimension; NaN where there is none."""
+    """Median and largest value along the first dimension; NaN where there is none."""
     if not len(values):
         return np.full((len(QUANTILES), *values.shape[1:]), np.nan)
     return np.asarray(np.quantile(values, list(QUANTILES.values()), axis=0))
@@ -107,4 +108,4 @@ def _extent(values: np.ndarray) -> np.ndarray:
 def _corners(vertices: np.ndarray) -> np.ndarray:
     """The corners (8, 3) of a part's bounding box: no point of the part moves further than the furthest of them."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    return np.array([[(low, high)[i][0], (low, high)[j][1], (low, high)[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+    return np.array(list(itertools.product(*zip(low, high, strict=True))))

@@ -29,14 +29,14 @@ _MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 
 
 @dataclass(frozen=True)
-class Source:
-    """A mesh as read, in mm. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
+class Shape:
+    """A part's surface in mm. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
 
     mesh: trimesh.Trimesh
-    unsure: bool
+    unsure: bool = False
 
 
-def read(geometry: Mesh) -> Source:
+def read(geometry: Mesh) -> Shape:
     """The triangles of a mesh geometry.
 
     Raises GeometryFault where the file cannot be read or is too large, or where its units are unknown.
@@ -59,7 +59,7 @@ def read(geometry: Mesh) -> Source:
     # The vertices of neighbouring triangles are one: rims, smooth normals and bodies are read from what they share.
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     stated = geometry.units or not isinstance(source, str | Path) or Path(source).suffix.lower() in STEP
-    return Source(loaded, unsure=not stated)
+    return Shape(loaded, unsure=not stated)
 
 
 def _factor(geometry: Mesh, said: str) -> float:

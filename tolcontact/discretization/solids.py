@@ -1,7 +1,5 @@
 """Geometry to triangle surfaces whose normals point outward. Part's own frame, mm."""
 
-from dataclasses import dataclass
-
 import igl
 import numpy as np
 import trimesh
@@ -9,17 +7,9 @@ import trimesh
 from tolcontact.assembly import Box, Mesh
 from tolcontact.discretization.edges import edges
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.reading import read
+from tolcontact.discretization.reading import Shape, read
 
 FIELD_STATIONS = 12
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A part's surface. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
-
-    mesh: trimesh.Trimesh
-    unsure: bool = False
 
 
 def shape(geometry: Box | Mesh) -> Shape:
@@ -29,8 +19,8 @@ def shape(geometry: Box | Mesh) -> Shape:
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
-    source = read(geometry)
-    mesh = source.mesh
+    found = read(geometry)
+    mesh = found.mesh
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
     if not np.isfinite(mesh.vertices).all():
@@ -38,7 +28,7 @@ def shape(geometry: Box | Mesh) -> Shape:
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _check_outward(mesh, geometry)
-    return Shape(mesh, source.unsure)
+    return found
 
 
 def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:

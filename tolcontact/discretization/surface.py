@@ -21,9 +21,14 @@ class Surface:
 
     def __init__(self, mesh: trimesh.Trimesh, corner_normals: np.ndarray | None = None) -> None:
         self.mesh = mesh
-        self.corner_normals = _corner_normals(mesh) if corner_normals is None else corner_normals
+        self._given = corner_normals
         self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+
+    @cached_property
+    def corner_normals(self) -> np.ndarray:
+        """Outward unit normals at the corners of each triangle (face, 3, 3)."""
+        return _corner_normals(self.mesh) if self._given is None else self._given
 
     @cached_property
     def _tree(self) -> igl.AABB:

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.assembly import Assembly, Mesh, Part
 from tolcontact.assembly.geometry import UNITS
-from tolcontact.discretization.solids import Shape
+from tolcontact.discretization.reading import Shape
 from tolcontact.errors import UnitsWarning
 
 PLAUSIBLE = (1.0, 10_000.0)  # size of a part [mm]

@@ -11,14 +11,14 @@ def comparison_text(comparison: xr.Dataset) -> Group:
     """A comparison (see compare) as something that rich prints in 80 columns."""
     count = comparison.attrs["realizations"]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-    for column in ("solver", "us each", "unresolved", "residual", "pose, typical", "pose, largest", "measure, largest"):
+    for column in ("solver", "us each", "unresolved", "residual", "pose, median", "pose, largest", "measure, largest"):
         table.add_column(
             column, justify="left" if column == "solver" else "right", min_width=len(column) if column == "solver" else 0
         )
     for solver in comparison["solver"].values:
         of = comparison.sel(solver=solver)
         lost = int(of["by_status"].sel(status_meaning=["not_converged", "not_assemblable"]).sum())
-        differences = [of["pose_difference"].sel(extent=extent) for extent in ("typical", "largest")]
+        differences = [of["pose_difference"].sel(extent=extent) for extent in ("median", "largest")]
         table.add_row(
             str(solver),
             f"{1e6 * float(of['seconds']) / count:.1f}",
@@ -29,5 +29,5 @@ def comparison_text(comparison: xr.Dataset) -> Group:
         )
     heading = f"{comparison.attrs['title']}: {count} realizations, {comparison.attrs['resolution']}"
     reference = comparison.attrs["reference_solver"]
-    told = f"Residuals, and differences from {reference} in a realization [mm; measures in their units]."
+    told = f"In mm (measures in their own units): residuals, differences from {reference}."
     return Group(Text(heading, style="bold"), Text(told), Text(), table)

@@ -76,13 +76,13 @@ class ContactResolver:
             gap_min=np.stack([least, least], axis=1),
             active=np.stack([survey.active for survey in surveys], axis=1),
         )
+        scans = [scan.take(rows) for scan in scans]
         task = Task(
             raw=result.poses.copy(),
-            raw_relative=result.relative.copy(),
             deviations=deviations[rows],
             moments=np.concatenate([self._moments(*each)[rows] for each in zip(self._scans, surveys, strict=True)], axis=1),
+            may_carry=[self._may_carry(scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
         )
-        scans = [scan.take(rows) for scan in scans]
         self._repeat(task, result, scans, np.arange(len(rows)))
         if self._method.search == "iterated":
             scans = self._settle(task, result)
@@ -114,6 +114,12 @@ class ContactResolver:
             return survey.moments
         every = np.array([table.sum(axis=1) for table in scan.tables]).reshape(survey.moments.shape[1:])
         return np.broadcast_to(every, survey.moments.shape)
+
+    def _may_carry(self, scan: PairScan, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray | None:
+        """Which points (row, point) may carry: in the paper's set those that are active in the raw state, X_RM (row, 12)."""
+        if self._method.active_set == "closed" or scan.locators is not None:
+            return None
+        return np.asarray(scan.gaps(relative, deviations) < self._method.activity)
 
     def _settle(self, task: Task, result: Resolution) -> list[PairScan]:
         """Search and resolve again until the poses stay; returns the scans of the last search."""

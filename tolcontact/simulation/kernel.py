@@ -71,22 +71,21 @@ def survey(matrix, tables, relative, deviations, locators, activity, least, acti
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deepest(matrix, starts, relative, deviations, locators, raw, activity, points, gaps_there):  # type: ignore[no-untyped-def]
+def deepest(matrix, starts, relative, deviations, locators, may_carry, points, gaps_there):  # type: ignore[no-untyped-def]
     """For each realization the deepest point of each cluster (n, cluster), and its gap; infinite where none may carry.
 
-    Only points below `activity` at `raw` (n, 12) may carry; all where it is empty.
+    Only points where may_carry (n, point) holds are looked at; all where it is empty.
     """
-    gaps, before = np.empty(CHUNK), np.empty(CHUNK)
+    gaps = np.empty(CHUNK)
     for k in range(relative.shape[0]):
         for cluster in range(starts.size - 1):
             lowest, where = INF, starts[cluster]
             for first in range(starts[cluster], starts[cluster + 1], CHUNK):
                 count = min(CHUNK, starts[cluster + 1] - first)
                 _gaps(matrix, first, count, relative[k], deviations[k], locators, gaps)
-                if raw.shape[0]:
-                    _gaps(matrix, first, count, raw[k], deviations[k], locators, before)
+                if may_carry.shape[0]:
                     for j in range(count):
-                        if not before[j] < activity:
+                        if not may_carry[k, first + j]:
                             gaps[j] = INF
                 for j in range(count):
                     if gaps[j] < lowest:

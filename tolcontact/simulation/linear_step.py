@@ -25,7 +25,6 @@ class LinearStep:
         self._solve = group.solve
         self._parts = len(group.group.parts)
         self._accuracy = program.plugin.accuracy
-        self._method = program.method
         self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
 
     def take(
@@ -44,9 +43,12 @@ class LinearStep:
         (2, row) [mm]: that of the largest increment, and in the norm of the objective.
         """
         now = result.poses[moving]
-        seen = self._deepest(task, scans, moving, result.relative[moving])
+        seen = _deepest(task, scans, moving, result.relative[moving])
         before = [s.take(moving) for s in result.slots]
-        bend = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in zip(scans, before, strict=True)], axis=1)
+        bend = np.zeros((len(moving), ENTRIES * len(scans)))
+        if newton:
+            each = zip(scans, before, strict=True)
+            bend[:] = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in each], axis=1)
         slots = list(before)
         step = np.zeros((2, len(moving)))
         open_ = np.arange(len(moving))
@@ -59,7 +61,10 @@ class LinearStep:
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            reactions = [b.take(open_).reactions_of(s.points) for b, s in zip(before, slots, strict=True)]
+            reactions = [
+                b.take(open_).reactions_of(s.points) if newton else np.zeros(s.points.shape)
+                for b, s in zip(before, slots, strict=True)
+            ]
             curved = {
                 "firmness": np.full(len(open_), firmness),
                 "newton": np.full(len(open_), float(newton)),
@@ -99,7 +104,7 @@ class LinearStep:
             filled=np.concatenate([s.filled for s in slots], axis=1),
         )
         linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
-        seen = self._deepest(task, scans, rows, linearized)
+        seen = _deepest(task, scans, rows, linearized)
         inside = np.stack([depth.max(axis=1) for _, depth in seen], axis=1)
         slack = np.maximum(answer["slack"], 0)
         # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
@@ -118,17 +123,6 @@ class LinearStep:
         seen = [(points, depth) for (points, _), depth in zip(seen, deeper, strict=True)]
         return seen, slots, np.where(solved, answer["step"].T, 0.0)
 
-    def _deepest(
-        self, task: Task, scans: Sequence[PairScan], rows: np.ndarray, relative: np.ndarray
-    ) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Of each pair the deepest points that may carry, (row, cluster), and their depth, at X_RM (row, pair, 12)."""
-        found = []
-        for k, scan in enumerate(scans):
-            limited = self._method.active_set == "initial" and scan.locators is None
-            raw = task.raw_relative[rows, k] if limited else None
-            found.append(scan.deepest(relative[:, k], task.deviations[rows], raw, self._method.activity))
-        return found
-
     def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
         """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
 
@@ -144,6 +138,17 @@ class LinearStep:
                 for name, values in again.items():
                     answer[name][k] = values[0]
         return answer
+
+
+def _deepest(
+    task: Task, scans: Sequence[PairScan], rows: np.ndarray, relative: np.ndarray
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Of each pair the deepest points that may carry, (row, cluster), and their depth [mm], at X_RM (row, pair, 12)."""
+    found = []
+    for k, (scan, may_carry) in enumerate(zip(scans, task.may_carry, strict=True)):
+        mask = None if may_carry is None else may_carry[rows]
+        found.append(scan.deepest(relative[:, k], task.deviations[rows], mask))
+    return found
 
 
 def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:

@@ -15,14 +15,14 @@ class Task:
 
     raw            (row, part of the group, 12)
     deviations     (row, locator) [mm]
-    raw_relative   (row, pair of the group, 12), X_RM at the raw poses
     moments        (row, side, moment) of the points that count in the objective
+    may_carry      for each pair of the group (row, point), or None where every point may
     """
 
     raw: np.ndarray
-    raw_relative: np.ndarray
     deviations: np.ndarray
     moments: np.ndarray
+    may_carry: list[np.ndarray | None]
 
 
 @dataclass(frozen=True, eq=False)

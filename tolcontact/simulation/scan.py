@@ -6,13 +6,14 @@ how realizations are grouped into blocks. (A BLAS product would be faster and wo
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.simulation import kernel
-from tolcontact.symbolic import ENTRIES, MOMENTS
+from tolcontact.symbolic import MOMENTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +64,15 @@ class PairScan:
         return Survey(gaps.min(axis=1), active.sum(axis=1), moments)
 
     def deepest(
-        self, relative: np.ndarray, deviations: np.ndarray, raw: np.ndarray | None = None, activity: float = 0.0
+        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """The deepest point of each cluster and its depth, both (realization, cluster); depth [mm], > 0 inside.
 
-        Where `raw` X_RM (realization, 12) are given, only points whose gap is below `activity` there may carry.
+        Only points where `may_carry` (realization, point) holds are looked at, if it is given.
         """
         gaps = self.gaps(relative, deviations)
-        if raw is not None:
-            gaps = np.where(self.gaps(raw, deviations) < activity, gaps, np.inf)
+        if may_carry is not None:
+            gaps = np.where(may_carry, gaps, np.inf)
         points = np.stack([gaps[:, c].argmin(axis=1) + c.start for c in self.clusters], axis=1)
         return points, -np.take_along_axis(gaps, points, axis=1)
 
@@ -96,24 +97,36 @@ class CompiledScan(PairScan):
     def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
         count = len(relative)
         found = Survey(np.empty(count), np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS)))
-        tables = np.array(self.tables).reshape(len(self.tables), MOMENTS, len(self.P_m))
-        passed = self._arrays(relative, deviations)
-        kernel.survey(self.matrix, tables, *passed, activity, found.least, found.active, found.moments)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        kernel.survey(
+            self.matrix, self._tables, poses, heights, self._columns, activity, found.least, found.active, found.moments
+        )
         return found
 
     def deepest(
-        self, relative: np.ndarray, deviations: np.ndarray, raw: np.ndarray | None = None, activity: float = 0.0
+        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        starts = np.array([*(c.start for c in self.clusters), len(self.P_m)])
         points = np.empty((len(relative), len(self.clusters)), dtype=np.int64)
         gaps = np.empty(points.shape)
-        before = np.empty((0, ENTRIES)) if raw is None else np.ascontiguousarray(raw)
-        kernel.deepest(self.matrix, starts, *self._arrays(relative, deviations), before, activity, points, gaps)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        mask = np.empty((0, 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
+        kernel.deepest(self.matrix, self._starts, poses, heights, self._columns, mask, points, gaps)
         return points, -gaps
 
-    def _arrays(self, relative: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        locators = np.empty(0, dtype=np.int64) if self.locators is None else np.asarray(self.locators, dtype=np.int64)
-        return np.ascontiguousarray(relative), np.ascontiguousarray(deviations), locators
+    @cached_property
+    def _tables(self) -> np.ndarray:
+        """(side, moment, point)."""
+        return np.array(self.tables).reshape(len(self.tables), MOMENTS, len(self.P_m))
+
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        """First point of each cluster, and the end."""
+        return np.array([*(c.start for c in self.clusters), len(self.P_m)])
+
+    @cached_property
+    def _columns(self) -> np.ndarray:
+        """The locators, none of them for a pair of faces."""
+        return np.array([] if self.locators is None else self.locators, dtype=np.int64)
 
 
 def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray], clusters: int) -> PairScan:

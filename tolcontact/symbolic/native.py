@@ -101,7 +101,7 @@ def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
-    """As C's fmin ("<") and fmax (">"): a NaN gives way to the other number."""
+    """As C's fmin ("<=") and fmax (">="): a NaN gives way to the other number, and of equals the first is kept."""
     return builder.select(builder.or_(builder.fcmp_ordered(sign, x, y), builder.fcmp_unordered("uno", y, y)), x, y)
 
 
@@ -119,8 +119,8 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
     ca.OP_SQ: lambda b, x: b.fmul(x, x),
     ca.OP_TWICE: lambda b, x: b.fadd(x, x),
     ca.OP_INV: lambda b, x: b.fdiv(_DOUBLE(1.0), x),
-    ca.OP_FMIN: lambda b, x, y: _extreme(b, "<", x, y),
-    ca.OP_FMAX: lambda b, x, y: _extreme(b, ">", x, y),
+    ca.OP_FMIN: lambda b, x, y: _extreme(b, "<=", x, y),
+    ca.OP_FMAX: lambda b, x, y: _extreme(b, ">=", x, y),
     ca.OP_LT: lambda b, x, y: _truth(b, b.fcmp_ordered("<", x, y)),
     ca.OP_LE: lambda b, x, y: _truth(b, b.fcmp_ordered("<=", x, y)),
     ca.OP_EQ: lambda b, x, y: _truth(b, b.fcmp_ordered("==", x, y)),
