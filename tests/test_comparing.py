@@ -19,9 +19,7 @@ def test_solvers_that_agree_are_said_to_agree():
     assert (found.both_resolved == 200).all()
     assert (found.pose_difference.sel(solver="daqp") == 0).all()
     assert 0 < found.pose_difference.sel(solver="qpoases", extent="largest") < 1e-9
-    assert found.pose_difference.sel(solver="qpoases", extent="largest") < found.pose_difference.sel(
-        solver="osqp", extent="largest"
-    )
+    assert 0 < found.pose_difference.sel(solver="osqp", extent="largest") < 1e-5
     assert (found.measure_difference.sel(extent="median") <= found.measure_difference.sel(extent="largest")).all()
     assert (found.seconds > 0).all()
 

@@ -67,6 +67,9 @@ def test_solvers_agree_on_the_same_draws(case, solver):
         assert resolved.sum() > 200
         assert apart[resolved].max() < 1e-4
         return
+    elif solver == "highs":  # its QP solver stops at multipliers of -1e-7, whatever it is asked for
+        assert apart.max() < 1e-6
+        assert np.median(apart) < 1e-10
     else:
         assert apart.max() < 1e-7
     assert (run["status"] == reference["status"]).all()

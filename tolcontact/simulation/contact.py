@@ -12,10 +12,10 @@ import numpy as np
 
 from tolcontact.simulation.linear_step import LinearStep
 from tolcontact.simulation.resolution import Resolution, Task
-from tolcontact.simulation.scan import PairScan, Survey, least_gaps, pair_scan
+from tolcontact.simulation.scan import PairScan, least_gaps, pair_scan
 from tolcontact.simulation.search import placed, reach, search
 from tolcontact.simulation.slots import Slots
-from tolcontact.symbolic import ContactGroup, Program
+from tolcontact.symbolic import SLOTS, ContactGroup, ContactSolver, Program
 
 LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
 CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
@@ -31,26 +31,29 @@ LOST = 1e5  # sizes of the parts: no step will bring it back
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup) -> None:
+    def __init__(self, program: Program, group: ContactGroup, solve: ContactSolver | None = None) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
         self._size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._slots = group.slots
-        self._step = LinearStep(program, group)
+        self._step = LinearStep(program, group, solve or group.solve)
         self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
         self._method = program.method
         self._surfaces = [program.nominal.pairs[pair].surface for pair in group.group.pairs]
-        self._scans = [
-            pair_scan(
-                program.nominal.pairs[pair],
-                program.gaps[pair],
-                [side.table for side in group.group.sides if side.pair == position],
-                CLUSTERS,
-            )
-            for position, pair in enumerate(group.group.pairs)
-        ]
+        self._scans, self._candidates = [], []
+        for position, index in enumerate(group.group.pairs):
+            pair, gaps = program.nominal.pairs[index], program.gaps[index]
+            tables = [side.table for side in group.group.sides if side.pair == position]
+            self._scans.append(pair_scan(pair, gaps, tables, CLUSTERS))
+            # Where the paper's set of points may carry, those between the corners count, too.
+            some = self._method.search == "fixed" and self._method.active_set == "closed"
+            self._candidates.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if some else self._scans[-1])
         self._reaches = [reach(scan) for scan in self._scans]
+
+    @property
+    def spans(self) -> list[slice]:
+        """The rows of each pair in the QP."""
+        return self._step.spans
 
     def resolve(self, poses: np.ndarray, relative: np.ndarray, deviations: np.ndarray) -> Resolution:
         """Correct the realizations of a block that this group does not leave as they are.
@@ -60,8 +63,9 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         scans = self._found(relative)
-        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(scans)]
-        least = np.stack([survey.least for survey in surveys], axis=1)
+        surveyed = self._scans if self._method.search == "fixed" else scans
+        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
+        least = least_gaps(scans, relative, deviations)
         inside = (least < -self._step.tolerance).any(axis=1)
         rows = np.arange(len(poses)) if self._method.objective == "seating" else np.flatnonzero(inside)
         result = Resolution(
@@ -71,16 +75,16 @@ class ContactResolver:
             residual=np.full(len(rows), np.inf),
             slack=np.full((len(rows), len(scans)), np.inf),
             iterations=np.zeros(len(rows), dtype=int),
-            multipliers=np.zeros((len(rows), len(scans), self._slots)),
-            slots=[Slots.empty(len(rows), self._slots) for _ in scans],
+            multipliers=np.zeros((len(rows), self._step.spans[-1].stop)),
+            slots=[Slots.empty(len(rows), SLOTS) for _ in self._step.varying],
             gap_min=np.stack([least, least], axis=1),
-            active=np.stack([survey.active for survey in surveys], axis=1),
+            active=np.stack([active for active, _ in surveys], axis=1),
         )
         scans = [scan.take(rows) for scan in scans]
         task = Task(
             raw=result.poses.copy(),
             deviations=deviations[rows],
-            moments=np.concatenate([self._moments(*each)[rows] for each in zip(self._scans, surveys, strict=True)], axis=1),
+            moments=np.concatenate([self._moments(k, moments[rows]) for k, (_, moments) in enumerate(surveys)], axis=1),
             may_carry=[self._may_carry(scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
         )
         self._repeat(task, result, scans, np.arange(len(rows)))
@@ -100,20 +104,21 @@ class ContactResolver:
         return result
 
     def _found(self, relative: np.ndarray) -> list[PairScan]:
-        """The scans for X_RM (realization, pair, 12), their contact points projected again if the method says so."""
+        """Scans of the points that may carry, for X_RM (realization, pair, 12), projected again if the method says so."""
         if self._method.search == "fixed":
-            return self._scans
+            return self._candidates
         each = zip(self._scans, self._surfaces, self._reaches, strict=True)
         return [search(scan, surface, relative[:, k], margin) for k, (scan, surface, margin) in enumerate(each)]
 
-    def _moments(self, scan: PairScan, survey: Survey) -> np.ndarray:
-        """Moments (realization, side, moment) of the points that count in the objective."""
+    def _moments(self, pair: int, active: np.ndarray) -> np.ndarray:
+        """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
+        scan = self._scans[pair]
         if scan.locators is not None:  # supports are not among the paper's contact points
-            return np.zeros_like(survey.moments)
+            return np.zeros_like(active)
         if self._method.objective != "all points":
-            return survey.moments
-        every = np.array([table.sum(axis=1) for table in scan.tables]).reshape(survey.moments.shape[1:])
-        return np.broadcast_to(every, survey.moments.shape)
+            return active
+        every = np.array([table.sum(axis=1) for table in scan.tables]).reshape(active.shape[1:])
+        return np.broadcast_to(every, active.shape)
 
     def _may_carry(self, scan: PairScan, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray | None:
         """Which points (row, point) may carry: in the paper's set those that are active in the raw state, X_RM (row, 12)."""
@@ -127,7 +132,7 @@ class ContactResolver:
         for _ in range(SEARCHES):
             before = result.poses[searching]
             for slots in result.slots:  # what carried before may now be beyond the rim
-                slots.put(searching, Slots.empty(len(searching), self._slots))
+                slots.put(searching, Slots.empty(len(searching), SLOTS))
             self._repeat(task, result, self._found(result.relative[searching]), searching)
             moved = self._displacements(before, result.poses[searching])
             searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]

@@ -1,5 +1,7 @@
-"""Passes over the contact constants of a pair, compiled: no array of size realizations x points is made.
+"""Passes over the contact points of a pair, compiled: no array of size realizations x points is made.
 
+Points come in leaves of neighbours with bounds of their coordinates, which bound their gaps. A leaf that is wholly clear is
+passed over, one that is wholly active adds its summed moments, and one that cannot hold the deepest point is not looked at.
 Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
 another order than NumPy's, and agree to rounding.
 """
@@ -7,33 +9,54 @@ another order than NumPy's, and agree to rounding.
 import numpy as np
 from numba import njit
 
-CHUNK, LANES = 256, 8
+LEAF, LANES = 32, 8
 INF = np.inf
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _gaps(matrix, first, count, X, deviations, locators, gaps):  # type: ignore[no-untyped-def]
-    """Gaps [mm] of the points `first` to `first + count` at X_RM (12,), into gaps (CHUNK,)."""
-    for j in range(count):
-        gaps[j] = matrix[12, first + j]
+def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
+    """Coefficients of the gaps by the coordinates, [X_RM, 1] @ basis, into of (r,)."""
+    for c in range(of.size):
+        of[c] = basis[12, c]
     for entry in range(12):
-        x = X[entry]
-        row = matrix[entry, first : first + count]
+        for c in range(of.size):
+            of[c] += X[entry] * basis[entry, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _bounds(centres, halves, of, middle, reach):  # type: ignore[no-untyped-def]
+    """Of each leaf the gap in its middle, and how far gaps can be from that, into middle and reach (leaf,)."""
+    for leaf in range(middle.size):
+        middle[leaf] = of[0]
+        reach[leaf] = 0.0
+    for c in range(1, of.size):
+        slope = abs(of[c])
+        for leaf in range(middle.size):
+            middle[leaf] += of[c] * centres[c - 1, leaf]
+            reach[leaf] += slope * halves[c - 1, leaf]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: ignore[no-untyped-def]
+    """Gaps [mm] of the points `first` to `first + count`, into gaps (LEAF,)."""
+    for j in range(count):
+        gaps[j] = of[0]
+    for c in range(1, of.size):
+        slope = of[c]
+        row = coordinates[c, first : first + count]
         for j in range(count):
-            gaps[j] += x * row[j]
+            gaps[j] += slope * row[j]
     if locators.size:
         for j in range(count):
             gaps[j] -= deviations[locators[first + j]]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _add_moments(table, first, count, gaps, activity, counts, lanes, moments):  # type: ignore[no-untyped-def]
-    """Add to moments (10,) the columns of `table` (10, point) whose points are active.
+def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[no-untyped-def]
+    """Add to moments (10,) the columns of `table` (10, point) that count: counts (LEAF,), 1 or 0.
 
     LANES sums side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
     """
-    for j in range(count):
-        counts[j] = 1.0 if gaps[j] < activity else 0.0
     whole = count - count % LANES
     for moment in range(table.shape[0]):
         row = table[moment, first : first + count]
@@ -51,43 +74,71 @@ def _add_moments(table, first, count, gaps, activity, counts, lanes, moments):  
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def survey(matrix, tables, relative, deviations, locators, activity, least, active, moments):  # type: ignore[no-untyped-def]
-    """For each realization the least gap (n,), the number of points below `activity` (n,), and their moments (n, side, 10)."""
-    gaps, counts, lanes = np.empty(CHUNK), np.empty(CHUNK), np.empty(LANES)
+def survey(points, tables, sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
+    """For each realization the number of points below `activity` (n,), and their moments (n, side, 10).
+
+    points      see PairScan: (basis, coordinates, starts of the leaves, centres, halves, locators)
+    tables      (side, moment, point)
+    sums        (leaf, side, moment): of all points of a leaf
+    """
+    basis, coordinates, starts, centres, halves, locators = points
+    of, gaps, counts, lanes = np.empty(basis.shape[1]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
+    middle, reach = np.empty(starts.size - 1), np.empty(starts.size - 1)
     for k in range(relative.shape[0]):
-        lowest, number = INF, 0
-        for first in range(0, matrix.shape[1], CHUNK):
-            count = min(CHUNK, matrix.shape[1] - first)
-            _gaps(matrix, first, count, relative[k], deviations[k], locators, gaps)
+        _coefficients(basis, relative[k], of)
+        _bounds(centres, halves, of, middle, reach)
+        number = 0
+        for leaf in range(middle.size):
+            if middle[leaf] - reach[leaf] >= activity:
+                continue
+            first, count = starts[leaf], starts[leaf + 1] - starts[leaf]
+            if middle[leaf] + reach[leaf] < activity:
+                number += count
+                moments[k] += sums[leaf]
+                continue
+            _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
             below = 0
             for j in range(count):
-                lowest = min(lowest, gaps[j])
-                below += gaps[j] < activity
+                is_active = gaps[j] < activity
+                below += is_active
+                counts[j] = 1.0 if is_active else 0.0
+            number += below
             if below:
                 for side in range(tables.shape[0]):
-                    _add_moments(tables[side], first, count, gaps, activity, counts, lanes, moments[k, side])
-            number += below
-        least[k], active[k] = lowest, number
+                    _add_moments(tables[side], first, count, counts, lanes, moments[k, side])
+        active[k] = number
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deepest(matrix, starts, relative, deviations, locators, may_carry, points, gaps_there):  # type: ignore[no-untyped-def]
+def deepest(points, clusters, relative, deviations, may_carry, numbers, gaps_there):  # type: ignore[no-untyped-def]
     """For each realization the deepest point of each cluster (n, cluster), and its gap; infinite where none may carry.
 
-    Only points where may_carry (n, point) holds are looked at; all where it is empty.
+    points      as in `survey`
+    clusters    (cluster + 1,): the first leaf of each cluster, and the end
+    may_carry   (n, point), only these points are looked at; all where it is empty
     """
-    gaps = np.empty(CHUNK)
+    basis, coordinates, starts, centres, halves, locators = points
+    of, gaps = np.empty(basis.shape[1]), np.empty(LEAF)
+    middle, reach = np.empty(starts.size - 1), np.empty(starts.size - 1)
     for k in range(relative.shape[0]):
-        for cluster in range(starts.size - 1):
-            lowest, where = INF, starts[cluster]
-            for first in range(starts[cluster], starts[cluster + 1], CHUNK):
-                count = min(CHUNK, starts[cluster + 1] - first)
-                _gaps(matrix, first, count, relative[k], deviations[k], locators, gaps)
-                if may_carry.shape[0]:
-                    for j in range(count):
-                        if not may_carry[k, first + j]:
-                            gaps[j] = INF
+        _coefficients(basis, relative[k], of)
+        _bounds(centres, halves, of, middle, reach)
+        for cluster in range(clusters.size - 1):
+            begin, end = clusters[cluster], clusters[cluster + 1]
+            lowest, where = INF, starts[begin]
+            promising = begin
+            for leaf in range(begin + 1, end):
+                if middle[leaf] - reach[leaf] < middle[promising] - reach[promising]:
+                    promising = leaf
+            for turn in range(begin - 1, end):
+                leaf = promising if turn < begin else turn
+                if turn == promising or middle[leaf] - reach[leaf] > lowest:
+                    continue
+                first, count = starts[leaf], starts[leaf + 1] - starts[leaf]
+                _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
                 for j in range(count):
-                    if gaps[j] < lowest:
+                    if may_carry.shape[0] and not may_carry[k, first + j]:
+                        continue
+                    if gaps[j] < lowest or (gaps[j] == lowest and first + j < where):
                         lowest, where = gaps[j], first + j
-            points[k, cluster], gaps_there[k, cluster] = where, lowest
+            numbers[k, cluster], gaps_there[k, cluster] = where, lowest

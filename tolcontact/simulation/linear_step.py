@@ -11,8 +11,8 @@ import numpy as np
 
 from tolcontact.simulation.resolution import Resolution, Task
 from tolcontact.simulation.scan import PairScan
-from tolcontact.simulation.slots import Slots
-from tolcontact.symbolic import ENTRIES, ContactGroup, Program
+from tolcontact.simulation.slots import CARRIES, Slots
+from tolcontact.symbolic import ENTRIES, ContactGroup, ContactSolver, Program
 
 ROUNDS = 60
 PENETRATION = 1e-10  # mm: less than this is no penetration
@@ -21,10 +21,12 @@ PENETRATION = 1e-10  # mm: less than this is no penetration
 class LinearStep:
     """The QP of one group, ready to be solved for many realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup) -> None:
-        self._solve = group.solve
+    def __init__(self, program: Program, group: ContactGroup, solve: ContactSolver) -> None:
+        self._solve = solve
         self._parts = len(group.group.parts)
-        self._accuracy = program.plugin.accuracy
+        self._plugin = program.plugin
+        self.spans = group.program.spans
+        self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
         self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
 
     def take(
@@ -43,12 +45,15 @@ class LinearStep:
         (2, row) [mm]: that of the largest increment, and in the norm of the objective.
         """
         now = result.poses[moving]
-        seen = _deepest(task, scans, moving, result.relative[moving])
-        before = [s.take(moving) for s in result.slots]
+        scans = [scans[k] for k in self.varying]
+        seen = self._deepest(task, scans, moving, result.relative[moving])
+        before = [slots.take(moving) for slots in result.slots]
+        reactions = result.multipliers[moving]
         bend = np.zeros((len(moving), ENTRIES * len(scans)))
         if newton:
-            each = zip(scans, before, strict=True)
-            bend[:] = np.concatenate([_bend(scan, s, task.deviations[moving]) for scan, s in each], axis=1)
+            reactions = _carried(reactions, self.spans)
+            for k, (scan, s) in enumerate(zip(scans, before, strict=True)):
+                bend[:, ENTRIES * k : ENTRIES * (k + 1)] = _bend(scan, s, task.deviations[moving])
         slots = list(before)
         step = np.zeros((2, len(moving)))
         open_ = np.arange(len(moving))
@@ -61,16 +66,15 @@ class LinearStep:
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
             if not open_.size:
                 break
-            reactions = [
-                b.take(open_).reactions_of(s.points) if newton else np.zeros(s.points.shape)
-                for b, s in zip(before, slots, strict=True)
-            ]
             curved = {
                 "firmness": np.full(len(open_), firmness),
                 "newton": np.full(len(open_), float(newton)),
+                "reactions": reactions[open_],
                 "bend": bend[open_],
-                "reactions": np.concatenate(reactions, axis=1),
             }
+            if newton:
+                for k, b, s in zip(self.varying, before, slots, strict=True):
+                    curved["reactions"][:, self.spans[k]] = b.take(open_).reactions_of(s.points)
             seen, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
         result.iterations[moving] += 1
         return step
@@ -87,11 +91,12 @@ class LinearStep:
     ) -> tuple[list[tuple[np.ndarray, np.ndarray]], list[Slots], np.ndarray]:
         """Solve the QPs of `rows` about the poses `now`, note the answers.
 
-        Returns for each pair the deepest points and by how much they are deeper than the slack, slots, and step sizes.
+        Returns, of varying pairs, the deepest points and by how much they are deeper than the slack, and slots; and step sizes.
         """
         deviations = task.deviations[rows]
-        held = zip(*(scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)), strict=True)
-        P_m, P_r, n_r = (np.concatenate(arrays, axis=1) for arrays in held)
+        held = [scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)]
+        nothing = np.zeros((len(rows), 0, 3))
+        P_m, P_r, n_r = (np.concatenate([nothing, *(each[i] for each in held)], axis=1) for i in range(3))
         answer = self._answer(
             poses=now,
             raw=task.raw[rows],
@@ -101,54 +106,61 @@ class LinearStep:
             P_m=P_m,
             P_r=P_r,
             n_r=n_r,
-            filled=np.concatenate([s.filled for s in slots], axis=1),
+            filled=np.concatenate([np.zeros((len(rows), 0)), *(s.filled for s in slots)], axis=1),
         )
-        linearized = answer["linearized"].reshape(len(rows), len(scans), ENTRIES)
-        seen = _deepest(task, scans, rows, linearized)
-        inside = np.stack([depth.max(axis=1) for _, depth in seen], axis=1)
+        relative = result.relative.shape[1:]
         slack = np.maximum(answer["slack"], 0)
+        residual = _residual(answer)
+        seen = self._deepest(task, scans, rows, answer["linearized"].reshape(len(rows), *relative))
         # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
-        residual = np.maximum(_residual(answer), np.max(inside - slack, axis=1))
+        seen = [(points, depth - slack[:, k, None]) for k, (points, depth) in zip(self.varying, seen, strict=True)]
+        for _, deeper in seen:
+            residual = np.maximum(residual, deeper.max(axis=1))
         solved = np.isfinite(residual)
         result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), self._parts, ENTRIES)[solved]
-        result.relative[rows[solved]] = answer["relative"].reshape(linearized.shape)[solved]
+        result.relative[rows[solved]] = answer["relative"].reshape(len(rows), *relative)[solved]
         result.residual[rows] = np.where(solved, residual, np.inf)
         result.slack[rows[solved]] = slack[solved]
         multipliers = np.maximum(answer["multipliers"], 0)
-        result.multipliers[rows[solved]] = multipliers.reshape(len(rows), len(slots), -1)[solved]
-        slots = [s.carrying(m) for s, m in zip(slots, np.split(multipliers, len(slots), axis=1), strict=True)]
+        result.multipliers[rows[solved]] = multipliers[solved]
+        slots = [s.carrying(multipliers[:, self.spans[k]]) for k, s in zip(self.varying, slots, strict=True)]
         for kept, s in zip(result.slots, slots, strict=True):
             kept.put(rows, s)
-        deeper = [np.where(solved[:, None], depth - slack[:, k, None], -np.inf) for k, (_, depth) in enumerate(seen)]
-        seen = [(points, depth) for (points, _), depth in zip(seen, deeper, strict=True)]
+        seen = [(points, np.where(solved[:, None], deeper, -np.inf)) for points, deeper in seen]
         return seen, slots, np.where(solved, answer["step"].T, 0.0)
 
-    def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
-        """Outputs of the QPs. One that the solver missed is tried again after a problem without rows.
+    def _deepest(
+        self, task: Task, scans: Sequence[PairScan], rows: np.ndarray, relative: np.ndarray
+    ) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Of varying pairs the deepest points that may carry, (row, cluster), and their depth [mm], at X_RM (row, pair, 12)."""
+        found = []
+        for k, scan in zip(self.varying, scans, strict=True):
+            may_carry = task.may_carry[k]
+            found.append(scan.deepest(relative[:, k], task.deviations[rows], None if may_carry is None else may_carry[rows]))
+        return found
 
-        qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there.
+    def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
+        """Outputs of the QPs. Those that the solver missed are tried again, without curvature.
+
+        qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there; DAQP may
+        go in circles where rows contradict each other.
         """
         answer = self._solve(**problems)
-        for k in np.flatnonzero(~(_residual(answer) <= self._accuracy)):
-            one = {name: values[k : k + 1] for name, values in problems.items()}
-            one["newton"] = np.zeros(1)
-            self._solve(**{**one, "filled": np.zeros_like(one["filled"])})
-            again = self._solve(**one)
-            if _residual(again)[0] < _residual(answer)[k]:
-                for name, values in again.items():
-                    answer[name][k] = values[0]
+        lost = np.flatnonzero(~(_residual(answer) <= self._plugin.accuracy))
+        if lost.size and (self._plugin.second is not None or problems["newton"].any()):
+            again = self._solve.again(
+                **{name: values[lost] for name, values in problems.items()} | {"newton": np.zeros(len(lost))}
+            )
+            better = _residual(again) < _residual(answer)[lost]
+            for name, values in again.items():
+                answer[name][lost[better]] = values[better]
         return answer
 
 
-def _deepest(
-    task: Task, scans: Sequence[PairScan], rows: np.ndarray, relative: np.ndarray
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Of each pair the deepest points that may carry, (row, cluster), and their depth [mm], at X_RM (row, pair, 12)."""
-    found = []
-    for k, (scan, may_carry) in enumerate(zip(scans, task.may_carry, strict=True)):
-        mask = None if may_carry is None else may_carry[rows]
-        found.append(scan.deepest(relative[:, k], task.deviations[rows], mask))
-    return found
+def _carried(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
+    """Multipliers (row, row of the QP), zero where they are nothing beside the largest of their pair."""
+    of_pairs = (multipliers[:, span] for span in spans)
+    return np.concatenate([np.where(m > CARRIES * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 
 
 def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """What a group is asked to resolve, and what became of it: plain arrays, filled as the steps go on."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,8 +37,8 @@ class Resolution:
     slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
                 for it, the true penetration at the best poses on the way, which are kept
     iterations  (row,): linear steps taken
-    multipliers (row, pair of the group, slot): reactions of the rows of the last QP
-    slots       the points that carry most, for the next QP to start with; one for each pair of the group
+    multipliers (row, row of the QP): reactions in the last QP
+    slots       the points that carry most, for the next QP to start with; one for each pair whose points in the QP change
 
     and of all realizations of the block:
 
@@ -56,11 +57,11 @@ class Resolution:
     gap_min: np.ndarray
     active: np.ndarray
 
-    def reactions(self) -> np.ndarray:
-        """Sum of the reactions of each pair, (row, pair)."""
-        return np.asarray(self.multipliers.sum(axis=2))
+    def reactions(self, spans: Sequence[slice]) -> np.ndarray:
+        """Sum of the reactions of each pair, (row, pair), whose rows of the QP are `spans`."""
+        return np.stack([self.multipliers[:, span].sum(axis=1) for span in spans], axis=1)
 
-    def carrying(self) -> np.ndarray:
+    def carrying(self, spans: Sequence[slice]) -> np.ndarray:
         """Number of carrying points of each pair, (row, pair); smaller reactions only oppose the regularization."""
-        least = CARRIES * self.multipliers.max(axis=(1, 2), initial=0)
-        return np.asarray((self.multipliers > least[:, None, None]).sum(axis=2))
+        carries = self.multipliers > CARRIES * self.multipliers.max(axis=1, initial=0)[:, None]
+        return np.stack([carries[:, span].sum(axis=1) for span in spans], axis=1)

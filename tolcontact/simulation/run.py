@@ -48,8 +48,8 @@ def simulate_block(
         # A conflict is believed where it exceeds what the solver left undone.
         solved[found.rows] &= np.isfinite(found.residual) & (found.residual <= np.maximum(accuracy, slack))
         iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
-        carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying()
-        reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions()
+        carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying(resolver.spans)
+        reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions(resolver.spans)
     measured = measured_raw.copy()
     measured[touched], _ = _observe(program, poses[touched])
 

@@ -1,9 +1,10 @@
-"""Gaps of all contact points of a pair, what is active, and which points deserve a row of the QP.
+"""Gaps of the contact points of a pair, what is active, and which points deserve a row of the QP.
 
 Sums run over points in a fixed order, one realization independent of the others, so that results do not depend on
 how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,27 +14,33 @@ from scipy.spatial import cKDTree
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.simulation import kernel
-from tolcontact.symbolic import MOMENTS
+from tolcontact.symbolic import MOMENTS, GapMap
+
+SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
 
 
 @dataclass(frozen=True, eq=False)
 class PairScan:
-    """Contact constants of a pair, its points sorted by spatial cluster.
+    """Contact constants of a pair, its points sorted by cluster, and into leaves of neighbours within a cluster.
 
-    matrix             (13, point): gaps [mm] = [X_RM, 1] @ matrix
+    basis              (13, r), and
+    coordinates        (r, point): gaps [mm] = [X_RM, 1] @ basis @ coordinates
     tables             moment tables (moment, point) of the sides that enter the objective
     P_m, P_r, n_r      (point, 3)
     locators           columns of the deviations by which points stand out, (point,); None where none does
-    clusters           slices of points that are neighbours
+    starts             (leaf + 1,): the first point of each leaf, and the end
+    clusters           (cluster + 1,): the first leaf of each cluster, and the end
     """
 
-    matrix: np.ndarray
+    basis: np.ndarray
+    coordinates: np.ndarray
     tables: tuple[np.ndarray, ...]
     P_m: np.ndarray
     P_r: np.ndarray
     n_r: np.ndarray
     locators: np.ndarray | None
-    clusters: tuple[slice, ...]
+    starts: np.ndarray
+    clusters: np.ndarray
 
     def take(self, rows: np.ndarray) -> "PairScan":
         """The scan for some of the realizations: here all have the same contact points."""
@@ -41,10 +48,13 @@ class PairScan:
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
-        result = np.repeat(self.matrix[-1:], len(relative), axis=0)
+        slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
+        for entry, row in zip(relative.T, self.basis, strict=False):
+            slopes += entry[:, None] * row
+        result = np.repeat(slopes[:, :1], self.coordinates.shape[1], axis=1)
         term = np.empty_like(result)
-        for entry, row in zip(relative.T, self.matrix, strict=False):
-            result += np.multiply(entry[:, None], row, out=term)
+        for slope, row in zip(slopes.T[1:], self.coordinates[1:], strict=True):
+            result += np.multiply(slope[:, None], row, out=term)
         return result if self.locators is None else result - deviations[:, self.locators]
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -55,13 +65,12 @@ class PairScan:
         height = np.take_along_axis(deviations, self.locators[points], axis=1)
         return P_m, P_r + height[..., None] * n_r, n_r
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
-        """What there is to see at X_RM (realization, 12): see Survey."""
-        gaps = self.gaps(relative, deviations)
-        active = gaps < activity
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
+        """The number of points whose gap is below `activity` (realization,), and their moments (realization, side, moment)."""
+        active = self.gaps(relative, deviations) < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(gaps.min(axis=1), active.sum(axis=1), moments)
+        return active.sum(axis=1), moments
 
     def deepest(
         self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
@@ -73,45 +82,41 @@ class PairScan:
         gaps = self.gaps(relative, deviations)
         if may_carry is not None:
             gaps = np.where(may_carry, gaps, np.inf)
-        points = np.stack([gaps[:, c].argmin(axis=1) + c.start for c in self.clusters], axis=1)
+        firsts = self.starts[self.clusters]
+        points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
         return points, -np.take_along_axis(gaps, points, axis=1)
-
-
-@dataclass(frozen=True, eq=False)
-class Survey:
-    """What a pass over the points of a pair finds in each realization.
-
-    least      (realization,) least gap [mm]
-    active     (realization,) number of points whose gap is below the activity
-    moments    (realization, side, moment) of those
-    """
-
-    least: np.ndarray
-    active: np.ndarray
-    moments: np.ndarray
 
 
 class CompiledScan(PairScan):
     """A scan whose passes are compiled; PairScan is the same in NumPy."""
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> Survey:
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
         count = len(relative)
-        found = Survey(np.empty(count), np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS)))
+        active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.survey(
-            self.matrix, self._tables, poses, heights, self._columns, activity, found.least, found.active, found.moments
-        )
-        return found
+        kernel.survey(self._points, self._tables, self._sums, poses, heights, activity, active, moments)
+        return active, moments
 
     def deepest(
         self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        points = np.empty((len(relative), len(self.clusters)), dtype=np.int64)
+        points = np.empty((len(relative), len(self.clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         mask = np.empty((0, 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(self.matrix, self._starts, poses, heights, self._columns, mask, points, gaps)
+        kernel.deepest(self._points, self.clusters, poses, heights, mask, points, gaps)
         return points, -gaps
+
+    @cached_property
+    def _points(self) -> tuple[np.ndarray, ...]:
+        """What the kernel knows of the points. The height of a point that stands out is not bounded."""
+        of = self.coordinates[1:]
+        low, high = (extreme.reduceat(of, self.starts[:-1], axis=1) for extreme in (np.minimum, np.maximum))
+        halves = (high - low) / 2 + SLACKNESS * np.abs(of).max(initial=0)
+        if self.locators is not None:
+            halves[:] = np.inf
+        columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
+        return self.basis, self.coordinates, self.starts, np.ascontiguousarray((low + high) / 2), halves, columns
 
     @cached_property
     def _tables(self) -> np.ndarray:
@@ -119,31 +124,45 @@ class CompiledScan(PairScan):
         return np.array(self.tables).reshape(len(self.tables), MOMENTS, len(self.P_m))
 
     @cached_property
-    def _starts(self) -> np.ndarray:
-        """First point of each cluster, and the end."""
-        return np.array([*(c.start for c in self.clusters), len(self.P_m)])
-
-    @cached_property
-    def _columns(self) -> np.ndarray:
-        """The locators, none of them for a pair of faces."""
-        return np.array([] if self.locators is None else self.locators, dtype=np.int64)
+    def _sums(self) -> np.ndarray:
+        """Summed moments of the leaves, (leaf, side, moment)."""
+        return np.ascontiguousarray(np.add.reduceat(self._tables, self.starts[:-1], axis=2).transpose(2, 0, 1))
 
 
-def pair_scan(pair: ContactPoints, matrix: np.ndarray, tables: list[np.ndarray], clusters: int) -> PairScan:
-    """Sort the points of a pair into at most `clusters` clusters of neighbours; supports all have one of their own."""
-    label = _cluster(pair.P_m, clusters if pair.locators is None else len(pair.P_m))
-    order = np.argsort(label, kind="stable")
-    ends = np.cumsum(np.bincount(label))
-    slices = tuple(slice(int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True) if a < b)
+def pair_scan(
+    pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, chosen: np.ndarray | None = None
+) -> PairScan:
+    """Sort the points of a pair, or some `chosen` ones, into clusters of neighbours, at most so many; and those into leaves.
+
+    Supports have a cluster each.
+    """
+    chosen = np.arange(len(pair.P_m)) if chosen is None else chosen
+    label = _cluster(pair.P_m[chosen], clusters if pair.locators is None else len(chosen))
+    found = [_leaves(chosen[label == one], gaps.coordinates[1:]) for one in range(label.max() + 1)]
+    leaves = [leaf for cluster in found for leaf in cluster]
+    order = np.concatenate(leaves)
     return CompiledScan(
-        matrix=np.ascontiguousarray(matrix[:, order]),
+        basis=gaps.basis,
+        coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
         tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
         P_m=pair.P_m[order],
         P_r=pair.P_r[order],
         n_r=pair.n_r[order],
         locators=None if pair.locators is None else pair.locators[order],
-        clusters=slices,
+        starts=np.cumsum([0, *map(len, leaves)]),
+        clusters=np.cumsum([0, *map(len, found)]),
     )
+
+
+def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
+    """Halve `points` across their longest extent until no part has more than LEAF of them."""
+    if len(points) <= kernel.LEAF:
+        return [points]
+    of = coordinates[:, points]
+    # Whole leaves on one side, so that only the last one is not full.
+    half = kernel.LEAF * -(-len(points) // (2 * kernel.LEAF))
+    order = np.argpartition(of[int(np.ptp(of, axis=1).argmax())], half) if len(of) else np.arange(len(points))
+    return _leaves(points[order[:half]], coordinates) + _leaves(points[order[half:]], coordinates)
 
 
 def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
@@ -155,10 +174,10 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
     while len(seeds) < clusters:
         seeds.append(int(np.argmax(distance2)))
         np.minimum(distance2, ((points - points[seeds[-1]]) ** 2).sum(axis=1), out=distance2)
-    return np.asarray(cKDTree(points[seeds]).query(points)[1])
+    return np.unique(cKDTree(points[seeds]).query(points)[1], return_inverse=True)[1]
 
 
 def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """Least gap (row, pair) [mm] of each pair at X_RM (row, pair, 12)."""
-    each = [scan.survey(relative[:, k], deviations, -np.inf).least for k, scan in enumerate(scans)]
+    each = [-scan.deepest(relative[:, k], deviations)[1].max(axis=1) for k, scan in enumerate(scans)]
     return np.stack(each, axis=1)

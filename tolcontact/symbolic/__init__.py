@@ -1,8 +1,21 @@
 """Compile: poses, gaps and measures as CasADi expressions, and the one QP Function. CasADi stays in this folder."""
 
+from tolcontact.symbolic.contact_program import SLOTS
+from tolcontact.symbolic.contact_solver import ContactSolver
+from tolcontact.symbolic.gap_map import GapMap
 from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import usable_plugins
 from tolcontact.symbolic.pose import ENTRIES
 from tolcontact.symbolic.program import ContactGroup, Program, compile_program
 
-__all__ = ["ENTRIES", "MOMENTS", "ContactGroup", "Program", "compile_program", "usable_plugins"]
+__all__ = [
+    "ENTRIES",
+    "MOMENTS",
+    "SLOTS",
+    "ContactGroup",
+    "ContactSolver",
+    "GapMap",
+    "Program",
+    "compile_program",
+    "usable_plugins",
+]

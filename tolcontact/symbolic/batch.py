@@ -3,39 +3,25 @@
 import contextlib
 import io
 import math
-from collections.abc import Iterator, Sequence
-from typing import Protocol
+import threading
+from collections.abc import Iterator, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.symbolic.native import Native, UnknownInstructionError
 
-WIDTH = 64
+WIDTHS = (256, 16)  # realizations in a call of CasADi
+ENOUGH = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
 LARGEST = 300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
 
-
-class Evaluator(Protocol):
-    """Evaluates a Function on arrays (realization, stored entry).
-
-    Returns its outputs, likewise, and `failed` (realization,): those whose evaluation gave up; their outputs are NaN.
-    """
-
-    def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]: ...
-
-
-def evaluator(function: ca.Function) -> Evaluator:
-    """The fastest way to evaluate a Function of scalar expressions."""
-    if function.n_instructions() <= LARGEST:
-        with contextlib.suppress(UnknownInstructionError):
-            return Native(function)
-    return Mapped(function)
+_STREAMS = threading.RLock()
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
     """Swallow what plugins print to Python's streams: banners that no option turns off."""
-    with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+    with _STREAMS, contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         yield
 
 
@@ -46,11 +32,11 @@ class Batch:
         inputs = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
         outputs = [ca.densify(output) for output in function.call(inputs)]
         self._names, self._results = function.name_in(), function.name_out()
-        self._evaluate = evaluator(ca.Function(function.name(), inputs, outputs))
+        self._evaluate = Expressions(ca.Function(function.name(), inputs, outputs))
 
     def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
         """Evaluate for all realizations: `name=(realization, ...)` for each input; outputs by name, (realization, entry)."""
-        outputs, _ = self._evaluate([flat(arrays[name]) for name in self._names])
+        outputs = self._evaluate([flat(arrays[name]) for name in self._names])
         return dict(zip(self._results, outputs, strict=True))
 
 
@@ -59,70 +45,118 @@ def flat(array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array, dtype=float).reshape(len(array), math.prod(array.shape[1:]))
 
 
-class Mapped:
-    """A Function that CasADi evaluates itself, WIDTH realizations in a call; QP solvers above all.
+class Expressions:
+    """A Function of scalar expressions: interpreted by CasADi, compiled once it was evaluated often. Threads may share it.
 
-    Not to be shared between threads: one evaluation at a time uses its buffers.
+    Both ways give the same to the last bit, so that nobody needs to know which one it was.
     """
 
     def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self._interpreted = Mapped(function)
+        self._native: Native | None = None
+        self._left = ENOUGH if function.n_instructions() <= LARGEST else math.inf
+        self._lock = threading.Lock()
+
+    def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Outputs (realization, stored entry) for inputs (realization, stored entry)."""
+        if self._native is None:
+            with self._lock:
+                self._left -= len(inputs[0])
+                if self._left < 0:
+                    self._compile()
+                if self._native is None:
+                    return self._interpreted(inputs)[0]
+        return self._native(inputs)
+
+    def _compile(self) -> None:
+        try:
+            self._native = Native(self._function)
+        except UnknownInstructionError:
+            self._left = math.inf
+
+
+class Mapped:
+    """A Function that CasADi evaluates itself, many realizations in a call; QP solvers above all.
+
+    Not to be shared between threads: one evaluation at a time uses its buffers. `given` are inputs, by position, that are
+    the same in all realizations.
+    """
+
+    def __init__(self, function: ca.Function, given: Mapping[int, np.ndarray] | None = None) -> None:
         # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
         caller = ca.Function("caller", inputs, function.call(inputs))
-        self._many = _Buffered(caller.map(WIDTH), WIDTH)
-        self._one = _Buffered(caller, 1)
+        self._calls = [_Buffered(caller.map(width) if width > 1 else caller, width, given or {}) for width in (*WIDTHS, 1)]
         self._solvers = [function] if function.is_a("Conic") else []
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+        """For the inputs (realization, stored entry) that are not given: outputs, likewise, and `failed` (realization,).
+
+        Outputs are NaN where the evaluation gave up.
+        """
         count = len(inputs[0])
-        results = [np.empty((count, size)) for size in self._one.sizes_out]
+        results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
         failed = np.zeros(count, dtype=bool)
-        start = 0
-        while start < count:
-            width = WIDTH if count - start >= WIDTH else 1
-            call = self._many if width == WIDTH else self._one
-            rows = slice(start, start + width)
+        for call, start, stop in self._turns(count):
+            rows = slice(start, stop)
             if not call([array[rows] for array in inputs], [result[rows] for result in results]):
                 # A plugin that gives up on one realization ends the whole call (qpOASES does), so find out which.
                 self._forget()
-                for k in range(start, start + width):
+                for k in range(start, stop):
                     one = slice(k, k + 1)
-                    if not self._one([array[one] for array in inputs], [result[one] for result in results]):
+                    if not self._calls[-1]([array[one] for array in inputs], [result[one] for result in results]):
                         failed[k] = True
                         self._forget()
                         for result in results:
                             result[k] = np.nan
-            start += width
         return results, failed
+
+    def _turns(self, count: int) -> Iterator[tuple["_Buffered", int, int]]:
+        """Who evaluates which realizations; the narrower of WIDTHS may have idle places at the end."""
+        start = 0
+        while start < count:
+            call = self._calls[0] if count - start >= WIDTHS[0] else self._calls[1] if count - start > 1 else self._calls[2]
+            stop = min(start + call.width, count)
+            yield call, start, stop
+            start = stop
 
     def _forget(self) -> None:
         """Give the solvers a new memory. qpOASES starts from its last problem, and once it has failed it fails for ever."""
         for solver in self._solvers:
             solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
-        self._many.is_new = self._one.is_new = True
+        for call in self._calls:
+            call.is_new = True
 
 
 class _Buffered:
-    """One Function with arrays that stay where they are."""
+    """One Function, of `width` realizations at once, with arrays that stay where they are."""
 
-    def __init__(self, function: ca.Function, width: int) -> None:
+    def __init__(self, function: ca.Function, width: int, given: Mapping[int, np.ndarray]) -> None:
         self._buffer, self._evaluate = function.buffer()
-        self._inputs = [np.zeros(function.nnz_in(i)) for i in range(function.n_in())]
-        self._outputs = [np.zeros(function.nnz_out(i)) for i in range(function.n_out())]
-        self.sizes_out = [output.size // width for output in self._outputs]
-        for i, array in enumerate(self._inputs):
-            self._buffer.set_arg(i, memoryview(array))  # type: ignore[call-arg, arg-type]
+        inputs = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
+        self._outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
+        self.width = width
+        self.sizes_out = [output.shape[1] for output in self._outputs]
+        for i, array in enumerate(inputs):
+            if i in given:
+                array[:] = given[i]
+            self._buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self._outputs):
-            self._buffer.set_res(i, memoryview(array))  # type: ignore[call-arg, arg-type]
+            self._buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        self._all = inputs  # the buffer does not keep them alive
+        self._inputs = [array for i, array in enumerate(inputs) if i not in given]
         self.is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
-        """Evaluate; False where the Function gave up."""
+        """Evaluate for up to `width` realizations; idle places repeat the last one. False where the Function gave up."""
+        count = len(inputs[0])
         for buffer, array in zip(self._inputs, inputs, strict=True):
-            buffer[:] = array.ravel()
+            buffer[:count] = array
+            buffer[count:] = array[-1:]
         with quiet() if self.is_new else contextlib.nullcontext():
             self._evaluate()
         self.is_new = False
         for buffer, array in zip(self._outputs, outputs, strict=True):
-            array[:] = buffer.reshape(array.shape)
+            array[:] = buffer[:count]
         return bool(self._buffer.ret() == 0)

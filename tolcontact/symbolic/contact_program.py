@@ -10,17 +10,19 @@ objective at the present poses, is zero in the raw state but for forces; h are t
 objective holds them.
 """
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.method import Method
 from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, quadratic, rigid
 from tolcontact.symbolic.criterion import criterion, two_sided
 from tolcontact.symbolic.gap import gap
+from tolcontact.symbolic.gap_map import GapMap
 from tolcontact.symbolic.groups import Group
 from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import Plugin, solver
@@ -29,25 +31,40 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "bend", "reactions", "P_m", "P_r", "n_r", "filled")
+INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "reactions", "bend", "P_m", "P_r", "n_r", "filled")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
 
 
 @dataclass(frozen=True, eq=False)
 class ContactProgram:
-    """The Functions of a group: `assemble` makes the QP of the inputs, `qp` solves it, `finish` makes the outputs.
+    """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
 
     slacks       how many of the QP's last variables are slacks: they are not negative
+    standing     for each pair of the group the contact points that always have a row, None where slots hold changing points
     """
 
     assemble: ca.Function
-    qp: ca.Function
+    plugin: Plugin
     finish: ca.Function
     slacks: int
+    standing: tuple[np.ndarray | None, ...]
+
+    def qp(self, *, second: bool = False) -> ca.Function:
+        """A new solver, without memory of any problem; for a second try if asked."""
+        return solver(self.plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"), second=second)
+
+    @property
+    def spans(self) -> list[slice]:
+        """The rows of each pair among those of the group."""
+        ends = np.cumsum([0, *(SLOTS if points is None else len(points) for points in self.standing)])
+        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
-def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plugin) -> ContactProgram:
-    """The Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` = q * SLOTS rows.
+def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], method: Method, plugin: Plugin) -> ContactProgram:
+    """The Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` rows.
+
+    Where few points of a pair can be the deepest each of them has a row, always. The `v` other pairs have SLOTS rows each, for
+    points that change: `m` = v * SLOTS.
 
     poses (12 p)         poses of the group's parts about which the gaps are linearized
     raw (12 p)           their raw poses, from which displacements count
@@ -55,20 +72,25 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
     deviations (l)       of all locators of the model [mm]
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
-    bend (12 q)          where it counts: the reactions' sum of the gaps' gradients by the entries of X_RM
-    reactions (k)        where it counts: the reaction that a slot's point had before
-    P_m, P_r, n_r (3, k) the contact points whose gaps are constrained, SLOTS for each pair
-    filled (k)           1 where a slot holds a point, 0 where it is empty
+    reactions (k)        where it counts: the reaction that a row's point had before
+    bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
+                         by the entries of X_RM
+    P_m, P_r, n_r (3, m) the contact points in the slots
+    filled (m)           1 where a slot holds a point, 0 where it is empty
 
     corrected (12 p)     poses after the correction
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
     relative (12 q)      X_RM of every pair at `corrected`
     multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
-    stationarity, natural_residual   KKT residuals [mm]: max |Hy + f - A'lambda| and max |min(row, lambda)|
+    stationarity, natural_residual   KKT residuals [mm], in y: max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows of
+                         length 1, or how far a gap remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|
     """
-    rows = SLOTS * len(group.pairs)
+    standing = tuple(_standing(gaps[index], method) for index in group.pairs)
+    varying = sum(points is None for points in standing)
+    slots = SLOTS * varying
+    rows = slots + sum(len(points) for points in standing if points is not None)
     inputs = [
         ca.SX.sym("poses", ENTRIES * len(group.parts)),
         ca.SX.sym("raw", ENTRIES * len(group.parts)),
@@ -76,19 +98,26 @@ def contact_program(nominal: Nominal, group: Group, method: Method, plugin: Plug
         ca.SX.sym("deviations", len(nominal.locator_labels)),
         ca.SX.sym("firmness"),
         ca.SX.sym("newton"),
-        ca.SX.sym("bend", ENTRIES * len(group.pairs)),
         ca.SX.sym("reactions", rows),
-        *(ca.SX.sym(name, 3, rows) for name in ("P_m", "P_r", "n_r")),
-        ca.SX.sym("filled", rows),
+        ca.SX.sym("bend", ENTRIES * varying),
+        *(ca.SX.sym(name, 3, slots) for name in ("P_m", "P_r", "n_r")),
+        ca.SX.sym("filled", slots),
     ]
-    assemble, finish = _around_the_solver(nominal, group, method, inputs)
-    qp = solver(plugin, assemble.sparsity_out("h"), assemble.sparsity_out("a"))
-    return ContactProgram(assemble, qp, finish, len(group.pairs))
+    assemble, finish = _around_the_solver(nominal, group, standing, method, inputs)
+    return ContactProgram(assemble, plugin, finish, len(group.pairs), standing)
 
 
-def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: list[ca.SX]) -> tuple[ca.Function, ca.Function]:
+def _standing(gaps: GapMap, method: Method) -> np.ndarray | None:
+    """The points of a pair that always have a row: those that can be the deepest, where they are few and stay the same."""
+    stays = method.search == "fixed" and method.active_set == "closed"
+    return gaps.corners if stays and len(gaps.corners) <= SLOTS else None
+
+
+def _around_the_solver(
+    nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None], method: Method, inputs: list[ca.SX]
+) -> tuple[ca.Function, ca.Function]:
     """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, firmness, newton, bend, reactions, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, firmness, newton, reactions, bend, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -98,25 +127,42 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     update = rigid if method.resolution == "exact" else published
     poses = [update(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
 
-    rows, constants, linearized = [], [], []
+    owners: list[int] = []
+    rows: list[ca.SX] = []
+    constants, fills, bends, linearized = ([] for _ in range(4))
+    in_slots = iter(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, filled.T)), strict=True))
+    slot_bends = iter(ca.vertsplit(bend, ENTRIES) if bend.numel() else [])
     for k, (before, after) in enumerate(zip(_pairs(nominal, group, now), _pairs(nominal, group, moved), strict=True)):
         by_z = ca.substitute(ca.jacobian(after.vector(), z), z, at_rest)
         linearized.append(before.vector() + by_z @ z)
-        for slot in range(k * SLOTS, (k + 1) * SLOTS):
+        held_here = standing[k]
+        if held_here is None:
+            points = list(itertools.islice(in_slots, SLOTS))
+            bends.append(next(slot_bends))
+        else:
+            points = _always(nominal.pairs[group.pairs[k]], held_here, deviations)
+            bends.append(ca.SX.zeros(ENTRIES))
+        for p_m, p_r, n, is_filled in points:
             X = ca.SX.sym("X_RM", ENTRIES)
-            g = gap(pose_of(X), P_m[:, slot], P_r[:, slot], n_r[:, slot])
-            rows.append(ca.substitute(ca.jacobian(g, X), X, before.vector()) @ by_z)
+            g = gap(pose_of(X), p_m, p_r, n)
+            slope = ca.substitute(ca.jacobian(g, X), X, before.vector())
+            if held_here is not None:
+                bends[k] += slope.T * reactions[len(rows)]
+            rows.append(slope @ by_z)
             constants.append(ca.substitute(g, X, before.vector()))
+            fills.append(is_filled)
+            owners.append(k)
     slots = len(rows)
+    fill = ca.vertcat(*fills)
     held, elongation = _held(nominal, group, moved, deviations, z) if method.objective == "seating" else (0, ca.SX(0, 1))
     goal = criterion(nominal, group, method, moments, firmness, raw, moved, z)
     Q, pull = (ca.substitute(each, z, at_rest) for each in ca.hessian(goal.energy, z))
     A, g = ca.vertcat(*rows), ca.vertcat(*constants)
     if method.resolution == "exact":
         curved = [quadratic(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
-        curvature = _curvature(nominal, group, method, moments, firmness, raw, curved, z, bend / goal.scale) - Q
+        curvature = _curvature(nominal, group, method, moments, firmness, raw, curved, z, ca.vertcat(*bends) / goal.scale) - Q
         # Rows that carry are held in the objective, too: it does not change the answer, and makes it convex again.
-        hold = (1 + 2 * ca.sum1(reactions) / goal.scale / group.length) * ca.if_else(reactions > 0, filled, 0)
+        hold = (1 + 2 * ca.sum1(reactions) / goal.scale / group.length) * ca.if_else(reactions > 0, fill, 0)
         curvature += A.T @ ca.diag(hold) @ A
         counts = ca.logic_and(newton, _is_convex(Q + curvature))
         Q += ca.if_else(counts, curvature, 0)
@@ -124,30 +170,37 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     H, U = _conditioned(Q)
     whiten = _whitening(U)
     A = A @ whiten
-    A = ca.vertcat(*(_or_idle(filled[k], A[k, :], k) for k in range(slots)))
+    # Rows of length 1 in y: multipliers are then in the norm of the objective, however weakly that holds a freedom.
+    length = ca.sqrt(ca.sum2(A**2))
+    length = ca.if_else(length > 0, length, 1)
+    A = ca.diag(1 / length) @ A
+    A = ca.vertcat(*(A[k, :] if fill[k].is_one() else _or_idle(fill[k], A[k, :], k) for k in range(slots)))
     B = ca.substitute(ca.jacobian(elongation, z), z, at_rest) @ whiten
     pairs = len(group.pairs)
-    A = ca.blockcat([[A, SLACK * ca.kron(ca.DM.eye(pairs), ca.DM.ones(SLOTS))], [B, ca.SX(held, pairs)]])
+    opens = ca.sparsify(ca.DM(np.equal.outer(owners, range(pairs)).astype(float)))
+    A = ca.blockcat([[A, ca.diag(SLACK / length) @ opens], [B, ca.SX(held, pairs)]])
     rest = -ca.substitute(elongation, z, at_rest)
-    lower = ca.vertcat(ca.if_else(filled, -g, -FAR * group.length), rest)
+    lower = ca.vertcat(ca.if_else(fill, -g / length, -FAR * group.length), rest)
     upper = ca.vertcat(ca.DM(np.full(slots, np.inf)), rest)
     f = ca.vertcat(whiten.T @ pull, ca.DM(np.full(pairs, group.length)))
     H = ca.diagcat(H, ca.SX.eye(pairs))
-    assemble = ca.Function("assemble", inputs, [H, f, A, lower, upper, U], list(INPUTS), ["h", "g", "a", "lower", "upper", "u"])
+    problem = [H, f, A, lower, upper, U, length]
+    assemble = ca.Function("assemble", inputs, problem, list(INPUTS), ["h", "g", "a", "lower", "upper", "u", "length"])
 
     size = z.numel() + pairs
     x, lam_a, lam_x = ca.SX.sym("x", size), ca.SX.sym("lam_a", slots + held), ca.SX.sym("lam_x", size)
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
     # The results get the QP's matrices as inputs, so that nothing is computed twice and the residuals are of what was solved.
     H_in, A_in, U_in = (ca.SX.sym("M", matrix.sparsity()) for matrix in (H, A, U))
-    f_in, lower_in = ca.SX.sym("f", f.shape), ca.SX.sym("lower", lower.shape)
+    f_in, lower_in, length_in = (ca.SX.sym("v", vector.shape) for vector in (f, lower, length))
     excess = A_in @ x - lower_in
-    complementarity = ca.norm_inf(ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(s, -lam_s)))
+    natural = ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(s, -lam_s), ca.fmin(excess[:slots] * length_in, 0))
+    complementarity = ca.norm_inf(natural)
     results = [
         ca.vertcat(*(pose.vector() for pose in poses)),
         ca.vertcat(*linearized),
         ca.vertcat(*(X_RM.vector() for X_RM in _pairs(nominal, group, poses))),
-        -lam_a[:slots] * filled * goal.scale,
+        -lam_a[:slots] / length_in * fill * goal.scale,
         ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x),
         ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
         SLACK * s,
@@ -155,8 +208,16 @@ def _around_the_solver(nominal: Nominal, group: Group, method: Method, inputs: l
     ]
     step = _whitening(U_in) @ y
     results = [ca.densify(ca.substitute(result, z, step)) for result in results]
-    finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, x, lam_a, lam_x], results)
+    finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, length_in, x, lam_a, lam_x], results)
     return assemble, finish
+
+
+def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[tuple[ca.SX, ...]]:
+    """P^m, P^r, n^r of points that have a row whatever happens, and that it is filled: constants, but for supports' heights."""
+    P_m, P_r, n_r = (ca.SX(ca.DM(each[points].T)) for each in (pair.P_m, pair.P_r, pair.n_r))
+    if pair.locators is not None:
+        P_r = P_r + n_r @ ca.diag(deviations[[int(column) for column in pair.locators[points]]])
+    return list(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))
 
 
 def _curvature(

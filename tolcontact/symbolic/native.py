@@ -12,7 +12,10 @@ import casadi as ca
 import numpy as np
 from llvmlite import binding, ir
 
-_DOUBLE, _INDEX = ir.DoubleType(), ir.IntType(64)
+LANES = 4
+_INDEX = ir.IntType(64)
+_DOUBLE = ir.DoubleType()
+_LANES = ir.VectorType(_DOUBLE, LANES)
 
 
 class UnknownInstructionError(Exception):
@@ -30,12 +33,12 @@ class Native:
         pointers = ctypes.POINTER(ctypes.c_void_p)
         self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointers, pointers)(address)
 
-    def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+    def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         count = len(inputs[0])
         inputs = [np.ascontiguousarray(array, dtype=float) for array in inputs]
         results = [np.empty((count, size)) for size in self.sizes_out]
         self._evaluate(count, _pointers(inputs), _pointers(results))
-        return results, np.zeros(count, dtype=bool)
+        return results
 
 
 def _pointers(arrays: Sequence[np.ndarray]) -> ctypes.Array:
@@ -43,7 +46,10 @@ def _pointers(arrays: Sequence[np.ndarray]) -> ctypes.Array:
 
 
 def _module(function: ca.Function) -> ir.Module:
-    """void evaluate(count, inputs, results): for each realization all instructions."""
+    """void evaluate(count, inputs, results): all instructions, for LANES realizations at once.
+
+    In the last turn of the loop the lanes beyond `count` repeat the last realization.
+    """
     module = ir.Module("contact")
     pointer = _DOUBLE.as_pointer()
     evaluate = ir.Function(
@@ -56,17 +62,20 @@ def _module(function: ca.Function) -> ir.Module:
         [builder.load(builder.gep(array, [_INDEX(i)])) for i in range(number)]
         for array, number in ((inputs, function.n_in()), (results, function.n_out()))
     ]
+    last = builder.sub(count, _INDEX(1))
     builder.cbranch(builder.icmp_signed(">", count, _INDEX(0)), body, done)
     builder.position_at_end(body)
     k = builder.phi(_INDEX)
     k.add_incoming(_INDEX(0), entry)
+    lanes = [builder.add(k, _INDEX(lane)) for lane in range(LANES)]
+    lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
     sizes = ([function.nnz_in(i) for i in range(function.n_in())], [function.nnz_out(i) for i in range(function.n_out())])
     here = [
-        [builder.gep(place, [builder.mul(k, _INDEX(size))]) for place, size in zip(*both, strict=True)]
+        [[builder.gep(place, [builder.mul(lane, _INDEX(size))]) for lane in lanes] for place, size in zip(*both, strict=True)]
         for both in zip(places, sizes, strict=True)
     ]
     _translate(function, builder, *here)
-    following = builder.add(k, _INDEX(1))
+    following = builder.add(k, _INDEX(LANES))
     k.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, count), body, done)
     ir.IRBuilder(done).ret_void()
@@ -74,30 +83,43 @@ def _module(function: ca.Function) -> ir.Module:
 
 
 def _translate(function: ca.Function, builder: ir.IRBuilder, inputs: list, results: list) -> None:
+    """The instructions of a Function; `inputs` and `results` hold, for each argument and lane, where it is."""
     work: dict[int, ir.Value] = {}
     for number in range(function.n_instructions()):
         operation = function.instruction_id(number)
         to, of = function.instruction_output(number), function.instruction_input(number)
         if operation == ca.OP_OUTPUT:
-            builder.store(work[of[0]], builder.gep(results[to[0]], [_INDEX(to[1])]))
-            continue
-        if operation == ca.OP_INPUT:
-            work[to[0]] = builder.load(builder.gep(inputs[of[0]], [_INDEX(of[1])]))
+            for lane, place in enumerate(results[to[0]]):
+                value = builder.extract_element(work[of[0]], ir.IntType(32)(lane))
+                builder.store(value, builder.gep(place, [_INDEX(to[1])]))
+        elif operation == ca.OP_INPUT:
+            value = _LANES(ir.Undefined)
+            for lane, place in enumerate(inputs[of[0]]):
+                loaded = builder.load(builder.gep(place, [_INDEX(of[1])]))
+                value = builder.insert_element(value, loaded, ir.IntType(32)(lane))
+            work[to[0]] = value
         elif operation == ca.OP_CONST:
-            work[to[0]] = _DOUBLE(function.instruction_constant(number))
+            work[to[0]] = _constant(function.instruction_constant(number))
         elif operation in OPERATIONS:
             work[to[0]] = OPERATIONS[operation](builder, *(work[index] for index in of))
         else:
             raise UnknownInstructionError(f"instruction {operation}")
 
 
+def _constant(value: float) -> ir.Constant:
+    return _LANES([_DOUBLE(value)] * LANES)
+
+
+ZERO, ONE = _constant(0.0), _constant(1.0)
+
+
 def _truth(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
     """1.0 or 0.0 of a bit."""
-    return builder.select(value, _DOUBLE(1.0), _DOUBLE(0.0))
+    return builder.select(value, ONE, ZERO)
 
 
 def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
-    return builder.fcmp_unordered("!=", x, _DOUBLE(0.0))
+    return builder.fcmp_unordered("!=", x, ZERO)
 
 
 def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
@@ -106,7 +128,12 @@ def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.V
 
 
 def _call(name: str) -> Callable[[ir.IRBuilder, ir.Value], ir.Value]:
-    return lambda builder, x: builder.call(builder.module.declare_intrinsic(f"llvm.{name}", [_DOUBLE]), [x])
+    def call(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
+        full = f"llvm.{name}.v{LANES}f64"
+        declared = builder.module.globals.get(full) or ir.Function(builder.module, ir.FunctionType(_LANES, [_LANES]), full)
+        return builder.call(declared, [x])
+
+    return call
 
 
 OPERATIONS: dict[int, Callable[..., ir.Value]] = {
@@ -118,7 +145,7 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
     ca.OP_NEG: lambda b, x: b.fneg(x),
     ca.OP_SQ: lambda b, x: b.fmul(x, x),
     ca.OP_TWICE: lambda b, x: b.fadd(x, x),
-    ca.OP_INV: lambda b, x: b.fdiv(_DOUBLE(1.0), x),
+    ca.OP_INV: lambda b, x: b.fdiv(ONE, x),
     ca.OP_FMIN: lambda b, x, y: _extreme(b, "<=", x, y),
     ca.OP_FMAX: lambda b, x, y: _extreme(b, ">=", x, y),
     ca.OP_LT: lambda b, x, y: _truth(b, b.fcmp_ordered("<", x, y)),
@@ -128,7 +155,7 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
     ca.OP_NOT: lambda b, x: _truth(b, b.not_(_holds(b, x))),
     ca.OP_AND: lambda b, x, y: _truth(b, b.and_(_holds(b, x), _holds(b, y))),
     ca.OP_OR: lambda b, x, y: _truth(b, b.or_(_holds(b, x), _holds(b, y))),
-    ca.OP_IF_ELSE_ZERO: lambda b, x, y: b.select(_holds(b, x), y, _DOUBLE(0.0)),
+    ca.OP_IF_ELSE_ZERO: lambda b, x, y: b.select(_holds(b, x), y, ZERO),
     **{getattr(ca, f"OP_{name.upper()}"): _call(name) for name in ("sqrt", "fabs", "sin", "cos", "exp", "log")},
 }
 
@@ -137,8 +164,10 @@ def _engine(module: ir.Module) -> binding.ExecutionEngine:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     parsed = binding.parse_assembly(str(module))
-    # Optimized the code would run twice as fast, and take four times as long to make: more than most runs would save.
-    target = binding.Target.from_default_triple().create_target_machine(opt=0)
+    # More optimization would take as long again, for code that is no faster.
+    target = binding.Target.from_default_triple().create_target_machine(
+        cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=1
+    )
     engine = binding.create_mcjit_compiler(parsed, target)
     engine.finalize_object()
     return engine

@@ -16,23 +16,36 @@ class Plugin:
     options     what we ask of it
     accuracy    residual of the KKT conditions [mm] up to which its answers count as solved. An interior-point solver
                 (piqp) needs a strict one: where a row hardly carries, an answer 0.1 mm off can have a residual of 1e-7 mm.
+    second      what changes in a second try of what it missed; None if it would give the same answer again
+    remembers   whether it starts each problem from the answer to the previous one
     """
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
     accuracy: float = 1e-8
+    second: dict[str, Any] | None = None
+    remembers: bool = False
 
 
 PLUGINS = {
     plugin.name: plugin
     for plugin in (
-        Plugin("qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}),
+        Plugin(
+            "qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}, second={}, remembers=True
+        ),
         Plugin(
             "osqp",
             {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}},
             1e-5,
+            second={},
+            remembers=True,
         ),
-        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}),
+        # Where rows contradict each other, its strict tolerances are below the rounding of multipliers: it goes in circles.
+        Plugin(
+            "daqp",
+            {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}},
+            second={"daqp": {"primal_tol": 1e-10, "dual_tol": 1e-12}},
+        ),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}, 1e-9),
         Plugin("highs", {"highs": {"output_flag": False}}, 1e-6),
         Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}, 1e-6),
@@ -76,9 +89,10 @@ def usable_plugins() -> list[str]:
     return [name for name in PLUGINS if is_usable(name)]
 
 
-def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
-    """A QP solver for these sparsities that reports failure in its outputs, never by an exception."""
-    return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**plugin.options, "error_on_fail": False})
+def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity, *, second: bool = False) -> ca.Function:
+    """A QP solver for these sparsities, or for a second try; it reports failure in its outputs, never by an exception."""
+    options = {**plugin.options, **((plugin.second or {}) if second else {}), "error_on_fail": False}
+    return ca.conic("qp", plugin.name, {"h": h, "a": a}, options)
 
 
 def is_usable(name: str) -> bool:

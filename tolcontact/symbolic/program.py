@@ -9,9 +9,10 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.method import Method
 from tolcontact.symbolic.batch import Batch, quiet
-from tolcontact.symbolic.contact_program import SLOTS, contact_program
+from tolcontact.symbolic.contact_program import ContactProgram, contact_program
 from tolcontact.symbolic.contact_solver import ContactSolver
 from tolcontact.symbolic.gap import gap_matrix
+from tolcontact.symbolic.gap_map import GapMap, gap_map
 from tolcontact.symbolic.groups import Group, contact_groups
 from tolcontact.symbolic.measure import measured
 from tolcontact.symbolic.placement import raw_poses
@@ -25,8 +26,8 @@ class ContactGroup:
     """A group of coupled parts and its QP (see contact_program)."""
 
     group: Group
+    program: ContactProgram
     solve: ContactSolver
-    slots: int = SLOTS
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +36,7 @@ class Program:
 
     place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
     observe      poses -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         one constant matrix (13, point) per pair: gaps = [X_RM, 1] @ matrix
+    gaps         one per pair: its gaps at X_RM
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     tapes        the users' own expressions by measure name
@@ -46,7 +47,7 @@ class Program:
     plugin: Plugin
     place: Batch
     observe: Batch
-    gaps: tuple[np.ndarray, ...]
+    gaps: tuple[GapMap, ...]
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     tapes: dict[str, Tape]
@@ -73,6 +74,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
         )
         groups = contact_groups(nominal)
+        gaps = tuple(gap_map(gap_matrix(pair), stand_out=pair.locators is not None) for pair in nominal.pairs)
         if method.objective == "seating":
             _check_forces(nominal, groups)
         return Program(
@@ -81,8 +83,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             plugin=chosen,
             place=Batch(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
             observe=Batch(observe),
-            gaps=tuple(gap_matrix(pair) for pair in nominal.pairs),
-            groups=tuple(ContactGroup(g, ContactSolver(contact_program(nominal, g, method, chosen))) for g in groups),
+            gaps=gaps,
+            groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
             nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
             tapes={
                 measure.name: record(value, entries)
@@ -90,6 +92,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 if not measure.points
             },
         )
+
+
+def _ready(group: Group, program: ContactProgram) -> ContactGroup:
+    return ContactGroup(group, program, ContactSolver(program))
 
 
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:

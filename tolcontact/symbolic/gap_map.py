@@ -1,0 +1,54 @@
+"""Gaps as affine functions of few coordinates of the contact points, and the points that can be the deepest.
+
+The gaps of all points at a pose are [X_RM, 1] @ G, with G constant. Where both faces are planes, gaps are affine in two
+coordinates of the points: G = basis @ coordinates, with three rows of coordinates instead of thirteen. An affine function has
+its least value at a corner of the points' convex hull, so that only the corners can be the deepest, whatever the pose.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+ROUNDING = 1e-13  # of the largest entry: normals of flat faces differ by that much
+
+
+@dataclass(frozen=True, eq=False)
+class GapMap:
+    """All gaps of a pair: [X_RM, 1] @ basis @ coordinates [mm].
+
+    basis         (13, r)
+    coordinates   (r, point), the first row is 1
+    corners       numbers of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
+    """
+
+    basis: np.ndarray
+    coordinates: np.ndarray
+    corners: np.ndarray
+
+
+def gap_map(G: np.ndarray, *, stand_out: bool = False) -> GapMap:
+    """Take the matrix G (13, point) apart, exactly but for rounding. Points that `stand_out` have heights of their own."""
+    centre = G.mean(axis=1)
+    U, S, V = np.linalg.svd(G - centre[:, None], full_matrices=False)
+    tolerance = ROUNDING * np.abs(G).max()
+    rank = 0
+    while rank < len(S) and np.abs(U[:, rank:] * S[rank:] @ V[rank:]).max() > tolerance:
+        rank += 1
+    basis = np.column_stack([centre, U[:, :rank]])
+    coordinates = np.vstack([np.ones(G.shape[1]), S[:rank, None] * V[:rank]])
+    return GapMap(basis, coordinates, np.arange(G.shape[1]) if stand_out else _corners(coordinates[1:]))
+
+
+def _corners(coordinates: np.ndarray) -> np.ndarray:
+    """Corners of the convex hull of points (coordinate, point), in order; all points beyond two coordinates."""
+    if len(coordinates) == 0:
+        return np.array([0])
+    if len(coordinates) == 1:
+        return np.unique([coordinates[0].argmin(), coordinates[0].argmax()])
+    if len(coordinates) == 2 and coordinates.shape[1] > 3:
+        try:
+            return np.sort(ConvexHull(coordinates.T).vertices)
+        except QhullError:  # all but on one line
+            pass
+    return np.arange(coordinates.shape[1])
