@@ -6,6 +6,7 @@ nothing holds, while the curvature of gaps and objective counts: it goes on with
 firmly first. With an iterated search, contact points are then projected again, and all of this repeated until the poses stay.
 """
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -15,7 +16,7 @@ from tolcontact.simulation.resolution import Resolution, Task
 from tolcontact.simulation.scan import PairScan, least_gaps, pair_scan
 from tolcontact.simulation.search import placed, reach, search
 from tolcontact.simulation.slots import Slots
-from tolcontact.symbolic import SLOTS, ContactGroup, ContactSolver, Program
+from tolcontact.symbolic import SLOTS, ContactGroup, Program
 
 LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
 CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
@@ -31,12 +32,12 @@ LOST = 1e5  # sizes of the parts: no step will bring it back
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup, solve: ContactSolver | None = None) -> None:
+    def __init__(self, program: Program, group: ContactGroup) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
         self._size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
-        self._step = LinearStep(program, group, solve or group.solve)
+        self._step = LinearStep(program, group)
         self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
         self._method = program.method
         self._surfaces = [program.nominal.pairs[pair].surface for pair in group.group.pairs]
@@ -49,6 +50,16 @@ class ContactResolver:
             some = self._method.search == "fixed" and self._method.active_set == "closed"
             self._candidates.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if some else self._scans[-1])
         self._reaches = [reach(scan) for scan in self._scans]
+
+    def twin(self) -> "ContactResolver":
+        """The same for another thread."""
+        other = copy.copy(self)
+        other._step = self._step.twin()
+        return other
+
+    def start_over(self) -> None:
+        """Forget all problems solved before, so that the next ones do not depend on them."""
+        self._step.start_over()
 
     @property
     def spans(self) -> list[slice]:

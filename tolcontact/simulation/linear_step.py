@@ -5,6 +5,7 @@ realizations in which another point is still inside enter again with their carry
 optimum of a strictly convex problem, so the rounds end, with the solution of the QP that has every row.
 """
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from tolcontact.simulation.resolution import Resolution, Task
 from tolcontact.simulation.scan import PairScan
 from tolcontact.simulation.slots import CARRIES, Slots
-from tolcontact.symbolic import ENTRIES, ContactGroup, ContactSolver, Program
+from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 PENETRATION = 1e-10  # mm: less than this is no penetration
@@ -21,13 +22,24 @@ PENETRATION = 1e-10  # mm: less than this is no penetration
 class LinearStep:
     """The QP of one group, ready to be solved for many realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup, solve: ContactSolver) -> None:
-        self._solve = solve
+    def __init__(self, program: Program, group: ContactGroup) -> None:
+        self._solve = group.solve
         self._parts = len(group.group.parts)
         self._plugin = program.plugin
         self.spans = group.program.spans
         self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
         self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
+
+    def twin(self) -> "LinearStep":
+        """The same for another thread."""
+        other = copy.copy(self)
+        other._solve = self._solve.twin()
+        return other
+
+    def start_over(self) -> None:
+        """Forget all problems solved before, where the solver starts from the last one."""
+        if self._plugin.remembers:
+            self._solve.start_over()
 
     def take(
         self,

@@ -1,6 +1,13 @@
-"""Deviations to corrected poses and measures, block by block."""
+"""Deviations to corrected poses and measures, block by block, on as many threads as there are processors.
 
+A block does not depend on the one before it, nor on the thread that simulates it: the results of a run are the same for any
+number of threads, to the last bit.
+"""
+
+import os
+from collections import deque
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 
 import numpy as np
 
@@ -12,12 +19,47 @@ from tolcontact.symbolic import ENTRIES, Program
 BLOCK = 4096  # as many as sampling draws at once
 
 
-def simulate_blocks(program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK) -> Iterator[Block]:
-    """Realizations `start` to `samples` in blocks. The realization k is the same in any block and any run."""
-    resolvers = [ContactResolver(program, group) for group in program.groups]
-    for first in range(start, samples, block):
+def simulate_blocks(
+    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK, threads: int | None = None
+) -> Iterator[Block]:
+    """Realizations `start` to `samples` in blocks, in order. The realization k is the same in any run.
+
+    At most two blocks for each of the `threads` (by default one for each processor) are in memory.
+    """
+    threads = threads or processors()
+    firsts = range(start, samples, block)
+    originals = [ContactResolver(program, group) for group in program.groups]
+    idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(firsts)))]
+    begun: deque[tuple[Future[Block], list[ContactResolver]]] = deque()
+
+    def simulate(first: int, resolvers: list[ContactResolver]) -> Block:
         deviations = draw(program.nominal, seed=seed, start=first, stop=min(first + block, samples))
-        yield simulate_block(program, deviations, start=first, resolvers=resolvers)
+        return simulate_block(program, deviations, start=first, resolvers=resolvers)
+
+    def finish_one() -> Block:
+        future, resolvers = begun.popleft()
+        done = future.result()
+        idle.append(resolvers)
+        return done
+
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for first in firsts:
+            if not idle:
+                yield finish_one()
+            resolvers = idle.pop()
+            for resolver in resolvers:
+                resolver.start_over()  # here, since CasADi's objects are not to be made by several threads at once
+            begun.append((pool.submit(simulate, first, resolvers), resolvers))
+        while begun:
+            yield finish_one()
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def simulate_block(

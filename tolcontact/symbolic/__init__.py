@@ -1,7 +1,6 @@
 """Compile: poses, gaps and measures as CasADi expressions, and the one QP Function. CasADi stays in this folder."""
 
 from tolcontact.symbolic.contact_program import SLOTS
-from tolcontact.symbolic.contact_solver import ContactSolver
 from tolcontact.symbolic.gap_map import GapMap
 from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import usable_plugins
@@ -13,7 +12,6 @@ __all__ = [
     "MOMENTS",
     "SLOTS",
     "ContactGroup",
-    "ContactSolver",
     "GapMap",
     "Program",
     "compile_program",

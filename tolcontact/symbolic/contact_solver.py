@@ -4,7 +4,7 @@ import copy
 
 import numpy as np
 
-from tolcontact.symbolic.batch import Expressions, Mapped, flat
+from tolcontact.symbolic.batch import Expressions, Mapped, flat, quiet
 from tolcontact.symbolic.contact_program import INPUTS, OUTPUTS, ContactProgram
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
@@ -36,7 +36,8 @@ class ContactSolver:
         return answer
 
     def _solver(self, *, second: bool = False) -> Mapped:
-        qp = self._program.qp(second=second)
+        with quiet():
+            qp = self._program.qp(second=second)
         self._inputs = [name for name in qp.name_in() if name in ASSEMBLED]
         self._results = qp.name_out()
         at_least = np.zeros(qp.numel_in("g"))
@@ -44,7 +45,8 @@ class ContactSolver:
         bounds = {"lbx": at_least, "ubx": np.full(at_least.shape, np.inf)}
         # The other inputs are zero, and starting points that no plugin is told to use.
         given = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in ASSEMBLED}
-        return Mapped(qp, given)
+        with quiet():
+            return Mapped(qp, given)
 
     def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
         """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
