@@ -53,6 +53,7 @@ class Expressions:
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
+        self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._interpreted = Mapped(function)
         self._native: Native | None = None
         self._left = ENOUGH if function.n_instructions() <= LARGEST else math.inf

@@ -9,6 +9,8 @@ from tolcontact.symbolic.contact_program import INPUTS, OUTPUTS, ContactProgram
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
 
+TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
+
 
 class ContactSolver:
     """Solves the QPs of a ContactProgram. Not to be shared between threads."""
@@ -54,6 +56,14 @@ class ContactSolver:
         They are NaN where the solver gave up.
         """
         inputs = [flat(arrays[name]) for name in INPUTS]
+        outputs = [np.empty((len(inputs[0]), size)) for size in self._finish.sizes_out]
+        for start in range(0, len(inputs[0]), TOGETHER):
+            rows = slice(start, start + TOGETHER)
+            for output, part in zip(outputs, self._solve_some([array[rows] for array in inputs]), strict=True):
+                output[rows] = part
+        return dict(zip(OUTPUTS, outputs, strict=True))
+
+    def _solve_some(self, inputs: list[np.ndarray]) -> list[np.ndarray]:
         assembled = self._assemble(inputs)
         solved, failed = self._solve([assembled[ASSEMBLED[name]] for name in self._inputs])
         x, lam_a, lam_x = (solved[self._results.index(name)] for name in ("x", "lam_a", "lam_x"))
@@ -61,4 +71,4 @@ class ContactSolver:
         outputs = self._finish([*inputs, H, f, A, lower, U, length, x, lam_a, lam_x])
         for output in outputs:
             output[failed] = np.nan
-        return dict(zip(OUTPUTS, outputs, strict=True))
+        return outputs
