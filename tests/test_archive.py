@@ -167,42 +167,65 @@ def test_a_run_in_memory_is_the_same_as_its_archive(archive):
         assert (there.values == values).all()
 
 
-def test_resume_gives_the_same_data_as_an_undisturbed_run(archive, tmp_path):
-    path = tmp_path / "grown.nc"
-    for samples in (70, 131, 300):
-        tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True, block=50).close()
-    for name, values in rows(path).items():
-        assert (values == rows(archive)[name]).all(), name
-    fields = [xr.load_dataset(p, group="field/middle") for p in (path, archive)]
-    assert (fields[0].six_sigma.values == fields[1].six_sigma.values).all()
+@pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), ("qpoases", "measures")])
+def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path):
+    paths = [tmp_path / "grown.nc", tmp_path / "whole.nc"]
+    for samples in (300, 5000, 5000, 9000):
+        tc.run(cases.stack(), samples=samples, seed=3, solver=solver, out=paths[0], resume=True, keep=keep).close()
+    tc.run(cases.stack(), samples=9000, seed=3, solver=solver, out=paths[1], keep=keep).close()
+    grown, whole = (xr.open_datatree(path) for path in paths)
+    for name, values in {**grown.data_vars, **grown["sample"].data_vars}.items():
+        if name != "summed_rows":  # the two checkpoints may have changed places
+            assert values.identical(whole.get(name, whole["sample"].get(name))), name
+    for part in ("bottom", "middle", "upper"):
+        one, other = (tree[f"field/{part}"].to_dataset().drop_vars("sums") for tree in (grown, whole))
+        assert one.identical(other)
+    assert grown.attrs["history"].count("resumed after 4096") == 2
 
 
 SCRIPT = """
 import sys
 from tests import cases
 import tolcontact as tc
-tc.run(cases.stack(), samples=20000, seed=3, solver="daqp", out=sys.argv[1], block=100,
+tc.run(cases.stack(), samples=40000, seed=3, solver="daqp", out=sys.argv[1], keep=sys.argv[2],
        progress=lambda rows: print(rows, flush=True))
 """
 
 
-@pytest.mark.parametrize("after", [100, 1700])
-def test_a_killed_run_keeps_its_rows_and_goes_on(after, tmp_path):
+@pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
+def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     path = tmp_path / "killed.nc"
-    with subprocess.Popen([sys.executable, "-c", SCRIPT, path], stdout=subprocess.PIPE, text=True) as run:
+    with subprocess.Popen([sys.executable, "-c", SCRIPT, path, keep], stdout=subprocess.PIPE, text=True) as run:
         for line in run.stdout:
             if int(line) >= after:
                 break
         run.send_signal(signal.SIGKILL)
     with netCDF4.Dataset(path) as file:
         written = int((file["status"][:] != -1).sum())
-    assert after <= written < 20_000
-    samples = written + 150
-    tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True).close()
+    assert after <= written < 40_000
+    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=path, keep=keep, resume=True).close()
     whole = tmp_path / "whole.nc"
-    tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=whole).close()
-    for name, values in rows(whole).items():
-        assert (rows(path)[name][:samples] == values).all(), name
+    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=whole, keep=keep).close()
+    for group in (None, "sample"):
+        one, other = (xr.load_dataset(p, group=group).drop_vars("summed_rows", errors="ignore") for p in (path, whole))
+        assert one.drop_attrs().identical(other.drop_attrs())
+    fields = [xr.load_dataset(p, group="field/middle").drop_vars("sums") for p in (path, whole)]
+    assert fields[0].identical(fields[1])
+
+
+@pytest.mark.parametrize("keep", ["measures", "poses", "all"])
+def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path):
+    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=tmp_path / "some.nc", keep=keep).close()
+    some, every = xr.load_datatree(tmp_path / "some.nc"), xr.load_datatree(archive)
+    assert ("rotation" in some) == ("translation" in some) == (keep != "measures")
+    assert ("deviation" in some["sample"]) == (keep == "all")
+    for name in ("measured", "gap_min", "active", "carrying", "reaction", "status", "iterations", "kkt_residual"):
+        assert (some[name].values == every[name].values).all(), name
+    for name in ("mean", "six_sigma", "magnitude_six_sigma_interval"):
+        assert (some["field/middle"][name].values == every["field/middle"][name].values).all()
+    assert tc.summarize(some).identical(tc.summarize(every))
+    with pytest.raises(tc.TolcontactError, match="expected one of: measures, poses, all"):
+        tc.run(cases.stack(), samples=300, keep="everything")
 
 
 def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(archive):

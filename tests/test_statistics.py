@@ -5,7 +5,8 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from tolcontact.statistics import FieldMoments, intervals
+from tolcontact.statistics import FieldMoments, intervals, sample
+from tolcontact.statistics.sample import Sample
 
 SAMPLES, REPEATS = 1000, 1000
 
@@ -38,6 +39,25 @@ def test_intervals_cover_the_truth_in_95_of_100(name):
     assert (found[:, 1] <= found[:, 0]).all() and (found[:, 0] <= found[:, 2]).all()
 
 
+@pytest.mark.parametrize("ties", [False, True])
+def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ties, monkeypatch):
+    monkeypatch.setattr(sample, "AT_ONCE", 100)
+    rng = np.random.default_rng(4)
+    x, y = rng.standard_t(2, size=(2, 5003)) * np.exp(rng.normal(size=(2, 5003)) * 5)
+    if ties:
+        x = np.where(rng.random(5003) < 0.6, rng.choice([0.0, -1.0, 1e-300, 7.5], 5003), x)
+    pieces = [Sample(lambda values=values: iter(np.array_split(values, 7))) for values in (x, y)]
+    ranks = [0, 1, 17, 2500, 2501, 5001, 5002]
+    assert (pieces[0].ordered(ranks) == np.sort(x)[ranks]).all()
+    for percent in (0.135, 5, 50, 99.865):
+        estimate, *bounds = intervals.percentile(pieces[0], percent)
+        assert estimate == pytest.approx(np.percentile(x, percent), rel=1e-12)
+        assert set(bounds) <= {-np.inf, np.inf, *x}
+    assert intervals.variance_ratio(*pieces) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
+    assert intervals.mean(pieces[0] - pieces[1]) == pytest.approx(intervals.mean(x - y), rel=1e-12)
+    assert np.isnan(Sample(lambda: iter([x, np.array([np.nan])])).ordered(ranks)).all()
+
+
 def test_a_percentile_beyond_the_sample_has_no_bound():
     _, lower, upper = intervals.percentile(np.random.default_rng(0).normal(size=1000), 0.135)
     assert lower == -np.inf and np.isfinite(upper)
@@ -61,6 +81,11 @@ def test_fields_equal_the_plain_sums_over_realizations():
     u = np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
     assert np.abs(moments.mean() - u.mean(axis=0)).max() < 1e-10
     assert np.abs(moments.six_sigma() - 6 * u.std(axis=0, ddof=1)).max() < 1e-9
+    expected = [intervals.standard_deviation(u[:, k, 3], times=6)[1:] for k in range(30)]
+    assert np.abs(moments.magnitude_bounds() - expected).max() < 1e-9
+    again = FieldMoments(v)
+    again.state = moments.state
+    assert (again.state == moments.state).all() and (again.six_sigma() == moments.six_sigma()).all()
 
 
 def test_intervals_are_those_of_scipys_distributions():

@@ -31,46 +31,56 @@ from tolcontact.symbolic import Program
 from tolcontact.vocabulary import Variable
 
 ROW_CHUNK = 1000
+ROOM = 50 * ROW_CHUNK  # rows that are laid out at once
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
 
 
 class ArchiveWriter:
     """An archive being written. Use it as a context manager."""
 
-    def __init__(self, path: Path, program: Program, *, seed: int, samples: int) -> None:
-        """Create the file with everything but its rows.
+    def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> None:
+        """Create the file with everything but its rows. `keep` says what it will hold of each realization (see `run`).
 
         Raises ArchiveError where it cannot be written.
         """
-        self._nominal = program.nominal
         with _replacing(path) as part, _opened(part, "w") as file:
-            _write_header(file, program, _settings(program, seed, samples))
+            _write_header(file, program, _settings(program, seed, samples, keep))
             _make_room(file, 0, samples)
-        self._file = _opened(path, "r+")
-        self.rows = 0
+        self._go_on(path, program.nominal)
 
     @classmethod
-    def resume(cls, path: Path, program: Program, *, seed: int, samples: int) -> "ArchiveWriter":
-        """Open an archive to go on after its last finished row, up to `samples`.
+    def resume(cls, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> "ArchiveWriter":
+        """Open an archive to go on after its last checkpoint, up to `samples`.
 
         Raises ArchiveError where the file is no archive, or holds another model or another run.
         """
         writer = cls.__new__(cls)
-        writer._nominal = program.nominal
         with _replacing(path) as part:
             # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
             shutil.copyfile(path, part)
             open_archive(part, shown=path).close()
             with _opened(part, "r+") as file:
-                _check_same_run(file, path, program, _settings(program, seed, samples))
-                unfinished = np.flatnonzero(file[words.STATUS.name][:] == words.UNFINISHED)
+                _check_same_run(file, path, program, _settings(program, seed, samples, keep))
                 length = len(file.dimensions[words.REALIZATION])
-                writer.rows = int(unfinished[0]) if unfinished.size else length
                 _make_room(file, length, samples)
                 file.setncattr("samples", np.int64(max(samples, length)))
-                file.setncattr("history", f"{file.history}\n{_now()} resumed after {writer.rows} realizations")
-        writer._file = _opened(path, "r+")
+                rows = max(0, int(file[words.SUMMED_ROWS.name][:].max()))
+                file.setncattr("history", f"{file.history}\n{_now()} resumed after {rows} realizations")
+        writer._go_on(path, program.nominal)
         return writer
+
+    def _go_on(self, path: Path, nominal: Nominal) -> None:
+        """Open the file and take up the sums of its last checkpoint."""
+        self._file = _opened(path, "r+")
+        self._nominal = nominal
+        self._moments = [[FieldMoments(part.vertices) for _ in words.STATES] for part in nominal.parts]
+        summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
+        self._slot = int(summed.argmax())
+        self.rows = max(0, int(summed[self._slot]))
+        if self.rows:
+            for part, both in zip(nominal.parts, self._moments, strict=True):
+                for state, moments in enumerate(both):
+                    moments.state = np.asarray(self._file[f"field/{part.name}"][words.FIELD_SUMS.name][self._slot, state])
 
     def __enter__(self) -> "ArchiveWriter":
         return self
@@ -82,6 +92,9 @@ class ArchiveWriter:
         """Write the rows of a block, and see them to the disk."""
         rows = slice(block.start, block.start + len(block))
         R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
+        for part, both in enumerate(self._moments):
+            for state, moments in enumerate(both):
+                moments.add(R[:, state, part], t[:, state, part])
         values = {
             words.MEASURED: block.measured,
             words.TRANSLATION: t,
@@ -93,32 +106,38 @@ class ArchiveWriter:
             words.KKT_RESIDUAL: block.kkt_residual,
             words.ITERATIONS: block.iterations,
         }
-        self._file["sample"][words.DEVIATION.name][rows] = block.deviations
+        if words.DEVIATION.name in self._file["sample"].variables:
+            self._file["sample"][words.DEVIATION.name][rows] = block.deviations
         for variable, data in values.items():
-            if data.size:
+            if data.size and variable.name in self._file.variables:
                 self._file[variable.name][rows] = data
         self._file.sync()
         self._file[words.STATUS.name][rows] = block.status
         self._file.sync()
         self.rows = rows.stop
 
-    def write_fields(self) -> None:
-        """Displacement fields of all parts, from the archived poses."""
-        for index, part in enumerate(self._nominal.parts):
-            group = self._file[f"field/{part.name}"]
-            for state in range(len(words.STATES)):
-                moments = FieldMoments(part.vertices)
-                for R, t in self._poses(state, index):
-                    moments.add(R, t)
-                group[words.FIELD_MEAN.name][state] = moments.mean()
-                group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
+    def check_point(self) -> None:
+        """Write the sums so far, from which a killed run goes on. The last ones stay until these are on the disk."""
+        self._slot = 1 - self._slot
+        self._file[words.SUMMED_ROWS.name][self._slot] = -1
+        self._file.sync()
+        for part, both in zip(self._nominal.parts, self._moments, strict=True):
+            sums = self._file[f"field/{part.name}"][words.FIELD_SUMS.name]
+            for state, moments in enumerate(both):
+                sums[self._slot, state] = moments.state
+        self._file.sync()
+        self._file[words.SUMMED_ROWS.name][self._slot] = self.rows
         self._file.sync()
 
-    def _poses(self, state: int, part: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-        R, t = self._file[words.ROTATION.name], self._file[words.TRANSLATION.name]
-        for start in range(0, self.rows, ROW_CHUNK):
-            rows = slice(start, min(start + ROW_CHUNK, self.rows))
-            yield np.asarray(R[rows, state, part]), np.asarray(t[rows, state, part])
+    def write_fields(self) -> None:
+        """Displacement fields of all parts, from the sums over all rows."""
+        for part, both in zip(self._nominal.parts, self._moments, strict=True):
+            group = self._file[f"field/{part.name}"]
+            for state, moments in enumerate(both):
+                group[words.FIELD_MEAN.name][state] = moments.mean()
+                group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
+                group[words.FIELD_INTERVAL.name][state] = moments.magnitude_bounds()
+        self._file.sync()
 
 
 def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
@@ -134,7 +153,9 @@ def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
         tree = xr.open_datatree(source, engine="netcdf4")
     except (OSError, ValueError) as error:
         raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
-    missing = [v.name for v in words.ROWS if v.name not in tree.ds] + [g for g in ("model", "sample") if g not in tree.children]
+    missing = [v.name for v in words.ROWS if v not in words.POSES and v.name not in tree.ds] + [
+        g for g in ("model", "sample") if g not in tree.children
+    ]
     if missing:
         tree.close()
         raise ArchiveError(f'"{path}" is not an archive of tolcontact: it has no {", ".join(missing)}')
@@ -173,13 +194,15 @@ def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
     counts = (words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS)
     room: dict[Variable, float] = dict.fromkeys(counts, words.UNFINISHED)
     for variable in (*words.ROWS, words.DEVIATION):
-        stored = (file["sample"] if variable is words.DEVIATION else file)[variable.name]
-        for first in range(start, stop, ROW_CHUNK):
-            rows = min(ROW_CHUNK, stop - first)
-            if 0 not in stored.shape[1:]:
-                stored[first : first + rows] = np.full((rows, *stored.shape[1:]), room.get(variable, np.nan))
-    if start < stop:
-        file[words.REALIZATION][start:stop] = np.arange(start, stop)
+        stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
+        if stored is None or 0 in stored.shape[1:]:
+            continue
+        for first in range(start, stop, ROOM):
+            rows = min(ROOM, stop - first)
+            stored[first : first + rows] = np.full((rows, *stored.shape[1:]), room.get(variable, np.nan))
+    for first in range(start, stop, ROOM):
+        last = min(first + ROOM, stop)
+        file[words.REALIZATION][first:last] = np.arange(first, last)
 
 
 def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
@@ -189,7 +212,7 @@ def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
         raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror or error}') from error
 
 
-def _settings(program: Program, seed: int, samples: int) -> dict[str, Any]:
+def _settings(program: Program, seed: int, samples: int, keep: str) -> dict[str, Any]:
     """Global attributes that say how the rows came about; a resumed run must agree in all but `samples`."""
     method = program.method
     return {
@@ -207,6 +230,7 @@ def _settings(program: Program, seed: int, samples: int) -> dict[str, Any]:
         "sampler": "monte-carlo",
         "seed": np.int64(seed),
         "samples": np.int64(samples),
+        "kept": keep,
     }
 
 
@@ -263,7 +287,10 @@ def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str
         else:
             _define(file, coordinate)
     for variable in words.ROWS:
-        _define(file, variable)
+        if settings["kept"] != "measures" or variable not in words.POSES:
+            _define(file, variable)
+    file.createDimension(words.CHECKPOINT, 2)
+    _write(file, words.SUMMED_ROWS, [-1, -1])
     file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
     units = [measure.units for measure in nominal.measures]
     if set(units) != {"mm"}:
@@ -273,17 +300,22 @@ def _write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str
     _write(file, words.MEASURE_UNITS, units)
     _write_model(file.createGroup("model"), nominal, _declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
-    _write_sample(file.createGroup("sample"), nominal)
+    _write_sample(file.createGroup("sample"), nominal, deviations=settings["kept"] == "all")
     for part in nominal.parts:
         group = file.createGroup(f"field/{part.name}")
         for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
             group.createDimension(name, size)
-        group.createDimension(words.COMPONENT, len(words.COMPONENTS))
+        sums = FieldMoments(part.vertices).state.size
+        for name, size in ((words.COMPONENT, len(words.COMPONENTS)), (words.BOUND, len(words.BOUNDS)), (words.NUMBER, sums)):
+            group.createDimension(name, size)
         _write(group, words.COMPONENT_LABEL, words.COMPONENTS)
         _write(group, words.FIELD_VERTICES, part.vertices)
         _write(group, words.FIELD_FACES, part.faces)
         for variable in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA):
             _write(group, variable, np.full([len(words.STATES), len(part.vertices), len(words.COMPONENTS)], np.nan))
+        _write(group, words.BOUND_LABEL, words.BOUNDS)
+        _write(group, words.FIELD_INTERVAL, np.full([len(words.STATES), len(part.vertices), len(words.BOUNDS)], np.nan))
+        _write(group, words.FIELD_SUMS, np.full([2, len(words.STATES), sums], np.nan))
 
 
 def _write_model(group: netCDF4.Group, nominal: Nominal, declaration: str) -> None:
@@ -312,9 +344,10 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
         _write(group, words.LOCATOR_OF_POINT, np.concatenate(none))
 
 
-def _write_sample(group: netCDF4.Group, nominal: Nominal) -> None:
+def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -> None:
     group.createDimension(words.LOCATOR, len(nominal.locator_labels))
-    _define(group, words.DEVIATION)
+    if deviations:
+        _define(group, words.DEVIATION)
     _write(group, words.LOCATOR_LABEL, nominal.locator_labels)
     _write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in nominal.tolerances])
     _write(

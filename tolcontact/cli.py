@@ -27,6 +27,7 @@ from tolcontact.running import run as run_model
 from tolcontact.script import load_model
 from tolcontact.simulation import Status
 from tolcontact.statistics import summarize
+from tolcontact.vocabulary import KEPT
 
 FAILED_SHARE = 0.001
 
@@ -59,6 +60,7 @@ def run(
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
+    keep: Annotated[str, typer.Option(help=f"What to archive of each realization: {_or(KEPT)}.")] = "all",
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
@@ -75,7 +77,7 @@ def run(
     ) as bar:  # fmt: skip
         task = bar.add_task(program.nominal.assembly.name, total=samples)
         results = run_model(
-            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume,
+            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume, keep=keep,
             progress=lambda done: bar.update(task, completed=done),
         )  # fmt: skip
     with results:

@@ -14,6 +14,7 @@ from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.run import BLOCK
 from tolcontact.symbolic import Program, compile_program
+from tolcontact.vocabulary import KEPT
 
 DEFAULT_SOLVER = "qpoases"
 Progress = Callable[[int], None]
@@ -37,15 +38,19 @@ def run(
     out: str | Path | None = None,
     overwrite: bool = False,
     resume: bool = False,
-    block: int = BLOCK,
+    keep: str = "all",
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
-    Without `out` the results are kept in memory only. `progress` is called with the number of finished realizations.
+    Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
+    status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
+    `progress` is called with the number of finished realizations.
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
     """
-    check_counts(samples=samples, seed=seed, block=block)
+    check_counts(samples=samples, seed=seed)
+    if keep not in KEPT:
+        raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
     if out is None:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "results.nc"
@@ -56,7 +61,7 @@ def run(
                 solver=solver,
                 method=method,
                 out=path,
-                block=block,
+                keep=keep,
                 progress=progress,
             )
             with open_archive(path) as tree:
@@ -65,9 +70,11 @@ def run(
     check_writable(path, overwrite=overwrite, resume=resume)
     program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
     start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
-    with start(path, program, seed=seed, samples=samples) as writer:
-        for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows, block=block):
+    with start(path, program, seed=seed, samples=samples, keep=keep) as writer:
+        for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows):
             writer.append(done)
+            if len(done) == BLOCK:
+                writer.check_point()
             if progress:
                 progress(writer.rows)
         writer.write_fields()
@@ -75,9 +82,9 @@ def run(
 
 
 def check_counts(**counts: int) -> None:
-    """Raise OptionError for a count that is no whole number, or too small (samples and block 1, seed 0)."""
+    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed 0)."""
     for word, value in counts.items():
-        least = {"samples": 2, "block": 1, "seed": 0}[word]
+        least = {"samples": 2, "seed": 0}[word]
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
             raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above and below 2^63")
 

@@ -10,7 +10,10 @@ COMPONENTS = (*AXES, "magnitude")
 
 REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
-VERTEX, FACE, CORNER, COMPONENT = "vertex", "face", "corner", "component"
+VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
+CHECKPOINT, NUMBER = "checkpoint", "number"
+BOUNDS = ("lower", "upper")
+KEPT = ("measures", "poses", "all")
 
 STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable")
 UNFINISHED = -1
@@ -109,6 +112,7 @@ ROWS = (
     ITERATIONS,
     STATUS,
 )
+POSES = (TRANSLATION, ROTATION)
 
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = Variable(
@@ -164,4 +168,20 @@ FIELD_SIX_SIGMA = Variable(
     "f8",
     "six standard deviations of the displacement of a surface point",
     "mm",
+)
+BOUND_LABEL = _label(BOUND, "bound of a 95 % confidence interval")
+FIELD_INTERVAL = Variable(
+    "magnitude_six_sigma_interval",
+    (STATE, VERTEX, BOUND),
+    "f8",
+    "95 % confidence interval of six standard deviations of the displacement magnitude",
+    "mm",
+)
+SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
+FIELD_SUMS = Variable(
+    "sums",
+    (CHECKPOINT, STATE, NUMBER),
+    "f8",
+    "running sums of the displacement field, from which an unfinished run goes on",
+    "1",
 )

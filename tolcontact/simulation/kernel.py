@@ -1,7 +1,7 @@
-"""Passes over the contact points of a pair, compiled: no array of size realizations x points is made.
+"""Passes over the points of a surface, compiled: no array of size realizations x points is made.
 
-Points come in leaves of neighbours with bounds of their coordinates, which bound their gaps. A leaf that is wholly clear is
-passed over, one that is wholly active adds its summed moments, and one that cannot hold the deepest point is not looked at.
+Contact points come in leaves of neighbours with bounds of their coordinates, which bound their gaps. A leaf that is wholly
+clear is passed over, one that is wholly active adds its summed moments, and one that cannot hold the deepest is left out.
 Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
 another order than NumPy's, and agree to rounding.
 """
@@ -9,7 +9,7 @@ another order than NumPy's, and agree to rounding.
 import numpy as np
 from numba import njit
 
-LEAF, LANES = 32, 8
+LEAF, LANES, CHUNK = 32, 8, 256
 INF = np.inf
 
 
@@ -142,3 +142,27 @@ def deepest(points, clusters, relative, deviations, may_carry, numbers, gaps_the
                     if gaps[j] < lowest or (gaps[j] == lowest and first + j < where):
                         lowest, where = gaps[j], first + j
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def add_magnitudes(A, points, shift, powers):  # type: ignore[no-untyped-def]
+    """Add to powers (4, point) the first to fourth power of |u| - shift, realization after realization.
+
+    u = A @ (x, y, z, 1) for A (n, 3, 4), points (3, point), shift (point,).
+    """
+    for first in range(0, shift.size, CHUNK):
+        last = min(first + CHUNK, shift.size)
+        x, y, z, less = points[0, first:last], points[1, first:last], points[2, first:last], shift[first:last]
+        sum1, sum2, sum3, sum4 = powers[0, first:last], powers[1, first:last], powers[2, first:last], powers[3, first:last]
+        for k in range(A.shape[0]):
+            a, b, c = A[k, 0], A[k, 1], A[k, 2]
+            for v in range(x.size):
+                u = a[0] * x[v] + a[1] * y[v] + a[2] * z[v] + a[3]
+                w = b[0] * x[v] + b[1] * y[v] + b[2] * z[v] + b[3]
+                t = c[0] * x[v] + c[1] * y[v] + c[2] * z[v] + c[3]
+                one = np.sqrt(u * u + w * w + t * t) - less[v]
+                two = one * one
+                sum1[v] += one
+                sum2[v] += two
+                sum3[v] += two * one
+                sum4[v] += two * two

@@ -1,11 +1,16 @@
 """Estimates from a Monte-Carlo sample with 95 % confidence intervals.
 
-Every function takes a sample (realization,) and returns (estimate, lower, upper). No interval assumes a normal
-distribution: contact cuts distributions off.
+Every function takes a sample, an array (realization,) or a Sample, and returns (estimate, lower, upper). No interval assumes a
+normal distribution: contact cuts distributions off.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import special
+
+from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
 Estimate = tuple[float, float, float]
@@ -14,69 +19,100 @@ _LOWER, _UPPER = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
 _Z = float(special.ndtri(_UPPER))
 
 
-def mean(x: np.ndarray) -> Estimate:
+def mean(x: np.ndarray | Sample) -> Estimate:
     """Mean, Student's t interval."""
-    centre = float(x.mean())
-    half = float(special.stdtrit(len(x) - 1, _UPPER) * x.std(ddof=1) / np.sqrt(len(x)))
-    return centre, centre - half, centre + half
+    x = Sample.of(x)
+    deviation = np.sqrt(_unbiased(x))
+    half = float(special.stdtrit(x.count - 1, _UPPER) * deviation / np.sqrt(x.count))
+    return x.mean, x.mean - half, x.mean + half
 
 
-def variance(x: np.ndarray) -> Estimate:
+def variance(x: np.ndarray | Sample) -> Estimate:
     """Variance; interval on the log scale with the standard error that the fourth moment gives."""
-    s2 = float(x.var(ddof=1))
-    if s2 == 0:
-        return 0.0, 0.0, 0.0
-    factor = np.exp(_Z * _standard_error(_variance_influence(x)))
-    return s2, float(s2 / factor), float(s2 * factor)
+    x = Sample.of(x)
+    estimate, lower, upper = of_moments(x.count, *x.moments)
+    return float(estimate), float(lower), float(upper)
 
 
-def standard_deviation(x: np.ndarray, *, times: float = 1.0) -> Estimate:
+def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimate:
     """`times` the standard deviation: 6 gives 6 sigma. Interval from that of the variance."""
-    s2, lower, upper = variance(x)
-    return times * np.sqrt(s2), times * np.sqrt(lower), times * np.sqrt(upper)
+    return root(variance(x), times=times)
 
 
-def percentile(x: np.ndarray, percent: float) -> Estimate:
-    """Percentile; the interval runs between order statistics (binomial, distribution-free).
+def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
+    """`times` the root of a variance."""
+    estimate, lower, upper = np.sqrt(variance)
+    return float(times * estimate), float(times * lower), float(times * upper)
+
+
+def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
+    """Percentiles; the intervals run between order statistics (binomial, distribution-free).
 
     A bound is infinite where the sample is too small to have one.
     """
-    ordered = np.sort(x)
-    p, n = percent / 100, len(x)
-    below, above = (_binomial_quantile(q, n, p) for q in (_LOWER, _UPPER))
-    lower = ordered[below - 1] if below >= 1 else -np.inf
-    upper = ordered[above] if above < n else np.inf
-    return float(np.quantile(x, p)), float(lower), float(upper)
+    x = Sample.of(x)
+    ranks = [_ranks(x.count, percent / 100) for percent in percents]
+    values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
+    return [
+        (
+            float(one + (next_ - one) * share),
+            float(lower if below >= 0 else -np.inf),
+            float(upper if above < x.count else np.inf),
+        )
+        for (below, above, _, _, share), (lower, upper, one, next_) in zip(ranks, values, strict=True)
+    ]
 
 
-def share(hits: np.ndarray) -> Estimate:
+def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
+    """One of `percentiles`."""
+    return percentiles(x, [percent])[0]
+
+
+def share(hits: np.ndarray | Sample) -> Estimate:
     """Share of True in a sample of booleans, exact (Clopper-Pearson) interval."""
-    k, n = int(hits.sum()), len(hits)
+    hits = Sample.of(hits)
+    n, k = hits.count, sum(int(piece.sum()) for piece in hits.pieces())
     lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
     upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
     return k / n, float(lower), float(upper)
 
 
-def variance_ratio(after: np.ndarray, before: np.ndarray) -> Estimate:
+def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> Estimate:
     """Variance of `after` over variance of `before`, from the same realizations (paired, on the log scale)."""
-    if before.var() == 0 or after.var() == 0:
+    after, before = Sample.of(after), Sample.of(before)
+    ours, theirs = after.moments[0], before.moments[0]
+    if ours == 0 or theirs == 0:
         return (float("nan"),) * 3
-    ratio = float(after.var(ddof=1) / before.var(ddof=1))
-    factor = np.exp(_Z * _standard_error(_variance_influence(after) - _variance_influence(before)))
-    return ratio, float(ratio / factor), float(ratio * factor)
+    # What each realization adds to the logarithm of the ratio; the sum of all is zero.
+    pairs = zip(after.pieces(), before.pieces(), strict=True)
+    influence2 = sum((((a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs) ** 2).sum() for a, b in pairs)
+    factor = np.exp(_Z * np.sqrt(influence2 / (after.count - 1) / after.count))
+    return ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor)
+
+
+def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`variance` of samples of which only the second and fourth central moment are known, of any shape."""
+    second, fourth = np.asarray(second), np.asarray(fourth)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        influence2 = np.where(second > 0, count * (fourth / second**2 - 1), 0.0)
+        factor = np.exp(_Z * np.sqrt(np.maximum(influence2, 0) / (count - 1) / count))
+    estimate = second * count / (count - 1)
+    return estimate, estimate / factor, estimate * factor
+
+
+def _unbiased(x: Sample) -> float:
+    return x.moments[0] * x.count / (x.count - 1)
+
+
+def _ranks(n: int, p: float) -> tuple[int, int, int, int, float]:
+    """Ranks, from 0, of the interval's bounds for the quantile `p`, and of the values that it lies between; and how far."""
+    lower, upper = _binomial_quantile(_LOWER, n, p) - 1, _binomial_quantile(_UPPER, n, p)
+    place = (n - 1) * p
+    one = int(np.floor(place))
+    return lower, upper, one, min(one + 1, n - 1), place - one
 
 
 def _binomial_quantile(q: float, n: int, p: float) -> int:
     """The least number of hits among n, each of probability p, that is not exceeded with probability `q`."""
     k = max(int(np.ceil(special.bdtrik(q, n, p))), 0)
     return k - 1 if k > 0 and special.bdtr(k - 1, n, p) >= q else k
-
-
-def _variance_influence(x: np.ndarray) -> np.ndarray:
-    """What each realization adds to the logarithm of the variance."""
-    deviation2 = (x - x.mean()) ** 2
-    return np.asarray(deviation2 / deviation2.mean() - 1)
-
-
-def _standard_error(influence: np.ndarray) -> float:
-    return float(influence.std(ddof=1) / np.sqrt(len(influence)))

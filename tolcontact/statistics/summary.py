@@ -1,25 +1,19 @@
-"""What a run says about each measure, each part and the contact, read from its archive alone."""
+"""What a run says about each measure, each part and the contact, read from its archive alone, piece by piece."""
 
-import functools
-from collections.abc import Callable
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
 from tolcontact.statistics import intervals
-from tolcontact.statistics.fields import displacement
 from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.sample import Sample
 
 ESTIMATE = ("estimate", "lower", "upper")
 PERCENTILES = (0.135, 5, 50, 95, 99.865)
-STATISTICS: dict[str, Callable[[np.ndarray], Estimate]] = {
-    "mean": intervals.mean,
-    "standard deviation": intervals.standard_deviation,
-    "6 sigma": lambda x: intervals.standard_deviation(x, times=6),
-    "variance": intervals.variance,
-    **{f"{percent:g} %": functools.partial(intervals.percentile, percent=percent) for percent in PERCENTILES},
-}
+STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
+PIECE = 100_000  # realizations that are read at once
 OUTSIDE = "outside tolerance"
 NOT_ASSEMBLABLE = words.STATUS_MEANINGS.index("not_assemblable")
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
@@ -38,27 +32,26 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
     """
-    rows = results.to_dataset().isel({words.REALIZATION: finished(results)})
-    x = rows[words.MEASURED.name].transpose(words.MEASURE, words.STATE, words.REALIZATION).values
-    values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(x)])
-    changes = np.array([_change(raw, corrected) for raw, corrected in x])
+    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
+    measures = range(rows.sizes[words.MEASURE])
+    samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
+    values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
+    changes = np.array([_change(raw, corrected) for raw, corrected in samples])
     status = rows[words.STATUS.name].values
-    gap_min = rows[words.GAP_MIN.name]
-    deepest = -gap_min.min([words.REALIZATION, words.PAIR]).values if gap_min.size else np.zeros(2)
     parts = rows[words.PART].values
     return xr.Dataset(
         {
             "statistic_value": ((words.MEASURE, words.STATE, "statistic", "bound"), values),
             "change": ((words.MEASURE, "change_of", "bound"), changes),
             "touched": (("bound",), np.array(intervals.share(status != 0))),
-            "by_status": (("status_meaning",), np.bincount(status.astype(int), minlength=len(words.STATUS_MEANINGS))),
+            "by_status": (("status_meaning",), [np.count_nonzero(status == k) for k in range(len(words.STATUS_MEANINGS))]),
             "not_assemblable": (("bound",), np.array(intervals.share(status == NOT_ASSEMBLABLE))),
-            "conflicts": ((words.PAIR,), in_conflict(rows).sum(axis=0)),
-            "iterations": (("of_iterations",), _iterations(rows, status)),
-            "penetration": ((words.STATE,), np.maximum(deepest, 0), {"units": "mm"}),
+            "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in _pieces(rows)], axis=0)),
+            "iterations": (("of_iterations",), _iterations(rows)),
+            "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
             "field_extreme": (
                 (words.PART, words.STATE, "extreme", "bound"),
-                np.array([_field_extremes(results, rows, str(part)) for part in parts]),
+                np.array([_field_extremes(results, str(part)) for part in parts]),
                 {"units": "mm"},
             ),
         },
@@ -95,9 +88,34 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
 
 
-def _iterations(rows: xr.Dataset, status: np.ndarray) -> list[float]:
-    taken = rows[words.ITERATIONS.name].values[status != 0]
-    return [float(np.median(taken)), float(taken.max())] if taken.size else [0.0, 0.0]
+def _pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
+    for start in range(0, rows.sizes[words.REALIZATION], PIECE):
+        yield rows.isel({words.REALIZATION: slice(start, start + PIECE)})
+
+
+def _sample(rows: xr.Dataset, name: str, state: str, measure: int) -> Sample:
+    of = rows[[name]].sel({words.STATE: state}).isel({words.MEASURE: measure})
+    return Sample(lambda: (np.asarray(piece[name].values) for piece in _pieces(of)))
+
+
+def _penetration(rows: xr.Dataset) -> np.ndarray:
+    if not rows[words.GAP_MIN.name].size:
+        return np.zeros(len(words.STATES))
+    least = [piece[words.GAP_MIN.name].min([words.REALIZATION, words.PAIR]).values for piece in _pieces(rows)]
+    return np.asarray(np.maximum(-np.min(least, axis=0), 0))
+
+
+def _iterations(rows: xr.Dataset) -> list[float]:
+    """Median and largest number of linear steps of the realizations that contact touched: those that took any."""
+    counts = np.zeros(1, dtype=int)
+    for piece in _pieces(rows[[words.ITERATIONS.name]]):
+        found = np.bincount(piece[words.ITERATIONS.name].values, minlength=len(counts))
+        found[: len(counts)] += counts
+        counts = found
+    counts[0] = 0
+    total = counts.sum()
+    middle = np.searchsorted(np.cumsum(counts), [(total - 1) // 2, total // 2], side="right")
+    return [float(middle.mean()), float(np.flatnonzero(counts)[-1])] if total else [0.0, 0.0]
 
 
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
@@ -109,39 +127,36 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
 
-def finished(results: xr.DataTree) -> np.ndarray:
-    """Numbers of the rows that were written completely, (row,)."""
-    status = results.to_dataset()[words.STATUS.name].values
-    return np.flatnonzero(status != words.UNFINISHED)
+def finished(results: xr.DataTree) -> int:
+    """How many rows, from the first on, were written completely."""
+    unfinished = np.flatnonzero(results[words.STATUS.name].values == words.UNFINISHED)
+    return int(unfinished[0]) if unfinished.size else results.sizes[words.REALIZATION]
 
 
-def _of_sample(x: np.ndarray, rows: xr.Dataset, measure: int) -> list[Estimate]:
+def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
     tolerance = float(rows[words.MEASURE_TOLERANCE.name][measure])
     nominal = float(rows[words.MEASURE_NOMINAL.name][measure])
-    known = np.isfinite(tolerance) and np.isfinite(x).all()
-    outside = intervals.share(np.abs(x - nominal) > tolerance / 2) if known else (np.nan,) * 3
-    return [*(statistic(x) for statistic in STATISTICS.values()), outside]
+    outside: Estimate = (np.nan,) * 3
+    if np.isfinite(tolerance) and np.isfinite(x.mean):
+        outside = intervals.share(Sample(lambda: (np.abs(piece - nominal) > tolerance / 2 for piece in x.pieces())))
+    variance = intervals.variance(x)
+    spreads = [intervals.root(variance), intervals.root(variance, times=6), variance]
+    return [intervals.mean(x), *spreads, *intervals.percentiles(x, PERCENTILES), outside]
 
 
-def _change(raw: np.ndarray, corrected: np.ndarray) -> list[Estimate]:
+def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
     ratio = intervals.variance_ratio(corrected, raw)
-    root = (float(np.sqrt(ratio[0])), float(np.sqrt(ratio[1])), float(np.sqrt(ratio[2])))
-    return [intervals.mean(corrected - raw), root, ratio]
+    return [intervals.mean(corrected - raw), intervals.root(ratio), ratio]
 
 
-def _field_extremes(results: xr.DataTree, rows: xr.Dataset, part: str) -> list[list[Estimate]]:
-    """Interval of 6 sigma of |u| at the points where the archived field is least and largest, per state."""
+def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
+    """6 sigma of |u|, and its interval, where the archived field is least and largest; (state, extreme, bound)."""
     field = results["field"].children[part].to_dataset()
-    extremes = []
-    for state in words.STATES:
-        chosen = {words.STATE: state, words.PART: part}
-        R = rows[words.ROTATION.name].sel(chosen).values
-        t = rows[words.TRANSLATION.name].sel(chosen).values
-        six_sigma = field[words.FIELD_SIX_SIGMA.name].sel({words.STATE: state, words.COMPONENT: "magnitude"}).values
-        if not np.isfinite(six_sigma).all():
-            extremes.append([(np.nan,) * 3] * 2)
-            continue
-        points = field[words.FIELD_VERTICES.name].values[[six_sigma.argmin(), six_sigma.argmax()]]
-        sizes = [np.linalg.norm(displacement(R, t, point), axis=1) for point in points]
-        extremes.append([intervals.standard_deviation(size, times=6) for size in sizes])
-    return extremes  # type: ignore[return-value]
+    six_sigma = field[words.FIELD_SIX_SIGMA.name].sel({words.COMPONENT: "magnitude"}).values
+    found = np.full((len(words.STATES), 2, len(ESTIMATE)), np.nan)
+    for state, values in enumerate(six_sigma):
+        if np.isfinite(values).all():
+            where = [values.argmin(), values.argmax()]
+            found[state, :, 0] = values[where]
+            found[state, :, 1:] = field[words.FIELD_INTERVAL.name].values[state, where]
+    return found

@@ -1,0 +1,80 @@
+"""A sample that need not fit into memory: it is read piece by piece, as often as needed."""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import cached_property
+
+import numpy as np
+
+AT_ONCE = 1 << 18  # values that are sorted in memory
+DIGIT = 16  # bits
+
+
+class Sample:
+    """Numbers, one for each realization. `pieces` gives them in arrays, from the first one each time that it is called."""
+
+    def __init__(self, pieces: Callable[[], Iterable[np.ndarray]]) -> None:
+        self.pieces = pieces
+
+    @classmethod
+    def of(cls, x: "np.ndarray | Sample") -> "Sample":
+        """A sample, whatever it is kept in."""
+        return x if isinstance(x, Sample) else cls(lambda: [x])
+
+    def __sub__(self, other: "Sample") -> "Sample":
+        return Sample(lambda: (a - b for a, b in zip(self.pieces(), other.pieces(), strict=True)))
+
+    @cached_property
+    def count(self) -> int:
+        return sum(len(piece) for piece in self.pieces())
+
+    @cached_property
+    def mean(self) -> float:
+        return float(sum(piece.sum() for piece in self.pieces()) / self.count)
+
+    @cached_property
+    def moments(self) -> tuple[float, float]:
+        """Second and fourth central moment."""
+        sums = np.zeros(2)
+        for piece in self.pieces():
+            square = (piece - self.mean) ** 2
+            sums += square.sum(), (square**2).sum()
+        return float(sums[0] / self.count), float(sums[1] / self.count)
+
+    def ordered(self, ranks: Sequence[int]) -> np.ndarray:
+        """The values of some ranks: 0 is the least, count - 1 the largest. NaN where one of the numbers is not finite.
+
+        What does not fit into memory is not sorted: digit by digit, the numbers are counted by the digits that they begin with.
+        """
+        if not np.isfinite(self.mean):
+            return np.full(len(ranks), np.nan)
+        if self.count <= AT_ONCE:
+            return np.asarray(np.sort(np.concatenate(list(self.pieces())))[list(ranks)])
+        rest, found = np.array(ranks, dtype=np.int64), np.zeros(len(ranks), dtype=np.uint64)
+        for shift in range(64 - DIGIT, -1, -DIGIT):
+            beginnings, own = np.unique(found, return_inverse=True)
+            counts = np.zeros(len(beginnings) << DIGIT, dtype=np.int64)
+            for piece in self.pieces():
+                keys = _keys(piece) >> np.uint64(shift)
+                place = np.searchsorted(beginnings, keys >> np.uint64(DIGIT)).clip(max=len(beginnings) - 1)
+                ours = beginnings[place] == keys >> np.uint64(DIGIT)
+                digits = (keys[ours] & np.uint64((1 << DIGIT) - 1)).astype(np.int64)
+                counts += np.bincount((place[ours] << DIGIT) + digits, minlength=len(counts))
+            ends = counts.reshape(len(beginnings), -1).cumsum(axis=1)
+            for k, begins in enumerate(own):
+                digit = np.searchsorted(ends[begins], rest[k], side="right")
+                rest[k] -= ends[begins, digit - 1] if digit else 0
+                found[k] = (found[k] << np.uint64(DIGIT)) | np.uint64(digit)
+        return _values(found)
+
+
+_SIGN = np.uint64(1 << 63)
+
+
+def _keys(x: np.ndarray) -> np.ndarray:
+    """Whole numbers in the order of the floating-point numbers `x`."""
+    bits = np.ascontiguousarray(x, dtype=float).view(np.uint64)
+    return np.where(bits & _SIGN, ~bits, bits | _SIGN)
+
+
+def _values(keys: np.ndarray) -> np.ndarray:
+    return np.asarray(np.where(keys & _SIGN, keys ^ _SIGN, ~keys).view(float))
