@@ -2,6 +2,7 @@
 
 import numpy as np
 import trimesh
+from scipy.spatial import cKDTree
 
 from tolcontact.discretization.edges import rim
 
@@ -29,12 +30,15 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
     if not chosen or (count is not None and len(chosen) > count):
         chosen = [candidates[np.argmax(((candidates - centre) ** 2).sum(axis=1))]]
     distance2 = np.min([((candidates - point) ** 2).sum(axis=1) for point in chosen], axis=0)
+    tree = cKDTree(candidates)
     while True:
         farthest = int(np.argmax(distance2))
         if (len(chosen) == count) if spacing is None else (distance2[farthest] <= spacing**2):
             return np.array(chosen)
         chosen.append(candidates[farthest])
-        np.minimum(distance2, ((candidates - candidates[farthest]) ** 2).sum(axis=1), out=distance2)
+        # No candidate is farther than this one from those chosen, so that it changes nothing beyond that distance.
+        near = tree.query_ball_point(candidates[farthest], np.sqrt(distance2[farthest]) * (1 + 1e-9), return_sorted=False)
+        distance2[near] = np.minimum(distance2[near], ((candidates[near] - candidates[farthest]) ** 2).sum(axis=1))
 
 
 def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
