@@ -1,7 +1,7 @@
 """Passes over the points of a surface, compiled: no array of size realizations x points is made.
 
-Contact points come in leaves of neighbours with bounds of their coordinates, which bound their gaps. A leaf that is wholly
-clear is passed over, one that is wholly active adds its summed moments, and one that cannot hold the deepest is left out.
+Contact points come in leaves of neighbours, and those in branches, with bounds of their coordinates, which bound their gaps.
+What is wholly clear is passed over, what is wholly active adds its summed moments, and what cannot hold the deepest is left out.
 Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
 another order than NumPy's, and agree to rounding.
 """
@@ -9,7 +9,8 @@ another order than NumPy's, and agree to rounding.
 import numpy as np
 from numba import njit
 
-LEAF, LANES, CHUNK = 32, 8, 256
+LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
+LANES, CHUNK = 8, 256
 INF = np.inf
 
 
@@ -24,16 +25,20 @@ def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _bounds(centres, halves, of, middle, reach):  # type: ignore[no-untyped-def]
-    """Of each leaf the gap in its middle, and how far gaps can be from that, into middle and reach (leaf,)."""
-    for leaf in range(middle.size):
-        middle[leaf] = of[0]
-        reach[leaf] = 0.0
+def _bounds(boxes, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
+    """Of some boxes the gap in their middle, and how far gaps can be from that, into middle and reach (count,).
+
+    boxes (2, coordinate, box): centres and half widths of the coordinates, without the first one, which is 1.
+    """
+    for box in range(count):
+        middle[box] = of[0]
+        reach[box] = 0.0
     for c in range(1, of.size):
-        slope = abs(of[c])
-        for leaf in range(middle.size):
-            middle[leaf] += of[c] * centres[c - 1, leaf]
-            reach[leaf] += slope * halves[c - 1, leaf]
+        slope, size = of[c], abs(of[c])
+        centres, halves = boxes[0, c - 1, first : first + count], boxes[1, c - 1, first : first + count]
+        for box in range(count):
+            middle[box] += slope * centres[box]
+            reach[box] += size * halves[box]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -53,7 +58,7 @@ def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: i
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[no-untyped-def]
-    """Add to moments (10,) the columns of `table` (10, point) that count: counts (LEAF,), 1 or 0.
+    """Add to moments (m,) the columns of `table` (m, point) that count: counts (LEAF,), 1 or 0.
 
     LANES sums side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
     """
@@ -74,39 +79,76 @@ def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[n
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def survey(points, tables, sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
-    """For each realization the number of points below `activity` (n,), and their moments (n, side, 10).
+def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
+    """For each realization the number of points below `activity` (n,), and their moments (n, side * 10).
 
-    points      see PairScan: (basis, coordinates, starts of the leaves, centres, halves, locators)
-    tables      (side, moment, point)
-    sums        (leaf, side, moment): of all points of a leaf
+    points        see PairScan: (basis, coordinates, locators, leaves, branches, boxes of the leaves, boxes of the branches)
+    tables        (side * moment, point)
+    leaf_sums     (leaf, side * moment), and
+    branch_sums   (branch, side * moment): of all points there
     """
-    basis, coordinates, starts, centres, halves, locators = points
+    basis, coordinates, locators, leaves, branches, leaf_boxes, branch_boxes = points
     of, gaps, counts, lanes = np.empty(basis.shape[1]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
-    middle, reach = np.empty(starts.size - 1), np.empty(starts.size - 1)
+    middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
+    middle_here, reach_here = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _coefficients(basis, relative[k], of)
-        _bounds(centres, halves, of, middle, reach)
+        _bounds(branch_boxes, 0, middle.size, of, middle, reach)
         number = 0
-        for leaf in range(middle.size):
-            if middle[leaf] - reach[leaf] >= activity:
+        for branch in range(middle.size):
+            if middle[branch] - reach[branch] >= activity:
                 continue
-            first, count = starts[leaf], starts[leaf + 1] - starts[leaf]
-            if middle[leaf] + reach[leaf] < activity:
-                number += count
-                moments[k] += sums[leaf]
+            first_leaf, end_leaf = branches[branch], branches[branch + 1]
+            if middle[branch] + reach[branch] < activity:
+                number += leaves[end_leaf] - leaves[first_leaf]
+                for moment in range(moments.shape[1]):
+                    moments[k, moment] += branch_sums[branch, moment]
                 continue
-            _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
-            below = 0
-            for j in range(count):
-                is_active = gaps[j] < activity
-                below += is_active
-                counts[j] = 1.0 if is_active else 0.0
-            number += below
-            if below:
-                for side in range(tables.shape[0]):
-                    _add_moments(tables[side], first, count, counts, lanes, moments[k, side])
+            _bounds(leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle_here, reach_here)
+            for leaf in range(first_leaf, end_leaf):
+                here = leaf - first_leaf
+                if middle_here[here] - reach_here[here] >= activity:
+                    continue
+                first, count = leaves[leaf], leaves[leaf + 1] - leaves[leaf]
+                if middle_here[here] + reach_here[here] < activity:
+                    number += count
+                    for moment in range(moments.shape[1]):
+                        moments[k, moment] += leaf_sums[leaf, moment]
+                    continue
+                _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
+                below = 0
+                for j in range(count):
+                    is_active = gaps[j] < activity
+                    below += is_active
+                    counts[j] = 1.0 if is_active else 0.0
+                number += below
+                if below:
+                    _add_moments(tables, first, count, counts, lanes, moments[k])
         active[k] = number
+
+
+@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
+    """The deepest point of some leaves, if it is below `lowest` or as low and before `where`; its gap and number."""
+    _, coordinates, locators, leaves, _, leaf_boxes, _ = points
+    gaps, middle, reach = scratch
+    _bounds(leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle, reach)
+    promising = 0
+    for here in range(1, end_leaf - first_leaf):
+        if middle[here] - reach[here] < middle[promising] - reach[promising]:
+            promising = here
+    for turn in range(-1, end_leaf - first_leaf):
+        here = promising if turn < 0 else turn
+        if turn == promising or middle[here] - reach[here] > lowest:
+            continue
+        first, count = leaves[first_leaf + here], leaves[first_leaf + here + 1] - leaves[first_leaf + here]
+        _gaps(coordinates, first, count, of, deviations, locators, gaps)
+        for j in range(count):
+            if may_carry.size and not may_carry[first + j]:
+                continue
+            if gaps[j] < lowest or (gaps[j] == lowest and first + j < where):
+                lowest, where = gaps[j], first + j
+    return lowest, where
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -114,33 +156,30 @@ def deepest(points, clusters, relative, deviations, may_carry, numbers, gaps_the
     """For each realization the deepest point of each cluster (n, cluster), and its gap; infinite where none may carry.
 
     points      as in `survey`
-    clusters    (cluster + 1,): the first leaf of each cluster, and the end
-    may_carry   (n, point), only these points are looked at; all where it is empty
+    clusters    (cluster + 1,): the first branch of each cluster, and the end
+    may_carry   (n, point), only these points are looked at; all where it is (n, 0)
     """
-    basis, coordinates, starts, centres, halves, locators = points
-    of, gaps = np.empty(basis.shape[1]), np.empty(LEAF)
-    middle, reach = np.empty(starts.size - 1), np.empty(starts.size - 1)
+    basis, _, _, leaves, branches, _, branch_boxes = points
+    of = np.empty(basis.shape[1])
+    middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
+    scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _coefficients(basis, relative[k], of)
-        _bounds(centres, halves, of, middle, reach)
+        _bounds(branch_boxes, 0, middle.size, of, middle, reach)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
-            lowest, where = INF, starts[begin]
+            lowest, where = INF, leaves[branches[begin]]
             promising = begin
-            for leaf in range(begin + 1, end):
-                if middle[leaf] - reach[leaf] < middle[promising] - reach[promising]:
-                    promising = leaf
+            for branch in range(begin + 1, end):
+                if middle[branch] - reach[branch] < middle[promising] - reach[promising]:
+                    promising = branch
             for turn in range(begin - 1, end):
-                leaf = promising if turn < begin else turn
-                if turn == promising or middle[leaf] - reach[leaf] > lowest:
+                branch = promising if turn < begin else turn
+                if turn == promising or middle[branch] - reach[branch] > lowest:
                     continue
-                first, count = starts[leaf], starts[leaf + 1] - starts[leaf]
-                _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
-                for j in range(count):
-                    if may_carry.shape[0] and not may_carry[k, first + j]:
-                        continue
-                    if gaps[j] < lowest or (gaps[j] == lowest and first + j < where):
-                        lowest, where = gaps[j], first + j
+                lowest, where = _search(
+                    points, branches[branch], branches[branch + 1], of, deviations[k], may_carry[k], lowest, where, scratch
+                )
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest
 
 

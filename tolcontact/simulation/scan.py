@@ -21,15 +21,16 @@ SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much w
 
 @dataclass(frozen=True, eq=False)
 class PairScan:
-    """Contact constants of a pair, its points sorted by cluster, and into leaves of neighbours within a cluster.
+    """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
 
     basis              (13, r), and
     coordinates        (r, point): gaps [mm] = [X_RM, 1] @ basis @ coordinates
     tables             moment tables (moment, point) of the sides that enter the objective
     P_m, P_r, n_r      (point, 3)
     locators           columns of the deviations by which points stand out, (point,); None where none does
-    starts             (leaf + 1,): the first point of each leaf, and the end
-    clusters           (cluster + 1,): the first leaf of each cluster, and the end
+    leaves             (leaf + 1,): the first point of each leaf, and the end
+    branches           (branch + 1,): the first leaf of each branch, and the end
+    clusters           (cluster + 1,): the first branch of each cluster, and the end
     """
 
     basis: np.ndarray
@@ -39,7 +40,8 @@ class PairScan:
     P_r: np.ndarray
     n_r: np.ndarray
     locators: np.ndarray | None
-    starts: np.ndarray
+    leaves: np.ndarray
+    branches: np.ndarray
     clusters: np.ndarray
 
     def take(self, rows: np.ndarray) -> "PairScan":
@@ -82,7 +84,7 @@ class PairScan:
         gaps = self.gaps(relative, deviations)
         if may_carry is not None:
             gaps = np.where(may_carry, gaps, np.inf)
-        firsts = self.starts[self.clusters]
+        firsts = self.leaves[self.branches[self.clusters]]
         points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
         return points, -np.take_along_axis(gaps, points, axis=1)
 
@@ -94,7 +96,7 @@ class CompiledScan(PairScan):
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.survey(self._points, self._tables, self._sums, poses, heights, activity, active, moments)
+        kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, moments.reshape(count, -1))
         return active, moments
 
     def deepest(
@@ -103,36 +105,38 @@ class CompiledScan(PairScan):
         points = np.empty((len(relative), len(self.clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        mask = np.empty((0, 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
+        mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
         kernel.deepest(self._points, self.clusters, poses, heights, mask, points, gaps)
         return points, -gaps
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, ...]:
         """What the kernel knows of the points. The height of a point that stands out is not bounded."""
-        of = self.coordinates[1:]
-        low, high = (extreme.reduceat(of, self.starts[:-1], axis=1) for extreme in (np.minimum, np.maximum))
-        halves = (high - low) / 2 + SLACKNESS * np.abs(of).max(initial=0)
-        if self.locators is not None:
-            halves[:] = np.inf
+        rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0) if self.locators is None else np.inf
+        boxes = []
+        for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
+            low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
+            boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
         columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
-        return self.basis, self.coordinates, self.starts, np.ascontiguousarray((low + high) / 2), halves, columns
+        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes
 
     @cached_property
     def _tables(self) -> np.ndarray:
-        """(side, moment, point)."""
-        return np.array(self.tables).reshape(len(self.tables), MOMENTS, len(self.P_m))
+        """(side * moment, point)."""
+        return np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.P_m))
 
     @cached_property
-    def _sums(self) -> np.ndarray:
-        """Summed moments of the leaves, (leaf, side, moment)."""
-        return np.ascontiguousarray(np.add.reduceat(self._tables, self.starts[:-1], axis=2).transpose(2, 0, 1))
+    def _sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Summed moments of the leaves and of the branches, (leaf, side * moment) and (branch, side * moment)."""
+        of_leaves = np.ascontiguousarray(np.add.reduceat(self._tables, self.leaves[:-1], axis=1).T)
+        return of_leaves, np.add.reduceat(of_leaves, self.branches[:-1], axis=0)
 
 
 def pair_scan(
     pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, chosen: np.ndarray | None = None
 ) -> PairScan:
-    """Sort the points of a pair, or some `chosen` ones, into clusters of neighbours, at most so many; and those into leaves.
+    """Sort the points of a pair, or some `chosen` ones, into clusters of neighbours, at most so many; and those into
+    branches and leaves.
 
     Supports have a cluster each.
     """
@@ -141,6 +145,8 @@ def pair_scan(
     found = [_leaves(chosen[label == one], gaps.coordinates[1:]) for one in range(label.max() + 1)]
     leaves = [leaf for cluster in found for leaf in cluster]
     order = np.concatenate(leaves)
+    ends = np.cumsum([0, *map(len, found)])
+    firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
     return CompiledScan(
         basis=gaps.basis,
         coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
@@ -149,13 +155,14 @@ def pair_scan(
         P_r=pair.P_r[order],
         n_r=pair.n_r[order],
         locators=None if pair.locators is None else pair.locators[order],
-        starts=np.cumsum([0, *map(len, leaves)]),
-        clusters=np.cumsum([0, *map(len, found)]),
+        leaves=np.cumsum([0, *map(len, leaves)]),
+        branches=np.concatenate([*firsts, [len(leaves)]]),
+        clusters=np.cumsum([0, *map(len, firsts)]),
     )
 
 
 def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
-    """Halve `points` across their longest extent until no part has more than LEAF of them."""
+    """Halve `points` across their longest extent until no part has more than LEAF of them; neighbours stay together."""
     if len(points) <= kernel.LEAF:
         return [points]
     of = coordinates[:, points]

@@ -1,0 +1,129 @@
+"""What a person would write instead: NumPy geometry, and a loop over a QP solver.
+
+One part moves, the other one stays where its locators put it. Geometry is vectorized over realizations, in blocks; the loop
+holds nothing but the solver. Every realization has one QP with the rows of the points that are inside at first: the paper's
+set, and the least work. (Ours also finds the points that the correction drives in; the loop does not.)
+"""
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+import qpsolvers
+import scipy.optimize
+from scipy.spatial.transform import Rotation
+
+ETA, ACTIVITY = 1e-6, 1e-9
+BLOCK = 500
+Solve = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray | None]
+
+
+def with_qpsolvers(name: str) -> Solve:
+    options = {"osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9, "polishing": True}, "piqp": {"eps_abs": 1e-11},
+               "proxqp": {"eps_abs": 1e-10}, "daqp": {"primal_tol": 1e-11}}.get(name, {})  # fmt: skip
+    zero = np.zeros(6)
+    warm: dict = {}
+    starts = name in ("osqp", "proxqp")  # those that make use of a starting point
+
+    def solve(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+        x = qpsolvers.solve_qp(Q, zero, -A, b, solver=name, initvals=warm.get("x") if starts else None, **options)
+        warm["x"] = x
+        return x
+
+    return solve
+
+
+def with_scipy(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+    found = scipy.optimize.minimize(
+        lambda x: 0.5 * x @ Q @ x, np.zeros(6), jac=lambda x: Q @ x, method="SLSQP",
+        constraints={"type": "ineq", "fun": lambda x: A @ x + b, "jac": lambda x: A}, options={"ftol": 1e-13, "maxiter": 200},
+    )  # fmt: skip
+    return found.x if found.success else None
+
+
+def with_casadi(plugin: str, rows: int) -> Solve:
+    """One conic Function with a row for every contact point."""
+    options = {"daqp": {}, "qpoases": {"printLevel": "none"}}[plugin]
+    S = ca.conic(
+        "S", plugin, {"h": ca.Sparsity.dense(6, 6), "a": ca.Sparsity.dense(rows, 6)}, {**options, "error_on_fail": False}
+    )
+
+    def solve(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+        return S(h=ca.DM(Q), a=ca.DM(A), lba=ca.DM(-b), uba=ca.inf)["x"].full().ravel()
+
+    return solve
+
+
+class Loop:
+    """The pair of a model, as plain arrays."""
+
+    def __init__(self, program) -> None:
+        nominal = program.nominal
+        (pair, *_), self.pairs = nominal.pairs, nominal.pairs
+        self.program, self.moving, self.reference = program, pair.moving, pair.reference
+        self.P = np.vstack([p.P_m for p in nominal.pairs])
+        self.n = np.vstack([p.n_r for p in nominal.pairs])
+        self.c = self.P.mean(axis=0)
+        p = self.P - self.c
+        self.length = np.sqrt((p**2).sum(axis=1).mean())
+        self.table = np.column_stack([np.ones(len(p)), p, *(p[:, i] * p[:, j] for i in range(3) for j in range(3))])
+        foot = np.vstack([p.P_r for p in nominal.pairs])
+        self.G = np.vstack(
+            [(self.n[:, :, None] * self.P[:, None, :]).reshape(len(p), 9).T, self.n.T, -(self.n * foot).sum(axis=1)]
+        )
+        self.J = []
+        for part in nominal.parts:
+            rows = [np.r_[n, np.cross(x, n)] for x, n in zip(part.locator_points, part.locator_directions, strict=True)]
+            self.J.append(np.linalg.inv(np.array(rows)) if rows else None)
+        measure = nominal.assembly.measures[0]
+        self.at, self.along = nominal.place(measure.of), np.array(measure.along)
+
+    def measure(self, deviations: np.ndarray, solve: Solve, every: bool = False) -> tuple[np.ndarray, np.ndarray]:
+        """Measures, and where the answer has no penetration left, for deviations (realization, locator)."""
+        blocks = [self._block(deviations[k : k + BLOCK], solve, every) for k in range(0, len(deviations), BLOCK)]
+        return np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
+
+    def _block(self, deviations: np.ndarray, solve: Solve, every: bool) -> tuple[np.ndarray, np.ndarray]:
+        poses, start = [], 0
+        for J in self.J:
+            q = deviations[:, start : start + 6] @ J.T if J is not None else np.zeros((len(deviations), 6))
+            start += 6 if J is not None else 0
+            poses.append((Rotation.from_rotvec(q[:, 3:]).as_matrix(), q[:, :3]))
+        (R_m, t_m), (R_r, t_r) = poses[self.moving], poses[self.reference]
+        R = R_r.swapaxes(1, 2) @ R_m
+        t = np.einsum("kji,kj->ki", R_r, t_m - t_r)
+        X = np.hstack([R.reshape(-1, 9), t, np.ones((len(R), 1))])
+        gaps = X @ self.G
+        active = gaps < ACTIVITY
+        touched = np.flatnonzero((gaps < 0).any(axis=1))
+        # Moments of the active points, and eta times those of all, turned into the reference frame.
+        M = active[touched].astype(float) @ self.table + ETA * self.table.sum(axis=0)
+        count, first = M[:, 0], np.einsum("kij,kj->ki", R[touched], M[:, 1:4])
+        second = R[touched] @ M[:, 4:].reshape(-1, 3, 3) @ R[touched].swapaxes(1, 2)
+        Q = np.zeros((len(touched), 6, 6))
+        Q[:, :3, :3] = count[:, None, None] * np.eye(3)
+        Q[:, :3, 3:] = -_skew(first)
+        Q[:, 3:, :3] = _skew(first)
+        Q[:, 3:, 3:] = np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second
+        scale = np.r_[1, 1, 1, np.full(3, 1 / self.length)]
+        Q *= scale * scale[:, None] / count[:, None, None]
+        x = np.zeros((len(R), 6))
+        for k, number in enumerate(touched):
+            rows = slice(None) if every else active[number]
+            n = self.n[rows]
+            arm = (self.P[rows] - self.c) @ R[number].T
+            A = np.hstack([n, np.cross(arm, n) / self.length])
+            found = solve(Q[k], A, gaps[number, rows])
+            x[number] = np.nan if found is None else found * scale
+        centre = np.einsum("kij,j->ki", R, self.c) + t
+        turn = np.eye(3) + _skew(x[:, 3:])
+        R_new = turn @ R
+        t_new = np.einsum("kij,kj->ki", turn, t - centre) + centre + x[:, :3]
+        open_ = (np.hstack([R_new.reshape(-1, 9), t_new, np.ones((len(R), 1))]) @ self.G).min(axis=1) > -1e-7
+        world = R_r @ R_new, np.einsum("kij,kj->ki", R_r, t_new) + t_r
+        return (world[0] @ self.at + world[1] - self.at) @ self.along, open_
+
+
+def _skew(w: np.ndarray) -> np.ndarray:
+    zero = np.zeros(len(w))
+    return np.array([[zero, -w[:, 2], w[:, 1]], [w[:, 2], zero, -w[:, 0]], [-w[:, 1], w[:, 0], zero]]).transpose(2, 0, 1)
