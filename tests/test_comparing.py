@@ -51,6 +51,20 @@ def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
     assert said["coords"]["solver"]["data"] == ["daqp", "qpoases"]
 
 
+def test_resolutions_and_objectives_are_compared_too(tmp_path):
+    options = ("compare", cases.MODELS / "channel.py", "--solvers", "daqp,qpoases", "--samples", "40")
+    both = ("--resolution", "linearized,exact", "--objective", "active points,all points")
+    assert call(tmp_path, *options, *both, "--out", "all.nc").returncode == 0
+    with xr.open_dataset(tmp_path / "all.nc") as found:
+        assert found.sizes["solver"] == 8
+        assert [str(label) for label in found.solver.values[:3]] == [
+            "daqp linearized active points", "qpoases linearized active points", "daqp linearized all points"
+        ]  # fmt: skip
+        exact = found.sel(solver=[label for label in found.solver.values if "exact" in str(label)])
+        assert (exact.by_status.sel(status_meaning="resolved") >= 38).all()
+    assert call(tmp_path, *options, "--resolution", "exact,exact").returncode == 2
+
+
 @pytest.mark.parametrize(("names", "words"), [("daqp,daqp", "each once"), (",", "at least one"), ("daqp,simplex", "simplex")])
 def test_wrong_lists_of_solvers_are_refused(names, words, tmp_path):
     done = call(tmp_path, "compare", cases.MODELS / "ra1.py", "--solvers", names)

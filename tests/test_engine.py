@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
@@ -10,7 +11,7 @@ from tolcontact.discretization import discretize
 from tolcontact.simulation import RAW, simulate_blocks
 from tolcontact.simulation.run import _observe
 from tolcontact.simulation.scan import PairScan, pair_scan
-from tolcontact.symbolic import contact_program
+from tolcontact.symbolic import batch, contact_program
 from tolcontact.symbolic.batch import Mapped
 from tolcontact.symbolic.gap import gap_matrix
 from tolcontact.symbolic.gap_map import gap_map
@@ -55,6 +56,53 @@ def test_an_instruction_without_translation_is_left_to_casadi():
     function = ca.Function("f", [x], [ca.erf(x)])
     with pytest.raises(UnknownInstructionError):
         Native(function)
+
+
+EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": cases.rollers} | {
+    name: lambda name=name: cases.model(name) for name in ("cover", "door", "cells", "channel")
+}
+
+
+@pytest.mark.parametrize("resolution", ["linearized", "exact"])
+@pytest.mark.parametrize("make", EVERY.values(), ids=EVERY)
+def test_few_rows_give_what_all_rows_give(make, resolution, monkeypatch):
+    """Curved contact and several bodies included: the same QPs, once with the rows that are found, once with every row."""
+    few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
+    monkeypatch.setattr(contact_program, "_standing", lambda gaps, method: np.arange(gaps.coordinates.shape[1]))
+    every = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
+    assert any(len(g.program.standing[0]) > 4 for g in every.groups)
+    blocks = [next(simulate_blocks(program, samples=40, seed=8)) for program in (few, every)]
+    assert (blocks[0].status == blocks[1].status).all()
+    apart = np.abs(blocks[0].poses - blocks[1].poses).max(axis=(1, 2, 3))
+    assert apart[np.isin(blocks[0].status, [0, 1])].max() < 1e-10 * 100  # lengths of some 100 mm
+
+
+def test_only_corners_of_planar_contacts_can_be_the_deepest():
+    (pair,) = discretize(cases.ra1()).pairs
+    G = gap_matrix(pair)
+    found = gap_map(G)
+    assert found.basis.shape == (13, 3) and len(found.corners) == 4
+    assert np.abs(found.basis @ found.coordinates - G).max() < 1e-11
+    X = np.hstack([Rotation.random(500, rng=1).as_matrix().reshape(500, 9), RNG.normal(size=(500, 3)), np.ones((500, 1))])
+    gaps = X @ G
+    assert np.abs(gaps.min(axis=1) - gaps[:, found.corners].min(axis=1)).max() < 1e-11
+
+
+@pytest.mark.parametrize("solver", ["daqp", "qpoases"])
+def test_results_do_not_depend_on_the_number_of_threads(solver, monkeypatch):
+    program = tc.build(cases.model("channel"), solver=solver, method=tc.Method(resolution="exact"))
+    runs = [list(simulate_blocks(program, samples=260, seed=1, block=40, threads=threads)) for threads in (1, 2, 5, 1)]
+    for name in ("poses", "measured", "gap_min", "reaction", "kkt_residual", "status", "iterations"):
+        one, *others = (np.concatenate([getattr(block, name) for block in run]) for run in runs)
+        assert all(np.array_equal(one, other) for other in others), name
+
+
+def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
+    monkeypatch.setattr(batch, "ENOUGH", 150)
+    program = tc.build(cases.ra1(), solver="daqp")
+    first, *_, last = (next(simulate_blocks(program, samples=100, seed=1)) for _ in range(4))
+    assert program.place._evaluate._native is not None
+    assert np.array_equal(first.poses, last.poses) and np.array_equal(first.kkt_residual, last.kkt_residual)
 
 
 @pytest.mark.parametrize("activity", [1e-9, 0.3])

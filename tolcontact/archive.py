@@ -92,9 +92,7 @@ class ArchiveWriter:
         """Write the rows of a block, and see them to the disk."""
         rows = slice(block.start, block.start + len(block))
         R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
-        for part, both in enumerate(self._moments):
-            for state, moments in enumerate(both):
-                moments.add(R[:, state, part], t[:, state, part])
+        self._add_to_fields(R, t)
         values = {
             words.MEASURED: block.measured,
             words.TRANSLATION: t,
@@ -115,6 +113,11 @@ class ArchiveWriter:
         self._file[words.STATUS.name][rows] = block.status
         self._file.sync()
         self.rows = rows.stop
+
+    def _add_to_fields(self, R: np.ndarray, t: np.ndarray) -> None:
+        for part, both in enumerate(self._moments):
+            for state, moments in enumerate(both):
+                moments.add(R[:, state, part], t[:, state, part])
 
     def check_point(self) -> None:
         """Write the sums so far, from which a killed run goes on. The last ones stay until these are on the disk."""

@@ -99,17 +99,16 @@ def compare(
     solvers: Annotated[str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")],
     samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
     seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
-    resolution: Annotated[str, typer.Option(help=f"One of {_or(RESOLUTIONS)}.")] = "linearized",
-    objective: Annotated[str, typer.Option(help=f"One of {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
+    resolution: Annotated[str, typer.Option(help=f"One or more of {_or(RESOLUTIONS)}.")] = "linearized",
+    objective: Annotated[str, typer.Option(help=f"One or more of {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
     as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
 ) -> None:
-    """Compare solvers on the same draws: agreement, failures, residuals, time."""
+    """Compare solvers, resolutions or objectives on the same draws: agreement, failures, residuals, time."""
     if out is not None:
         check_writable(out, overwrite=False, resume=False)
-    method = Method(resolution=resolution, objective=objective)
-    names = [name.strip() for name in solvers.split(",") if name.strip()]
-    found = compare_solvers(load_model(model), names, samples=samples, seed=seed, method=method)
+    methods = [Method(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
+    found = compare_solvers(load_model(model), _names(solvers), samples=samples, seed=seed, methods=methods)
     if out is not None:
         # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
         texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
@@ -120,6 +119,10 @@ def compare(
         typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
     else:
         Console(highlight=False, width=80).print(comparison_text(found))
+
+
+def _names(words: str) -> list[str]:
+    return [word.strip() for word in words.split(",") if word.strip()]
 
 
 @app.command()

@@ -1,4 +1,4 @@
-"""Several solvers on the same draws: do they agree, do they fail, how long do they take?"""
+"""Several solvers, resolutions or objectives on the same draws: do they agree, do they fail, how long do they take?"""
 
 import itertools
 import time
@@ -21,9 +21,11 @@ QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
 def compare(
-    assembly: Assembly, solvers: Sequence[str], *, samples: int = 1000, seed: int = 1, method: Method | None = None
+    assembly: Assembly, solvers: Sequence[str], *, samples: int = 1000, seed: int = 1, methods: Sequence[Method] = (Method(),)
 ) -> xr.Dataset:
-    """Simulate the same realizations with each solver. Differences are from the first one, in the corrected state.
+    """Simulate the same realizations with each solver and method. Differences are from the first one, in the corrected state.
+
+    Labels along the dimension `solver` name the solver, and the resolution and objective where they are not all the same.
 
     seconds           (solver)                         wall time of all realizations, from draws to measures [s]
     by_status         (solver, status_meaning)         number of realizations
@@ -36,10 +38,12 @@ def compare(
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
     check_counts(samples=samples, seed=seed)
-    if not solvers or len(set(solvers)) < len(solvers):
-        raise OptionError(f"solvers are {', '.join(solvers) or 'none'}; name at least one, and each once")
-    nominal, method = discretize(assembly), method or Method()
-    programs = [compile_program(nominal, solver, method) for solver in solvers]
+    for word, named in {"solvers": solvers, "methods": methods}.items():
+        if not named or len(set(named)) < len(named):
+            raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
+    nominal = discretize(assembly)
+    contestants = [(solver, method) for method in methods for solver in solvers]
+    programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
     runs = []
     for program in programs:
@@ -63,20 +67,30 @@ def compare(
             for name in rows[0]
         },
         coords={
-            "solver": list(solvers),
+            "solver": [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
             "status_meaning": list(words.STATUS_MEANINGS),
             "extent": list(QUANTILES),
             words.MEASURE: [measure.name for measure in nominal.measures],
         },
         attrs={
             "title": f"comparison of solvers on {assembly.name}",
-            "reference_solver": solvers[0],
+            "reference_solver": " ".join([solvers[0], *_apart(methods[0], methods)]),
             "realizations": samples,
             "seed": seed,
-            "resolution": method.resolution,
-            "objective": method.objective,
+            "resolution": ", ".join(dict.fromkeys(method.resolution for method in methods)),
+            "objective": ", ".join(dict.fromkeys(method.objective for method in methods)),
         },
     )
+
+
+def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
+    """What tells a method from the others."""
+    words_of = [[each.resolution, each.objective] for each in methods]
+    return [
+        own
+        for own, others in zip([method.resolution, method.objective], zip(*words_of, strict=True), strict=True)
+        if len({*others}) > 1
+    ]
 
 
 def _row(run: dict, first: dict, corners: np.ndarray) -> dict:

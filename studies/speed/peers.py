@@ -8,6 +8,7 @@ set, and the least work. (Ours also finds the points that the correction drives 
 from collections.abc import Callable
 
 import casadi as ca
+import daqp
 import numpy as np
 import qpsolvers
 import scipy.optimize
@@ -31,6 +32,13 @@ def with_qpsolvers(name: str) -> Solve:
         return x
 
     return solve
+
+
+def with_daqp(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
+    """DAQP by its own interface, without qpsolvers around it."""
+    none = np.full(len(b), 1e30)
+    x, _, status, _ = daqp.solve(Q, np.zeros(6), A, none, -b, np.zeros(len(b), dtype=np.intc), primal_tol=1e-11)
+    return x if status == 1 else None
 
 
 def with_scipy(Q: np.ndarray, A: np.ndarray, b: np.ndarray) -> np.ndarray | None:
@@ -71,10 +79,12 @@ class Loop:
         self.G = np.vstack(
             [(self.n[:, :, None] * self.P[:, None, :]).reshape(len(p), 9).T, self.n.T, -(self.n * foot).sum(axis=1)]
         )
-        self.J = []
+        self.schemes = []  # per part: inverse of the locator matrix about the locators' centroid, and that centroid
         for part in nominal.parts:
-            rows = [np.r_[n, np.cross(x, n)] for x, n in zip(part.locator_points, part.locator_directions, strict=True)]
-            self.J.append(np.linalg.inv(np.array(rows)) if rows else None)
+            centre = part.locator_points.mean(axis=0) if len(part.locator_points) else np.zeros(3)
+            arms = part.locator_points - centre
+            rows = [np.r_[n, np.cross(x, n)] for x, n in zip(arms, part.locator_directions, strict=True)]
+            self.schemes.append((np.linalg.inv(np.array(rows)) if rows else np.zeros((6, 0)), centre))
         measure = nominal.assembly.measures[0]
         self.at, self.along = nominal.place(measure.of), np.array(measure.along)
 
@@ -85,10 +95,11 @@ class Loop:
 
     def _block(self, deviations: np.ndarray, solve: Solve, every: bool) -> tuple[np.ndarray, np.ndarray]:
         poses, start = [], 0
-        for J in self.J:
-            q = deviations[:, start : start + 6] @ J.T if J is not None else np.zeros((len(deviations), 6))
-            start += 6 if J is not None else 0
-            poses.append((Rotation.from_rotvec(q[:, 3:]).as_matrix(), q[:, :3]))
+        for inverse, centre in self.schemes:
+            q = deviations[:, start : start + inverse.shape[1]] @ inverse.T
+            start += inverse.shape[1]
+            R = Rotation.from_rotvec(q[:, 3:]).as_matrix()
+            poses.append((R, q[:, :3] + centre - R @ centre))
         (R_m, t_m), (R_r, t_r) = poses[self.moving], poses[self.reference]
         R = R_r.swapaxes(1, 2) @ R_m
         t = np.einsum("kji,kj->ki", R_r, t_m - t_r)

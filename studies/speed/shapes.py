@@ -32,8 +32,12 @@ def _shell(long: float, wide: float, along: int, across: int, radius: float, thi
     sheet = np.concatenate([np.column_stack([first, first + 1, first + along]),
                             np.column_stack([first + 1, first + along + 1, first + along])])  # fmt: skip
     count = along * across
-    edge = np.concatenate([np.arange(along), np.arange(2 * along - 1, count, along), np.arange(count - 2, count - along - 1, -1),
-                           np.arange(count - 2 * along, 0, -along)])  # fmt: skip
+    right, back, left = (
+        np.arange(2 * along - 1, count, along),
+        np.arange(count - 2, count - along - 1, -1),
+        np.arange(count - 2 * along, 0, -along),
+    )
+    edge = np.concatenate([np.arange(along), right, back, left])
     after = np.roll(edge, -1)
     wall = np.concatenate([np.column_stack([edge, edge + count, after]), np.column_stack([after, edge + count, after + count])])
     vertices = np.concatenate([np.column_stack([x, y, z]), np.column_stack([x, y, np.full(count, thickness)])])

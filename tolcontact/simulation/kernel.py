@@ -1,7 +1,7 @@
 """Passes over the points of a surface, compiled: no array of size realizations x points is made.
 
 Contact points come in leaves of neighbours, and those in branches, with bounds of their coordinates, which bound their gaps.
-What is wholly clear is passed over, what is wholly active adds its summed moments, and what cannot hold the deepest is left out.
+What is wholly clear is passed over, what is wholly active adds its summed moments, what cannot hold the deepest is left out.
 Gaps are summed up in the order of `PairScan.gaps`, so that both give the same to the last bit; moments are summed up in
 another order than NumPy's, and agree to rounding.
 """

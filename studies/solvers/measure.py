@@ -1,0 +1,196 @@
+"""How accurate and how fast are QP solvers on contact problems with a row for every contact point?
+
+Usage: python studies/solvers/measure.py [--realizations 60] [--figure accuracy.png]
+
+The QPs are those of tolcontact, but with all rows, so that hundreds of them coincide or nearly do. Every solver gets the same
+ones, first in order, then reversed: an answer must not depend on the problem before it.
+"""
+# ruff: noqa: E402
+
+import argparse
+import importlib.util
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+sys.modules["highspy"] = None  # its HiGHS and CasADi's crash each other in one process
+
+import casadi as ca
+import matplotlib as mpl
+import numpy as np
+import qpsolvers
+from scipy.optimize import nnls
+
+import tolcontact as tc
+from tolcontact.sampling import draw
+from tolcontact.simulation.run import simulate_block
+from tolcontact.symbolic import contact_program, contact_solver, plugins
+from tolcontact.symbolic.batch import quiet
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+HERE = Path(__file__).resolve().parent
+WRONG = 1e-4  # mm: an answer that is farther off, and was not owned up to, is wrong
+REFUSED = {"ipqp": {}, "superscs": {"superscs": {"eps": 1e-9, "verbose": 0}}}
+OUTSIDE = {
+    "daqp": {"primal_tol": 1e-11}, "quadprog": {}, "clarabel": {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11},
+    "piqp": {"eps_abs": 1e-11}, "proxqp": {"eps_abs": 1e-10}, "osqp": {"eps_abs": 1e-9, "eps_rel": 1e-9},
+}  # fmt: skip
+Problem = dict[str, np.ndarray]
+Solve = Callable[[Problem], tuple[np.ndarray, bool]]
+
+
+def load(path: Path):
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def models() -> dict[str, tc.Assembly]:
+    shapes, scripts = load(HERE.parent / "speed" / "shapes.py"), HERE.parents[1] / "models"
+    flat = tc.Assembly("coincident")  # the block only moves up and down: 400 rows are the same
+    base, block = flat.part("base", tc.Box(50, 50, 10), fixed=True), flat.part("block", tc.Box(50, 50, 10), at=(0, 0, 10))
+    places = {
+        "Z1": ((25, 25, 0), "z", 2), "X1": ((0, 25, 0), "x", 0), "X2": ((0, 25, 10), "x", 0),
+        "X3": ((0, 40, 0), "x", 0), "Y1": ((25, 0, 0), "y", 0), "Y2": ((25, 0, 10), "y", 0),
+    }  # fmt: skip
+    flat.locate(block, [tc.Locator(name, *place) for name, place in places.items()])
+    flat.contact("seat", moving=block.face("-z"), reference=base.face("+z"), points=400)
+    flat.measure("height", block.point(25, 25, 10), along="z")
+    return {
+        "RA1": load(scripts / "ra1.py").assembly(),
+        "coincident rows": flat,
+        "opposed faces": load(scripts / "channel.py").assembly(),
+        "curved": shapes.slab(450, 60.0),
+        "RA2": load(scripts / "ra2.py").assembly(),
+        "8 free bodies": load(scripts / "cells.py").assembly(),
+    }
+
+
+def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
+    """The QPs of the first linear step, with a row for every contact point of the first group."""
+    kept = contact_program._standing
+    contact_program._standing = lambda gaps, _: np.arange(gaps.coordinates.shape[1])
+    found: list[Problem] = []
+    solve = contact_solver.Mapped.__call__
+
+    def record(self, inputs):
+        if self._solvers and not found:
+            found.extend(dict(zip("hgabc", (array[k].copy() for array in inputs), strict=True)) for k in range(len(inputs[0])))
+        return solve(self, inputs)
+
+    contact_solver.Mapped.__call__ = record
+    try:
+        program = tc.build(assembly, solver="daqp")
+        simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
+    finally:
+        contact_program._standing, contact_solver.Mapped.__call__ = kept, solve
+    functions = program.groups[0].program
+    h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
+    for one in found:
+        one["H"], one["A"] = ca.DM(h, one["h"]).full(), ca.DM(a, one["a"]).full()
+        one["low"] = np.r_[np.full(h.size1() - functions.slacks, -np.inf), np.zeros(functions.slacks)]
+    return found
+
+
+def with_casadi(name: str, one: Problem) -> Solve:
+    options = plugins.PLUGINS[name].options if name in plugins.PLUGINS else REFUSED[name]
+    dense = {"h": ca.Sparsity.dense(*one["H"].shape), "a": ca.Sparsity.dense(*one["A"].shape)}
+    with quiet():
+        S = ca.conic("S", name, dense, {**options, "error_on_fail": False})
+
+    def solve(of: Problem) -> tuple[np.ndarray, bool]:
+        # DM first: converting arrays would count as the solver's time.
+        inputs = {"h": ca.DM(of["H"]), "a": ca.DM(of["A"]), "g": ca.DM(of["g"]), "lba": ca.DM(of["b"]), "lbx": ca.DM(of["low"])}
+        with quiet():
+            x = S(**inputs, uba=ca.inf, ubx=ca.inf)["x"].full().ravel()
+        return x, bool(S.stats()["success"])
+
+    return solve
+
+
+def outside(name: str, _: Problem) -> Solve:
+    def solve(of: Problem) -> tuple[np.ndarray, bool]:
+        problem = qpsolvers.Problem(of["H"], of["g"], -of["A"], -of["b"], lb=of["low"])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = qpsolvers.solve_problem(problem, solver=name, **OUTSIDE[name])
+        return (found.x if found.x is not None else np.full(len(of["g"]), np.nan)), bool(found.found)
+
+    return solve
+
+
+def reference(of: Problem) -> np.ndarray:
+    """By quadprog's dual method; its optimality is checked by hand, with nonnegative least squares for the multipliers."""
+    x, _ = outside("quadprog", of)(of)
+    rows = np.vstack([of["A"], np.eye(len(x))[np.isfinite(of["low"])]])
+    slack = rows @ x - np.r_[of["b"], of["low"][np.isfinite(of["low"])]]
+    assert slack.min() > -1e-7, f"the reference penetrates by {slack.min()}"
+    _, rest = nnls(rows[slack < 1e-7].T, of["H"] @ x + of["g"], maxiter=10_000)
+    assert rest < 1e-6 * max(1.0, np.abs(of["g"]).max()), f"the reference is not optimal: {rest}"
+    return x
+
+
+def judge(solve: Solve, of: list[Problem], truth: list[np.ndarray], limit: float) -> dict[str, float]:
+    """`limit` [s]: a solver that takes longer is stopped, and judged by what it has done."""
+    solve(of[0])
+    answers, seconds, begun = [], [], time.perf_counter()
+    for one in of:
+        start = time.perf_counter()
+        answers.append(solve(one))
+        seconds.append(time.perf_counter() - start)
+        if time.perf_counter() - begun > limit:
+            break
+    back = [solve(one)[0] for one in of[: len(answers)][::-1]][::-1] if len(answers) == len(of) else [x for x, _ in answers]
+    errors = np.array([np.abs(x - t).max() for (x, _), t in zip(answers, truth, strict=False)])
+    owned = np.array([not success for _, success in answers])
+    bad = ~(errors < WRONG)
+    moved = [np.abs(x - y).max() for (x, _), y in zip(answers, back, strict=True)]
+    return {
+        "ms": 1e3 * float(np.median(seconds)), "median": float(np.nanmedian(errors)), "largest": float(np.nanmax(errors)),
+        "wrong": int((bad & ~owned).sum()), "given up": int(owned.sum()), "order": float(np.nanmax(moved)), "of": len(answers),
+    }  # fmt: skip
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--realizations", type=int, default=60)
+    options.add_argument("--figure", type=Path, default=HERE / "accuracy.png")
+    chosen = options.parse_args()
+    solvers = {f"CasADi {name}": (with_casadi, name) for name in (*plugins.usable_plugins(), *REFUSED)}
+    solvers |= {f"{name} outside": (outside, name) for name in OUTSIDE}
+    print("| problem | solver | ms | median error [mm] | largest | wrong, unsaid | given up | order matters [mm] |")
+    print("|---|---|---:|---:|---:|---:|---:|---:|")
+    fig, axes = plt.subplots(2, 3, figsize=(11, 6.4), layout="constrained", sharex=True, sharey=True)
+    for (name, assembly), ax in zip(models().items(), axes.flat, strict=True):
+        of = problems(assembly, chosen.realizations)
+        truth = [reference(one) for one in of]
+        rows, size = of[0]["A"].shape
+        ax.set_title(f"{name}: {rows} rows, {size} variables", fontsize=9)
+        for k, (label, (make, which)) in enumerate(solvers.items()):
+            try:
+                found = judge(make(which, of[0]), of, truth, limit=15.0)
+            except (RuntimeError, ValueError, qpsolvers.exceptions.SolverError) as error:
+                print(f"| {name} | {label} | fails: {str(error).splitlines()[0][:60]} ||||||", flush=True)
+                continue
+            print(
+                f"| {name} | {label} | {found['ms']:.3g} | {found['median']:.1g} | {found['largest']:.1g} | {found['wrong']} of"
+                f" {found['of']} | {found['given up']} | {found['order']:.1g} |",
+                flush=True,
+            )
+            marker, colour = ("o", f"C{k % 10}") if label.startswith("CasADi") else ("s", f"C{k % 10}")
+            ax.loglog(found["ms"], max(found["largest"], 1e-16), marker, color=colour, label=label)
+    for ax in axes[-1]:
+        ax.set_xlabel("ms per QP")
+    for ax in axes[:, 0]:
+        ax.set_ylabel("largest error [mm]")
+    fig.legend(*axes.flat[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize=8)
+    fig.savefig(chosen.figure, dpi=120)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,256 @@
+"""What a realization costs: ours beside what a person would write, on the same draws, in one run of about a quarter hour.
+
+Usage: python studies/speed/measure.py [--quick] [--figure cost.png]
+
+Contenders take turns; every figure is the median of the turns, in microseconds per realization from draws to measures.
+"""
+
+import argparse
+import contextlib
+import importlib.util
+import resource
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import peers
+import shapes
+
+import tolcontact as tc
+from tolcontact.archive import ArchiveWriter
+from tolcontact.sampling import draw
+from tolcontact.simulation import run as running
+from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.scan import CompiledScan
+from tolcontact.symbolic import batch
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+HERE = Path(__file__).resolve().parent
+TURNS = 3
+EXACT = tc.Method(resolution="exact")
+Contender = Callable[[], float]  # microseconds per realization, of one turn
+
+
+def model(name: str) -> tc.Assembly:
+    spec = importlib.util.spec_from_file_location(name, HERE.parents[1] / "models" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.assembly()
+
+
+def ours(assembly, samples: int, *, solver: str = "daqp", threads: int = 1, method: tc.Method | None = None) -> Contender:
+    program = tc.build(assembly, solver=solver, method=method)
+    if solver in ("daqp", "qpoases"):
+        list(simulate_blocks(program, samples=batch.ENOUGH + 4096, seed=1))  # until its Functions are compiled
+
+    def turn() -> float:
+        start = time.perf_counter()
+        blocks = [len(block) for block in simulate_blocks(program, samples=samples, seed=1, threads=threads)]
+        return 1e6 * (time.perf_counter() - start) / sum(blocks)
+
+    return turn
+
+
+def loop(assembly, samples: int, solve: peers.Solve, *, every: bool = False) -> Contender:
+    program = tc.build(assembly, solver="daqp")
+    geometry = peers.Loop(program)
+    corrected = next(simulate_blocks(program, samples=samples, seed=1)).measured[:, 1, 0]
+    deviations = draw(program.nominal, seed=1, start=0, stop=samples)
+    geometry.measure(deviations[:20], solve, every)
+
+    def turn() -> float:
+        start = time.perf_counter()
+        measured, closed = geometry.measure(deviations, solve, every)
+        seconds = time.perf_counter() - start
+        apart = np.abs(measured - corrected)[closed]
+        # Where few points are active the regularization decides, which the loop has in a simpler form.
+        assert np.quantile(apart, 0.9) < 1e-4, f"{assembly.name}: the loop's answers are others, {np.quantile(apart, 0.9)}"
+        return 1e6 * seconds / samples
+
+    return turn
+
+
+def medians(contenders: dict[str, Contender]) -> dict[str, float]:
+    taken = {name: [] for name in contenders}
+    for _ in range(TURNS):
+        for name, turn in contenders.items():
+            taken[name].append(turn())
+    return {name: float(np.median(times)) for name, times in taken.items()}
+
+
+def against_loops(samples: int) -> None:
+    """Ours, each plugin, one thread and all, beside each loop."""
+    few, fewest = 512, 64
+    cases = {"RA1, 202 points": model("ra1"), "RA2, 3000 points": model("ra2"), "curved, 3003 points": shapes.slab(3000, 200.0)}
+    columns = {}
+    for name, a in cases.items():
+        contenders = {f"ours, {solver}": ours(a, samples, solver=solver) for solver in ("daqp", "qpoases")}
+        # Not highs: CasADi's copy of it and highspy's, which qpsolvers loads, crash each other in one process.
+        contenders |= {f"ours, {solver}": ours(a, fewest, solver=solver) for solver in ("piqp", "proxqp", "osqp")}
+        contenders["ours, daqp, all processors"] = ours(a, samples * 2, threads=running.processors())
+        contenders["ours, qpoases, all processors"] = ours(a, samples * 2, solver="qpoases", threads=running.processors())
+        contenders["ours, daqp, exact"] = ours(a, samples // 2, method=EXACT)
+        contenders["loop over DAQP's own interface"] = loop(a, few, peers.with_daqp)
+        for solver, count in {
+            "daqp": few,
+            "quadprog": few,
+            "highs": fewest,
+            "piqp": few,
+            "proxqp": fewest,
+            "osqp": fewest,
+        }.items():
+            contenders[f"loop over qpsolvers, {solver}"] = loop(a, count, peers.with_qpsolvers(solver))
+        contenders["loop over scipy, SLSQP"] = loop(a, fewest, peers.with_scipy)
+        rows = len(peers.Loop(tc.build(a)).P)
+        for plugin in ("daqp", "qpoases"):
+            contenders[f"loop over CasADi, all rows, {plugin}"] = loop(a, fewest, peers.with_casadi(plugin, rows), every=True)
+        columns[name] = medians(contenders)
+    print("|  |", " | ".join(f"{name} [us] | times ours, daqp" for name in columns), "|")
+    print("|---|" + "---:|---:|" * len(columns))
+    for row in next(iter(columns.values())):
+        cells = [f"{of[row]:.1f} | {of[row] / of['ours, daqp']:.2f}" for of in columns.values()]
+        print(f"| {row} |", " | ".join(cells), "|")
+    for name, of in columns.items():
+        best = of["loop over qpsolvers, daqp"]
+        print(
+            f"\n{name}: {best / of['ours, daqp']:.1f} times as fast as the loop over qpsolvers with daqp, with qpoases"
+            f" {best / of['ours, qpoases']:.1f}; two threads {of['ours, daqp'] / of['ours, daqp, all processors']:.2f} times"
+            f" (qpoases {of['ours, qpoases'] / of['ours, qpoases, all processors']:.2f}); exact costs"
+            f" {of['ours, daqp, exact'] / of['ours, daqp']:.1f} times linearized"
+        )
+
+
+def against_size(samples: int, figure: Path) -> None:
+    sizes = (50, 200, 1000, 3000, 10_000, 30_000, 100_000)
+    shapes_of = {"flat": np.inf, "curved": 200.0}
+    found: dict[str, list[float]] = {}
+    for size in sizes:
+        contenders = {}
+        for shape, radius in shapes_of.items():
+            a = shapes.slab(size, radius)
+            contenders[f"ours, {shape}"] = ours(a, samples // 4)
+            contenders[f"loop, {shape}"] = loop(a, 100 if size > 3000 else 400, peers.with_qpsolvers("daqp"))
+        for name, cost in medians(contenders).items():
+            found.setdefault(name, []).append(cost)
+    print("\n| contact points |", " | ".join(f"{size}" for size in sizes), "|\n|---|" + "---:|" * len(sizes))
+    for name, costs in found.items():
+        print(f"| {name} [us] |", " | ".join(f"{cost:.1f}" for cost in costs), "|")
+    fig, axes = plt.subplots(figsize=(6.4, 4), layout="constrained")
+    for name, costs in found.items():
+        axes.loglog(
+            sizes, costs, "o-" if name.startswith("ours") else "s--", label=name, color="C0" if "flat" in name else "C1"
+        )
+    axes.set(xlabel="contact points", ylabel="microseconds per realization", title="One thread, DAQP, from draws to measures")
+    axes.grid(alpha=0.3)
+    axes.legend(frameon=False)
+    fig.savefig(figure, dpi=130)
+
+
+def against_bodies(samples: int) -> None:
+    print("\n| free bodies | linearized [us] | exact [us] | exact / linearized |\n|---:|---:|---:|---:|")
+    for blocks in (1, 2, 5, 10, 20, 30):
+        count = max(samples // blocks**2, 256)
+        both = {"linearized": ours(shapes.tower(blocks), count), "exact": ours(shapes.tower(blocks), count, method=EXACT)}
+        cost = medians(both)
+        ratio = cost["exact"] / cost["linearized"]
+        print(f"| {blocks} | {cost['linearized']:.1f} | {cost['exact']:.1f} | {ratio:.1f} |", flush=True)
+
+
+def whole_runs(largest: int) -> None:
+    """Runs of RA1 with their archive, all processors: time and memory."""
+    print("\n| realizations | seconds, build to archive | archive [MB] | largest memory so far [MB] |\n|---:|---:|---:|---:|")
+    with tempfile.TemporaryDirectory() as folder:
+        samples = 1000
+        while samples <= largest:
+            path = Path(folder) / "run.nc"
+            start = time.perf_counter()
+            tc.run(model("ra1"), samples=samples, solver="daqp", out=path, overwrite=True, keep="measures").close()
+            seconds = time.perf_counter() - start
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            print(f"| {samples} | {seconds:.2f} | {path.stat().st_size / 1e6:.1f} | {memory:.0f} |", flush=True)
+            samples *= 10
+
+
+@contextlib.contextmanager
+def clocked(where: dict[str, list[tuple[object, str]]]) -> Iterator[dict[str, float]]:
+    """Seconds spent in some functions, while the context lasts."""
+    spent = dict.fromkeys(where, 0.0)
+    kept = [(owner, name, getattr(owner, name)) for places in where.values() for owner, name in places]
+
+    def timed(word: str, function: Callable) -> Callable:
+        def call(*args, **kwargs):
+            start = time.perf_counter()
+            try:
+                return function(*args, **kwargs)
+            finally:
+                spent[word] += time.perf_counter() - start
+
+        return call
+
+    for word, places in where.items():
+        for owner, name in places:
+            setattr(owner, name, timed(word, getattr(owner, name)))
+    try:
+        yield spent
+    finally:
+        for owner, name, function in kept:
+            setattr(owner, name, function)
+
+
+def breakdown(samples: int) -> None:
+    where = {
+        "sampling": [(running, "draw")],
+        "scan": [(CompiledScan, "survey"), (CompiledScan, "deepest")],
+        "QP": [(batch.Mapped, "__call__")],
+        "rows, update, measures": [(batch.Expressions, "__call__")],
+        "fields": [(ArchiveWriter, "_add_to_fields")],
+        "archive": [(ArchiveWriter, "append"), (ArchiveWriter, "check_point")],
+    }
+    print("\n| us per realization, one thread |", " | ".join(where), "| between them |\n|---|" + "---:|" * (len(where) + 1))
+    cases = {
+        "RA1": model("ra1"),
+        "RA2": model("ra2"),
+        "curved, 3003": shapes.slab(3000, 200.0),
+        "flat, 100 000": shapes.slab(100_000),
+    }
+    for name, a in cases.items():
+        program = tc.build(a, solver="daqp")
+        list(simulate_blocks(program, samples=batch.ENOUGH + 4096, seed=1))
+        turns = []
+        for _ in range(TURNS):
+            with clocked(where) as spent:
+                start = time.perf_counter()
+                blocks = list(simulate_blocks(program, samples=samples // 4, seed=1, threads=1))
+                whole = time.perf_counter() - start
+                with tempfile.TemporaryDirectory() as folder:
+                    path = Path(folder) / "run.nc"
+                    with ArchiveWriter(path, program, seed=1, samples=samples // 4, keep="measures") as writer:
+                        for block in blocks:
+                            writer.append(block)
+            inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
+            spent["archive"] -= spent["fields"]
+            turns.append([*spent.values(), whole - sum(inside.values())])
+        cells = 1e6 * np.median(turns, axis=0) / (samples // 4)
+        print(f"| {name} |", " | ".join(f"{cell:.2f}" for cell in cells), "|", flush=True)
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--quick", action="store_true", help="few realizations: does it run?")
+    options.add_argument("--figure", type=Path, default=HERE / "cost.png")
+    chosen = options.parse_args()
+    samples = 2048 if chosen.quick else 16_384
+    against_loops(samples)
+    against_size(samples, chosen.figure)
+    against_bodies(samples)
+    breakdown(samples)
+    whole_runs(10_000 if chosen.quick else 10_000_000)
+
+
+if __name__ == "__main__":
+    main()
