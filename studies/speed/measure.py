@@ -1,6 +1,6 @@
 """What a realization costs: ours beside what a person would write, on the same draws, in one run of about a quarter hour.
 
-Usage: python studies/speed/measure.py [--quick] [--figure cost.png]
+Usage: python studies/speed/measure.py [--quick] [--only loops] [--figure cost.png]
 
 Contenders take turns; every figure is the median of the turns, in microseconds per realization from draws to measures.
 """
@@ -32,7 +32,9 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 TURNS = 3
+batch.ENOUGH = 0  # compile Functions at once: what counts here is the cost of many realizations
 EXACT = tc.Method(resolution="exact")
+CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
 
 
@@ -45,8 +47,7 @@ def model(name: str) -> tc.Assembly:
 
 def ours(assembly, samples: int, *, solver: str = "daqp", threads: int = 1, method: tc.Method | None = None) -> Contender:
     program = tc.build(assembly, solver=solver, method=method)
-    if solver in ("daqp", "qpoases"):
-        list(simulate_blocks(program, samples=batch.ENOUGH + 4096, seed=1))  # until its Functions are compiled
+    list(simulate_blocks(program, samples=256, seed=1))
 
     def turn() -> float:
         start = time.perf_counter()
@@ -56,16 +57,16 @@ def ours(assembly, samples: int, *, solver: str = "daqp", threads: int = 1, meth
     return turn
 
 
-def loop(assembly, samples: int, solve: peers.Solve, *, every: bool = False) -> Contender:
+def loop(assembly, samples: int, solve: peers.Solve, form: str = "first") -> Contender:
     program = tc.build(assembly, solver="daqp")
     geometry = peers.Loop(program)
     corrected = next(simulate_blocks(program, samples=samples, seed=1)).measured[:, 1, 0]
     deviations = draw(program.nominal, seed=1, start=0, stop=samples)
-    geometry.measure(deviations[:20], solve, every)
+    geometry.measure(deviations[:20], solve, form)
 
     def turn() -> float:
         start = time.perf_counter()
-        measured, closed = geometry.measure(deviations, solve, every)
+        measured, closed = geometry.measure(deviations, solve, form)
         seconds = time.perf_counter() - start
         apart = np.abs(measured - corrected)[closed]
         # Where few points are active the regularization decides, which the loop has in a simpler form.
@@ -86,16 +87,18 @@ def medians(contenders: dict[str, Contender]) -> dict[str, float]:
 def against_loops(samples: int) -> None:
     """Ours, each plugin, one thread and all, beside each loop."""
     few, fewest = 512, 64
+    samples *= 4
     cases = {"RA1, 202 points": model("ra1"), "RA2, 3000 points": model("ra2"), "curved, 3003 points": shapes.slab(3000, 200.0)}
     columns = {}
     for name, a in cases.items():
         contenders = {f"ours, {solver}": ours(a, samples, solver=solver) for solver in ("daqp", "qpoases")}
         # Not highs: CasADi's copy of it and highspy's, which qpsolvers loads, crash each other in one process.
         contenders |= {f"ours, {solver}": ours(a, fewest, solver=solver) for solver in ("piqp", "proxqp", "osqp")}
-        contenders["ours, daqp, all processors"] = ours(a, samples * 2, threads=running.processors())
-        contenders["ours, qpoases, all processors"] = ours(a, samples * 2, solver="qpoases", threads=running.processors())
+        for solver in ("daqp", "qpoases"):
+            contenders[f"ours, {solver}, all processors"] = ours(a, 2 * samples, solver=solver, threads=running.processors())
         contenders["ours, daqp, exact"] = ours(a, samples // 2, method=EXACT)
         contenders["loop over DAQP's own interface"] = loop(a, few, peers.with_daqp)
+        contenders["the same, until closed"] = loop(a, few, peers.with_daqp, "closed")
         for solver, count in {
             "daqp": few,
             "quadprog": few,
@@ -105,10 +108,11 @@ def against_loops(samples: int) -> None:
             "osqp": fewest,
         }.items():
             contenders[f"loop over qpsolvers, {solver}"] = loop(a, count, peers.with_qpsolvers(solver))
+        contenders[CLOSED] = loop(a, few, peers.with_qpsolvers("daqp"), "closed")
         contenders["loop over scipy, SLSQP"] = loop(a, fewest, peers.with_scipy)
         rows = len(peers.Loop(tc.build(a)).P)
         for plugin in ("daqp", "qpoases"):
-            contenders[f"loop over CasADi, all rows, {plugin}"] = loop(a, fewest, peers.with_casadi(plugin, rows), every=True)
+            contenders[f"loop over CasADi, all rows, {plugin}"] = loop(a, fewest, peers.with_casadi(plugin, rows), "every")
         columns[name] = medians(contenders)
     print("|  |", " | ".join(f"{name} [us] | times ours, daqp" for name in columns), "|")
     print("|---|" + "---:|---:|" * len(columns))
@@ -116,10 +120,11 @@ def against_loops(samples: int) -> None:
         cells = [f"{of[row]:.1f} | {of[row] / of['ours, daqp']:.2f}" for of in columns.values()]
         print(f"| {row} |", " | ".join(cells), "|")
     for name, of in columns.items():
-        best = of["loop over qpsolvers, daqp"]
+        first, closed = of["loop over qpsolvers, daqp"], of[CLOSED]
         print(
-            f"\n{name}: {best / of['ours, daqp']:.1f} times as fast as the loop over qpsolvers with daqp, with qpoases"
-            f" {best / of['ours, qpoases']:.1f}; two threads {of['ours, daqp'] / of['ours, daqp, all processors']:.2f} times"
+            f"\n{name}: {first / of['ours, daqp']:.1f} times as fast as the loop over qpsolvers with daqp and the first rows,"
+            f" with qpoases {first / of['ours, qpoases']:.1f}; until closed {closed / of['ours, daqp']:.1f} and"
+            f" {closed / of['ours, qpoases']:.1f}; two threads {of['ours, daqp'] / of['ours, daqp, all processors']:.2f} times"
             f" (qpoases {of['ours, qpoases'] / of['ours, qpoases, all processors']:.2f}); exact costs"
             f" {of['ours, daqp, exact'] / of['ours, daqp']:.1f} times linearized"
         )
@@ -220,7 +225,7 @@ def breakdown(samples: int) -> None:
     }
     for name, a in cases.items():
         program = tc.build(a, solver="daqp")
-        list(simulate_blocks(program, samples=batch.ENOUGH + 4096, seed=1))
+        list(simulate_blocks(program, samples=256, seed=1))
         turns = []
         for _ in range(TURNS):
             with clocked(where) as spent:
@@ -242,14 +247,20 @@ def breakdown(samples: int) -> None:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--quick", action="store_true", help="few realizations: does it run?")
+    options.add_argument("--only", choices=["loops", "size", "bodies", "breakdown", "runs"], help="one of the measurements")
     options.add_argument("--figure", type=Path, default=HERE / "cost.png")
     chosen = options.parse_args()
     samples = 2048 if chosen.quick else 16_384
-    against_loops(samples)
-    against_size(samples, chosen.figure)
-    against_bodies(samples)
-    breakdown(samples)
-    whole_runs(10_000 if chosen.quick else 10_000_000)
+    measurements = {
+        "loops": lambda: against_loops(samples),
+        "size": lambda: against_size(samples, chosen.figure),
+        "bodies": lambda: against_bodies(samples),
+        "breakdown": lambda: breakdown(samples),
+        "runs": lambda: whole_runs(10_000 if chosen.quick else 10_000_000),
+    }
+    for name, measure in measurements.items():
+        if chosen.only in (None, name):
+            measure()
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """What a person would write instead: NumPy geometry, and a loop over a QP solver.
 
 One part moves, the other one stays where its locators put it. Geometry is vectorized over realizations, in blocks; the loop
-holds nothing but the solver. Every realization has one QP with the rows of the points that are inside at first: the paper's
-set, and the least work. (Ours also finds the points that the correction drives in; the loop does not.)
+holds nothing but rows and solver. It comes in three forms, by the rows of the QP: "first", the points that are inside at first,
+the paper's set and the least work, which leaves penetration where the correction drives other points in; "closed", which adds
+those and solves again until there are none, as ours does; and "every" point.
 """
 
 from collections.abc import Callable
@@ -88,12 +89,12 @@ class Loop:
         measure = nominal.assembly.measures[0]
         self.at, self.along = nominal.place(measure.of), np.array(measure.along)
 
-    def measure(self, deviations: np.ndarray, solve: Solve, every: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    def measure(self, deviations: np.ndarray, solve: Solve, form: str) -> tuple[np.ndarray, np.ndarray]:
         """Measures, and where the answer has no penetration left, for deviations (realization, locator)."""
-        blocks = [self._block(deviations[k : k + BLOCK], solve, every) for k in range(0, len(deviations), BLOCK)]
+        blocks = [self._block(deviations[k : k + BLOCK], solve, form) for k in range(0, len(deviations), BLOCK)]
         return np.concatenate([b[0] for b in blocks]), np.concatenate([b[1] for b in blocks])
 
-    def _block(self, deviations: np.ndarray, solve: Solve, every: bool) -> tuple[np.ndarray, np.ndarray]:
+    def _block(self, deviations: np.ndarray, solve: Solve, form: str) -> tuple[np.ndarray, np.ndarray]:
         poses, start = [], 0
         for inverse, centre in self.schemes:
             q = deviations[:, start : start + inverse.shape[1]] @ inverse.T
@@ -120,11 +121,15 @@ class Loop:
         Q *= scale * scale[:, None] / count[:, None, None]
         x = np.zeros((len(R), 6))
         for k, number in enumerate(touched):
-            rows = slice(None) if every else active[number]
+            rows = active[number] if form == "first" else np.ones(len(self.P), dtype=bool)
             n = self.n[rows]
             arm = (self.P[rows] - self.c) @ R[number].T
             A = np.hstack([n, np.cross(arm, n) / self.length])
-            found = solve(Q[k], A, gaps[number, rows])
+            found = (
+                _closed(solve, Q[k], A, gaps[number], active[number])
+                if form == "closed"
+                else solve(Q[k], A, gaps[number, rows])
+            )
             x[number] = np.nan if found is None else found * scale
         centre = np.einsum("kij,j->ki", R, self.c) + t
         turn = np.eye(3) + _skew(x[:, 3:])
@@ -133,6 +138,18 @@ class Loop:
         open_ = (np.hstack([R_new.reshape(-1, 9), t_new, np.ones((len(R), 1))]) @ self.G).min(axis=1) > -1e-7
         world = R_r @ R_new, np.einsum("kij,kj->ki", R_r, t_new) + t_r
         return (world[0] @ self.at + world[1] - self.at) @ self.along, open_
+
+
+def _closed(solve: Solve, Q: np.ndarray, A: np.ndarray, gaps: np.ndarray, rows: np.ndarray) -> np.ndarray | None:
+    rows = rows.copy()
+    while True:
+        found = solve(Q, A[rows], gaps[rows])
+        if found is None:
+            return None
+        inside = (gaps + A @ found < -1e-9) & ~rows
+        if not inside.any():
+            return found
+        rows |= inside
 
 
 def _skew(w: np.ndarray) -> np.ndarray:
