@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.simulation import CORRECTED, RAW, Status, simulate_blocks
+from tolcontact.simulation import CORRECTED, Status, simulate_blocks
 from tolcontact.statistics import intervals
 
 MODELS = Path(__file__).resolve().parents[2] / "models"
@@ -114,50 +114,14 @@ def where_it_stands(samples: int) -> None:
                 )
 
 
-def tower(blocks: int) -> tc.Assembly:
-    """Free blocks, each resting on the one below, the lowest on a fixed one."""
-    a = tc.Assembly("tower")
-    below = a.part("block 0", tc.Box(40, 40, 10), fixed=True)
-    for k in range(1, blocks + 1):
-        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k), fixed=False)
-        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=1)
-        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
-        below = block
-    a.measure("top", below.point(20, 20, 10), along="z", tolerance=1)
-    return a
-
-
-def many_bodies(samples: int) -> None:
-    print("| free bodies | solver | linearized (us) | exact (us) | exact / linearized | steps | resolved, exact |")
-    print("|---|---|---|---|---|---|---|")
-    for blocks in (1, 2, 5, 10, 20):
-        for solver in ("daqp", "qpoases"):
-            cost, runs = {}, {}
-            for method in (tc.Method(), EXACT):
-                taken = []
-                for _ in range(3):
-                    runs[method.resolution], seconds = simulate(tower(blocks), samples, method=method, solver=solver)
-                    taken.append(1e6 * seconds / samples)
-                cost[method.resolution] = np.median(taken)
-            exact = runs["exact"]
-            moved = exact["status"] != Status.UNTOUCHED
-            assert (exact["gap_min"][moved, RAW].min(axis=1) < 0).all()
-            print(
-                f"| {blocks} | {solver} | {cost['linearized']:.0f} | {cost['exact']:.0f} | "
-                f"{cost['exact'] / cost['linearized']:.1f} | {np.median(exact['iterations'][moved]):g}, "
-                f"{exact['iterations'].max()} | {100 * (exact['status'][moved] == Status.RESOLVED).mean():.1f} % |"
-            )
-
-
 if __name__ == "__main__":
     arguments = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     arguments.add_argument("--samples", type=int, default=10_000)
     samples = arguments.parse_args().samples
-    for title, table, count in (
-        ("Linearized against exact", linearized_against_exact, samples),
-        ("Opposed faces", opposed_faces, samples),
-        ("The same assembly 1 m away", where_it_stands, samples),
-        ("Cost against the number of bodies", many_bodies, samples // 50),
+    for title, table in (
+        ("Linearized against exact", linearized_against_exact),
+        ("Opposed faces", opposed_faces),
+        ("The same assembly 1 m away", where_it_stands),
     ):
-        print(f"\n## {title}, N = {count}\n")
-        table(count)
+        print(f"\n## {title}, N = {samples}\n")
+        table(samples)

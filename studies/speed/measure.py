@@ -86,8 +86,8 @@ def medians(contenders: dict[str, Contender]) -> dict[str, float]:
 
 def against_loops(samples: int) -> None:
     """Ours, each plugin, one thread and all, beside each loop."""
-    few, fewest = 512, 64
-    samples *= 4
+    few, fewest = 512, 24
+    samples *= 2
     cases = {"RA1, 202 points": model("ra1"), "RA2, 3000 points": model("ra2"), "curved, 3003 points": shapes.slab(3000, 200.0)}
     columns = {}
     for name, a in cases.items():
