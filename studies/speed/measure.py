@@ -158,8 +158,9 @@ def against_size(samples: int, figure: Path) -> None:
 
 def against_bodies(samples: int) -> None:
     print("\n| free bodies | linearized [us] | exact [us] | exact / linearized |\n|---:|---:|---:|---:|")
+    batch.ENOUGH = 10_000  # many bodies have large Functions, which compile for minutes: short runs interpret them
     for blocks in (1, 2, 5, 10, 20, 30):
-        count = max(samples // blocks**2, 256)
+        count = max(samples // (4 * blocks**2), 64)
         both = {"linearized": ours(shapes.tower(blocks), count), "exact": ours(shapes.tower(blocks), count, method=EXACT)}
         cost = medians(both)
         ratio = cost["exact"] / cost["linearized"]
