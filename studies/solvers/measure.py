@@ -1,6 +1,6 @@
 """How accurate and how fast are QP solvers on contact problems with a row for every contact point?
 
-Usage: python studies/solvers/measure.py [--realizations 60] [--figure accuracy.png]
+Usage: python studies/solvers/measure.py [--realizations 12] [--figure accuracy.png]
 
 The QPs are those of tolcontact, but with all rows, so that hundreds of them coincide or nearly do. Every solver gets the same
 ones, first in order, then reversed: an answer must not depend on the problem before it.
@@ -8,7 +8,10 @@ ones, first in order, then reversed: an answer must not depend on the problem be
 # ruff: noqa: E402
 
 import argparse
+import functools
 import importlib.util
+import multiprocessing
+import queue
 import sys
 import time
 import warnings
@@ -33,6 +36,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
+PATIENCE = 10  # seconds
 WRONG = 1e-4  # mm: an answer that is farther off, and was not owned up to, is wrong
 REFUSED = {"ipqp": {}, "superscs": {"superscs": {"eps": 1e-9, "verbose": 0}}}
 OUTSIDE = {
@@ -156,9 +160,34 @@ def judge(solve: Solve, of: list[Problem], truth: list[np.ndarray], limit: float
     }  # fmt: skip
 
 
+def trial(make: Callable[[str, Problem], Solve], which: str, of: list[Problem], truth: list[np.ndarray]) -> dict[str, float]:
+    return judge(make(which, of[0]), of, truth, limit=1.0)
+
+
+def apart(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
+    """What `work` gives, done in a process of its own: solvers may crash, or never come back."""
+    context = multiprocessing.get_context("fork")
+    answers = context.Queue()
+
+    def run() -> None:
+        try:
+            answers.put(work())
+        except (RuntimeError, ValueError, qpsolvers.exceptions.SolverError) as error:
+            answers.put(f"fails: {str(error).splitlines()[0][:60]}")
+
+    process = context.Process(target=run)
+    process.start()
+    try:
+        return answers.get(timeout=PATIENCE)
+    except queue.Empty:
+        return f"no answer within {PATIENCE} s" if process.is_alive() else "crashes"
+    finally:
+        process.kill()
+
+
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
-    options.add_argument("--realizations", type=int, default=60)
+    options.add_argument("--realizations", type=int, default=12)
     options.add_argument("--figure", type=Path, default=HERE / "accuracy.png")
     chosen = options.parse_args()
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*plugins.usable_plugins(), *REFUSED)}
@@ -172,10 +201,9 @@ def main() -> None:
         rows, size = of[0]["A"].shape
         ax.set_title(f"{name}: {rows} rows, {size} variables", fontsize=9)
         for k, (label, (make, which)) in enumerate(solvers.items()):
-            try:
-                found = judge(make(which, of[0]), of, truth, limit=15.0)
-            except (RuntimeError, ValueError, qpsolvers.exceptions.SolverError) as error:
-                print(f"| {name} | {label} | fails: {str(error).splitlines()[0][:60]} ||||||", flush=True)
+            found = apart(functools.partial(trial, make, which, of, truth))
+            if isinstance(found, str):
+                print(f"| {name} | {label} | {found} ||||||", flush=True)
                 continue
             print(
                 f"| {name} | {label} | {found['ms']:.3g} | {found['median']:.1g} | {found['largest']:.1g} | {found['wrong']} of"
