@@ -49,7 +49,7 @@ def simulate_blocks(
                 yield finish_one()
             resolvers = idle.pop()
             for resolver in resolvers:
-                resolver.start_over()  # here, since CasADi's objects are not to be made by several threads at once
+                resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
             begun.append((pool.submit(simulate, first, resolvers), resolvers))
         while begun:
             yield finish_one()

@@ -20,7 +20,7 @@ _STREAMS = threading.RLock()
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Swallow what plugins print to Python's streams: banners that no option turns off."""
+    """Swallow what plugins print to Python's streams, banners that no option turns off; one thread at a time."""
     with _STREAMS, contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
         yield
 

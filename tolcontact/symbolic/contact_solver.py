@@ -38,6 +38,7 @@ class ContactSolver:
         return answer
 
     def _solver(self, *, second: bool = False) -> Mapped:
+        # Whatever the thread: quiet() has one lock, so that CasADi's objects are made one after the other.
         with quiet():
             qp = self._program.qp(second=second)
         self._inputs = [name for name in qp.name_in() if name in ASSEMBLED]
