@@ -49,7 +49,7 @@ class ContactResolver:
             # Where the paper's set of points may carry, those between the corners count, too.
             some = self._method.search == "fixed" and self._method.active_set == "closed"
             self._candidates.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if some else self._scans[-1])
-        self._reaches = [reach(scan) for scan in self._scans]
+        self._reaches = [reach(scan) for scan in self._scans] if self._method.search == "iterated" else []
 
     def twin(self) -> "ContactResolver":
         """The same for another thread."""

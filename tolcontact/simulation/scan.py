@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from tolcontact.discretization import ContactPoints
 from tolcontact.simulation import kernel
 from tolcontact.symbolic import MOMENTS, GapMap
 
 SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
+BEYOND = 1e300
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +142,8 @@ def pair_scan(
     """
     chosen = np.arange(len(pair.P_m)) if chosen is None else chosen
     label = _cluster(pair.P_m[chosen], clusters if pair.locators is None else len(chosen))
-    found = [_leaves(chosen[label == one], gaps.coordinates[1:]) for one in range(label.max() + 1)]
+    along = np.roll(gaps.coordinates, -1, axis=0)  # largest extents first, the constant last
+    found = [_leaves(chosen[label == one], along) for one in range(label.max() + 1)]
     leaves = [leaf for cluster in found for leaf in cluster]
     order = np.concatenate(leaves)
     ends = np.cumsum([0, *map(len, found)])
@@ -162,26 +163,34 @@ def pair_scan(
 
 
 def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
-    """Halve `points` across their longest extent until no part has more than LEAF of them; neighbours stay together."""
-    if len(points) <= kernel.LEAF:
-        return [points]
-    of = coordinates[:, points]
-    # Whole leaves on one side, so that only the last one is not full.
-    half = kernel.LEAF * -(-len(points) // (2 * kernel.LEAF))
-    order = np.argpartition(of[int(np.ptp(of, axis=1).argmax())], half) if len(of) else np.arange(len(points))
-    return _leaves(points[order[:half]], coordinates) + _leaves(points[order[half:]], coordinates)
+    """Halve `points` across their longest extent until no part has more than LEAF of them; neighbours stay together.
+
+    All leaves but one are full: what is missing to a power of two stands beyond all points, and is left out in the end.
+    """
+    count, size = len(points), kernel.LEAF
+    while size < count:
+        size *= 2
+    padded = np.concatenate([coordinates[:, points], np.full((len(coordinates), size - count), BEYOND)], axis=1)
+    parts = np.arange(size).reshape(1, size)
+    while parts.shape[1] > kernel.LEAF:
+        of = padded.take(parts, axis=1)
+        widest = (of.max(axis=2) - of.min(axis=2)).argmax(axis=0)
+        order = np.argpartition(of[widest, np.arange(len(parts))], parts.shape[1] // 2, axis=1)
+        parts = np.take_along_axis(parts, order, axis=1).reshape(2 * len(parts), -1)
+    return [points[leaf[leaf < count]] for leaf in parts[(parts < count).any(axis=1)]]
 
 
 def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
     """Each point joins the nearest of `clusters` points that lie as far apart as possible."""
     if len(points) <= clusters:
         return np.arange(len(points))
-    seeds = [int(np.argmax(((points - points.mean(axis=0)) ** 2).sum(axis=1)))]
-    distance2 = ((points - points[seeds[0]]) ** 2).sum(axis=1)
-    while len(seeds) < clusters:
-        seeds.append(int(np.argmax(distance2)))
-        np.minimum(distance2, ((points - points[seeds[-1]]) ** 2).sum(axis=1), out=distance2)
-    return np.unique(cKDTree(points[seeds]).query(points)[1], return_inverse=True)[1]
+    label = np.zeros(len(points), dtype=int)
+    nearest = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
+    for number in range(clusters):
+        distance = ((points - points[nearest.argmax()]) ** 2).sum(axis=1)
+        nearer = distance < nearest if number else np.ones(len(points), dtype=bool)
+        label[nearer], nearest[nearer] = number, distance[nearer]
+    return np.unique(label, return_inverse=True)[1]
 
 
 def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
