@@ -16,7 +16,7 @@ ROOMS = {
     "pyvista": ("report/",),
     "numba": ("simulation/kernel.py",),
     "llvmlite": ("symbolic/native.py",),
-    "netCDF4": ("archive.py",),
+    "netCDF4": ("archive/",),
     "typer": ("cli.py",),
     "trimesh": ("discretization/",),
     "igl": ("discretization/",),

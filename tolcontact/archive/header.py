@@ -1,0 +1,160 @@
+"""The header of an archive: everything but what is written block by block."""
+
+import datetime
+import json
+import platform
+from collections.abc import Mapping
+from importlib.metadata import version
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.archive.variables import define, write
+from tolcontact.assembly import Mesh
+from tolcontact.assembly.document import to_document
+from tolcontact.discretization import Nominal
+from tolcontact.statistics import FieldMoments
+from tolcontact.symbolic import Program
+
+_LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
+
+
+def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[str, Any]:
+    """Global attributes that say how the rows came about; a resumed run must agree in all but `samples`."""
+    method = program.method
+    return {
+        "solver": program.plugin.name,
+        "solver_options": json.dumps(program.plugin.options),
+        "solver_second_try": json.dumps(program.plugin.second),
+        "solver_accuracy": program.plugin.accuracy,
+        "resolution": method.resolution,
+        "objective": method.objective,
+        "weighting": method.objective if method.objective.endswith("points") else "none",
+        "regularization": method.regularization,
+        "eta": method.eta,
+        "active_set": method.active_set,
+        "activity": method.activity,
+        "search": method.search,
+        "sampler": "monte-carlo",
+        "seed": np.int64(seed),
+        "samples": np.int64(samples),
+        "kept": keep,
+    }
+
+
+def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any]) -> None:
+    """All attributes, dimensions, labels and groups; of the rows and of the fields what they will be called."""
+    nominal = program.nominal
+    file.setncatts(
+        {
+            "Conventions": words.CONVENTIONS,
+            "title": f"variation simulation of {nominal.assembly.name}",
+            "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
+            "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
+            "Variation Simulation of Rigid Bodies with Contact Representation",
+            "history": f"{now()} created",
+            "versions": ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)]),
+            **settings,
+        }
+    )
+    labels = {
+        words.STATE: words.STATES,
+        words.PART: [part.name for part in nominal.parts],
+        words.PAIR: [pair.name for pair in nominal.pairs],
+        words.MEASURE: [measure.name for measure in nominal.measures],
+        words.AXIS: words.AXES,
+        words.BODY_AXIS: words.AXES,
+    }
+    file.createDimension(words.REALIZATION, None)
+    for name, values in labels.items():
+        file.createDimension(name, len(values))
+    for coordinate in words.COORDINATES:
+        if coordinate.name in labels:
+            write(file, coordinate, labels[coordinate.name])
+        else:
+            define(file, coordinate)
+    for variable in words.ROWS:
+        if settings["kept"] != "measures" or variable not in words.POSES:
+            define(file, variable)
+    file.createDimension(words.CHECKPOINT, 2)
+    write(file, words.SUMMED_ROWS, [-1, -1])
+    file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
+    units = [measure.units for measure in nominal.measures]
+    if set(units) != {"mm"}:
+        file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
+    write(file, words.MEASURE_NOMINAL, program.nominal_measures)
+    write(file, words.MEASURE_TOLERANCE, [np.nan if m.tolerance is None else m.tolerance for m in nominal.measures])
+    write(file, words.MEASURE_UNITS, units)
+    _write_model(file.createGroup("model"), nominal, declaration(program))
+    _write_contact(file.createGroup("contact"), nominal)
+    _write_sample(file.createGroup("sample"), nominal, deviations=settings["kept"] == "all")
+    for part in nominal.parts:
+        group = file.createGroup(f"field/{part.name}")
+        for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
+            group.createDimension(name, size)
+        sums = FieldMoments(part.vertices).state.size
+        for name, size in ((words.COMPONENT, len(words.COMPONENTS)), (words.BOUND, len(words.BOUNDS)), (words.NUMBER, sums)):
+            group.createDimension(name, size)
+        write(group, words.COMPONENT_LABEL, words.COMPONENTS)
+        write(group, words.FIELD_VERTICES, part.vertices)
+        write(group, words.FIELD_FACES, part.faces)
+        for variable in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA):
+            write(group, variable, np.full([len(words.STATES), len(part.vertices), len(words.COMPONENTS)], np.nan))
+        write(group, words.BOUND_LABEL, words.BOUNDS)
+        write(group, words.FIELD_INTERVAL, np.full([len(words.STATES), len(part.vertices), len(words.BOUNDS)], np.nan))
+        write(group, words.FIELD_SUMS, np.full([2, len(words.STATES), sums], np.nan))
+
+
+def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
+    write(group, words.DECLARATION, document)
+    for part in nominal.parts:
+        if isinstance(part.part.geometry, Mesh):
+            mesh = group.createGroup(f"mesh/{part.name}")
+            mesh.createDimension(words.VERTEX, len(part.mesh.vertices))
+            mesh.createDimension(words.FACE, len(part.mesh.faces))
+            mesh.createDimension(words.CORNER, 3)
+            write(mesh, words.MESH_VERTICES, part.mesh.vertices)
+            write(mesh, words.MESH_FACES, part.mesh.faces)
+
+
+def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
+    pairs = nominal.pairs
+    group.createDimension(words.POINT, sum(len(pair.P_m) for pair in pairs))
+    write(group, words.MOVING_PART, [pair.moving for pair in pairs])
+    write(group, words.REFERENCE_PART, [-1 if pair.reference is None else pair.reference for pair in pairs])
+    if pairs:
+        write(group, words.PAIR_OF_POINT, np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]))
+        write(group, words.MOVING_POINT, np.vstack([pair.P_m for pair in pairs]))
+        write(group, words.REFERENCE_POINT, np.vstack([pair.P_r for pair in pairs]))
+        write(group, words.REFERENCE_NORMAL, np.vstack([pair.n_r for pair in pairs]))
+        none = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
+        write(group, words.LOCATOR_OF_POINT, np.concatenate(none))
+
+
+def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -> None:
+    group.createDimension(words.LOCATOR, len(nominal.locator_labels))
+    if deviations:
+        define(group, words.DEVIATION)
+    write(group, words.LOCATOR_LABEL, nominal.locator_labels)
+    write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in nominal.tolerances])
+    write(
+        group,
+        words.DISTRIBUTION,
+        [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in nominal.tolerances],
+    )
+    write(group, words.STIFFNESS, np.concatenate([part.stiffness for part in nominal.parts]))
+    write(group, words.ONE_SIDED, np.concatenate([part.one_sided for part in nominal.parts]))
+    write(group, words.LOCATOR_POINT, np.vstack([part.locator_points for part in nominal.parts]))
+    write(group, words.LOCATOR_DIRECTION, np.vstack([part.locator_directions for part in nominal.parts]))
+
+
+def declaration(program: Program) -> str:
+    """The declared model as JSON."""
+    return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
+
+
+def now() -> str:
+    """The present time, as history has it."""
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,0 +1,185 @@
+"""An archive is written block by block.
+
+A file that is being extended breaks when its writer is killed at the wrong moment. So everything is laid out first, under
+another name: header, and room for all rows, each with the status "unfinished". Once the file stands under its own name,
+bytes are only overwritten in place, the status of a row after its data; whatever kills the writer, the file opens,
+finished rows stay, and `resume` goes on after them.
+"""
+
+import contextlib
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.archive.header import declaration, now, run_settings, write_header
+from tolcontact.archive.reader import open_archive
+from tolcontact.archive.variables import ROW_CHUNK
+from tolcontact.discretization import Nominal
+from tolcontact.errors import ArchiveError
+from tolcontact.simulation import Block
+from tolcontact.statistics import FieldMoments
+from tolcontact.symbolic import Program
+from tolcontact.vocabulary import Variable
+
+ROOM = 50 * ROW_CHUNK  # rows that are laid out at once
+
+
+class ArchiveWriter:
+    """An archive being written. Use it as a context manager."""
+
+    def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> None:
+        """Create the file with everything but its rows. `keep` says what it will hold of each realization (see `run`).
+
+        Raises ArchiveError where it cannot be written.
+        """
+        with _replacing(path) as part, _opened(part, "w") as file:
+            write_header(file, program, run_settings(program, seed, samples, keep))
+            _make_room(file, 0, samples)
+        self._go_on(path, program.nominal)
+
+    @classmethod
+    def resume(cls, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> "ArchiveWriter":
+        """Open an archive to go on after its last checkpoint, up to `samples`.
+
+        Raises ArchiveError where the file is no archive, or holds another model or another run.
+        """
+        writer = cls.__new__(cls)
+        with _replacing(path) as part:
+            # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
+            shutil.copyfile(path, part)
+            open_archive(part, shown=path).close()
+            with _opened(part, "r+") as file:
+                _check_same_run(file, path, program, run_settings(program, seed, samples, keep))
+                length = len(file.dimensions[words.REALIZATION])
+                _make_room(file, length, samples)
+                file.setncattr("samples", np.int64(max(samples, length)))
+                rows = max(0, int(file[words.SUMMED_ROWS.name][:].max()))
+                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations")
+        writer._go_on(path, program.nominal)
+        return writer
+
+    def _go_on(self, path: Path, nominal: Nominal) -> None:
+        """Open the file and take up the sums of its last checkpoint."""
+        self._file = _opened(path, "r+")
+        self._nominal = nominal
+        self._moments = [[FieldMoments(part.vertices) for _ in words.STATES] for part in nominal.parts]
+        summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
+        self._slot = int(summed.argmax())
+        self.rows = max(0, int(summed[self._slot]))
+        if self.rows:
+            for part, both in zip(nominal.parts, self._moments, strict=True):
+                for state, moments in enumerate(both):
+                    moments.state = np.asarray(self._file[f"field/{part.name}"][words.FIELD_SUMS.name][self._slot, state])
+
+    def __enter__(self) -> "ArchiveWriter":
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._file.close()
+
+    def append(self, block: Block) -> None:
+        """Write the rows of a block, and see them to the disk."""
+        rows = slice(block.start, block.start + len(block))
+        R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
+        self._add_to_fields(R, t)
+        values = {
+            words.MEASURED: block.measured,
+            words.TRANSLATION: t,
+            words.ROTATION: R,
+            words.GAP_MIN: block.gap_min,
+            words.ACTIVE: block.active,
+            words.CARRYING: block.carrying,
+            words.REACTION: block.reaction,
+            words.KKT_RESIDUAL: block.kkt_residual,
+            words.ITERATIONS: block.iterations,
+        }
+        if words.DEVIATION.name in self._file["sample"].variables:
+            self._file["sample"][words.DEVIATION.name][rows] = block.deviations
+        for variable, data in values.items():
+            if data.size and variable.name in self._file.variables:
+                self._file[variable.name][rows] = data
+        self._file.sync()
+        self._file[words.STATUS.name][rows] = block.status
+        self._file.sync()
+        self.rows = rows.stop
+
+    def _add_to_fields(self, R: np.ndarray, t: np.ndarray) -> None:
+        for part, both in enumerate(self._moments):
+            for state, moments in enumerate(both):
+                moments.add(R[:, state, part], t[:, state, part])
+
+    def check_point(self) -> None:
+        """Write the sums so far, from which a killed run goes on. The last ones stay until these are on the disk."""
+        self._slot = 1 - self._slot
+        self._file[words.SUMMED_ROWS.name][self._slot] = -1
+        self._file.sync()
+        for part, both in zip(self._nominal.parts, self._moments, strict=True):
+            sums = self._file[f"field/{part.name}"][words.FIELD_SUMS.name]
+            for state, moments in enumerate(both):
+                sums[self._slot, state] = moments.state
+        self._file.sync()
+        self._file[words.SUMMED_ROWS.name][self._slot] = self.rows
+        self._file.sync()
+
+    def write_fields(self) -> None:
+        """Displacement fields of all parts, from the sums over all rows."""
+        for part, both in zip(self._nominal.parts, self._moments, strict=True):
+            group = self._file[f"field/{part.name}"]
+            for state, moments in enumerate(both):
+                group[words.FIELD_MEAN.name][state] = moments.mean()
+                group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
+                group[words.FIELD_INTERVAL.name][state] = moments.magnitude_bounds()
+        self._file.sync()
+
+
+@contextlib.contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
+    part = path.with_name(path.name + ".part")
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
+    """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
+    counts = (words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS)
+    room: dict[Variable, float] = dict.fromkeys(counts, words.UNFINISHED)
+    for variable in (*words.ROWS, words.DEVIATION):
+        stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
+        if stored is None or 0 in stored.shape[1:]:
+            continue
+        for first in range(start, stop, ROOM):
+            rows = min(ROOM, stop - first)
+            stored[first : first + rows] = np.full((rows, *stored.shape[1:]), room.get(variable, np.nan))
+    for first in range(start, stop, ROOM):
+        last = min(first + ROOM, stop)
+        file[words.REALIZATION][first:last] = np.arange(first, last)
+
+
+def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
+    try:
+        return netCDF4.Dataset(path, mode, format="NETCDF4")
+    except OSError as error:
+        raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror or error}') from error
+
+
+def _check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any]) -> None:
+    if there["model"][words.DECLARATION.name][...] != declaration(program):
+        raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
+    for part in program.nominal.parts:
+        if not np.array_equal(there[f"field/{part.name}"][words.FIELD_VERTICES.name][...], part.vertices):
+            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    for word, value in settings.items():
+        was = getattr(there, word, None)
+        if word != "samples" and was != value:
+            raise ArchiveError(
+                f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
+            )
