@@ -1,6 +1,6 @@
 """Assemblies with known answers, for several tests."""
 
-import importlib.util
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +13,9 @@ import tolcontact as tc
 MODELS = Path(__file__).resolve().parents[1] / "models"
 
 
-def model(name: str) -> tc.Assembly:
+def model(name: str, *choices) -> tc.Assembly:
     """The assembly of a script in `models/`."""
-    spec = importlib.util.spec_from_file_location(name, MODELS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.assembly()
+    return runpy.run_path(str(MODELS / f"{name}.py"))["assembly"](*choices)
 
 
 class Frame:
@@ -96,19 +93,6 @@ def stack(frame: Frame = STILL, *, reverse: bool = False, free_middle: bool = Tr
     a.measure("top", parts["upper"].point(15 * s, 15 * s, 10 * s), along=frame.along(0, 0, 1), tolerance=s)
     gap = {"to": parts["upper"].point(0, 0, 0), "along": frame.along(0, 0, 1)}
     a.measure("joint", parts["bottom"].point(0, 0, 10 * s), **gap, tolerance=s)
-    return a
-
-
-def tower(blocks: int = 10) -> tc.Assembly:
-    """Free blocks on a fixed one, each resting on the one below."""
-    a = tc.Assembly("tower")
-    below = a.part("block 0", tc.Box(40, 40, 10), fixed=True)
-    for k in range(1, blocks):
-        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k), fixed=False)
-        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=1)
-        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
-        below = block
-    a.measure("top", below.point(20, 20, 10), along="z", tolerance=1)
     return a
 
 

@@ -17,6 +17,7 @@ MODELS = {
     "door": tc.Method(),
     "ra1": tc.Method(),
     "ra2": tc.Method(),
+    "tower": tc.Method(resolution="exact"),
 }
 # Table 1: mean, 6 sigma, variance.
 RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
@@ -55,6 +56,15 @@ def test_cells_give_way_most_in_the_middle_and_their_pitch_varies_less():
     found = {name: sigma[CORRECTED] / sigma[RAW] for name, (_, sigma) in spreads("cells", 500).items()}
     assert found["first terminal"] < found["middle terminal"] < 0.8
     assert found["pitch in the middle"] < 0.7
+
+
+def test_blocks_of_a_tower_only_push_each_other_up():
+    _, run = simulate(cases.model("tower"), samples=1000, solver="daqp", method=MODELS["tower"])
+    top = run["measured"][..., 0]
+    assert top[:, CORRECTED].mean() > 0.05
+    assert top[:, CORRECTED].std() < 0.5 * top[:, RAW].std()
+    assert top[:, RAW].min() < -0.5
+    assert top[:, CORRECTED].min() > -0.4
 
 
 def test_a_cover_stays_within_the_clearance_of_its_pins():

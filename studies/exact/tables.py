@@ -4,7 +4,7 @@ Usage: python studies/exact/tables.py [--samples N]
 """
 
 import argparse
-import importlib.util
+import runpy
 import time
 from pathlib import Path
 
@@ -14,16 +14,13 @@ import tolcontact as tc
 from tolcontact.simulation import CORRECTED, Status, simulate_blocks
 from tolcontact.statistics import intervals
 
-MODELS = Path(__file__).resolve().parents[2] / "models"
+HERE = Path(__file__).resolve().parent
 EXACT = tc.Method(resolution="exact")
 FAR = (1000.0, 0.0, 0.0)
 
 
-def model(name: str):
-    spec = importlib.util.spec_from_file_location(name, MODELS / f"{name}.py")
-    loaded = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(loaded)
-    return loaded
+def model(name: str, *choices) -> tc.Assembly:
+    return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"](*choices)
 
 
 def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = None, solver: str = "daqp"):
@@ -61,10 +58,10 @@ def linearized_against_exact(samples: int) -> None:
     )
     print("|---|---|---|---|---|---|---|---|")
     for name, assembly in {
-        "RA1": model("ra1").assembly(),
-        "RA2": model("ra2").assembly(),
-        "channel": model("channel").assembly(),
-        "channel, flanges open by 15 degrees": model("channel").assembly(15),
+        "RA1": model("ra1"),
+        "RA2": model("ra2"),
+        "channel": model("channel"),
+        "channel, flanges open by 15 degrees": model("channel", 15),
     }.items():
         linear, _ = simulate(assembly, samples)
         exact, _ = simulate(assembly, samples, method=EXACT)
@@ -86,7 +83,7 @@ def opposed_faces(samples: int) -> None:
     initial = tc.Method(active_set="initial")
     for method, points in ((initial, "active at first"), (tc.Method(), "all"), (EXACT, "all")):
         for solver in ("qpoases", "daqp"):
-            run, _ = simulate(model("channel").assembly(), samples, method=method, solver=solver)
+            run, _ = simulate(model("channel"), samples, method=method, solver=solver)
             infeasible = intervals.share(run["status"] == Status.NOT_CONVERGED)
             resolved = (run["status"] == Status.RESOLVED).mean()
             print(
@@ -99,15 +96,14 @@ def opposed_faces(samples: int) -> None:
 def where_it_stands(samples: int) -> None:
     print("| model, measure | regularization | resolution | largest difference (mm) | 6 sigma | 6 sigma, 1 m away |")
     print("|---|---|---|---|---|---|")
-    cases = {"RA1": model("ra1").assembly, "RA2": model("ra2").assembly}
-    for name, make in cases.items():
+    for name in ("RA1", "RA2"):
         for method in (
             tc.Method(regularization="identity"), tc.Method(), tc.Method(regularization="identity", resolution="exact"), EXACT,
         ):  # fmt: skip
-            still, _ = simulate(make(), samples, method=method)
-            moved, _ = simulate(shifted(make()), samples, method=method)
+            still, _ = simulate(model(name.lower()), samples, method=method)
+            moved, _ = simulate(shifted(model(name.lower())), samples, method=method)
             apart = np.abs(moved["measured"] - still["measured"])[:, CORRECTED]
-            for k, measure in enumerate(make().measures):
+            for k, measure in enumerate(model(name.lower()).measures):
                 print(
                     f"| {name}, {measure.name} | {method.regularization} | {method.resolution} | {apart[:, k].max():.2g} | "
                     f"{spread(still['measured'][:, CORRECTED, k])} | {spread(moved['measured'][:, CORRECTED, k])} |"

@@ -4,7 +4,7 @@ Usage: python studies/paper/reproduce.py [--large N] [--to FOLDER]
 """
 
 import argparse
-import importlib.util
+import runpy
 from pathlib import Path
 
 import figures
@@ -20,11 +20,8 @@ METHODS = {
 }
 
 
-def model(name: str) -> tc.Assembly:
-    spec = importlib.util.spec_from_file_location(name, HERE.parents[1] / "models" / f"{name.lower()}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.assembly()
+def model(name: str, *choices) -> tc.Assembly:
+    return runpy.run_path(str(HERE.parents[1] / "models" / f"{name.lower()}.py"))["assembly"](*choices)
 
 
 def main() -> None:

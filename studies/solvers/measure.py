@@ -9,9 +9,9 @@ ones, first in order, then reversed: an answer must not depend on the problem be
 
 import argparse
 import functools
-import importlib.util
 import multiprocessing
 import queue
+import runpy
 import sys
 import time
 import warnings
@@ -47,15 +47,12 @@ Problem = dict[str, np.ndarray]
 Solve = Callable[[Problem], tuple[np.ndarray, bool]]
 
 
-def load(path: Path):
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def model(name: str, *choices) -> tc.Assembly:
+    return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"](*choices)
 
 
 def models() -> dict[str, tc.Assembly]:
-    shapes, scripts = load(HERE.parent / "speed" / "shapes.py"), HERE.parents[1] / "models"
+    slab = runpy.run_path(str(HERE.parent / "speed" / "shapes.py"))["slab"]
     flat = tc.Assembly("coincident")  # the block only moves up and down: 400 rows are the same
     base, block = flat.part("base", tc.Box(50, 50, 10), fixed=True), flat.part("block", tc.Box(50, 50, 10), at=(0, 0, 10))
     places = {
@@ -66,12 +63,12 @@ def models() -> dict[str, tc.Assembly]:
     flat.contact("seat", moving=block.face("-z"), reference=base.face("+z"), points=400)
     flat.measure("height", block.point(25, 25, 10), along="z")
     return {
-        "RA1": load(scripts / "ra1.py").assembly(),
+        "RA1": model("ra1"),
         "coincident rows": flat,
-        "opposed faces": load(scripts / "channel.py").assembly(),
-        "curved": shapes.slab(450, 60.0),
-        "RA2": load(scripts / "ra2.py").assembly(),
-        "8 free bodies": load(scripts / "cells.py").assembly(),
+        "opposed faces": model("channel"),
+        "curved": slab(450, 60.0),
+        "RA2": model("ra2"),
+        "8 free bodies": model("cells"),
     }
 
 

@@ -7,8 +7,8 @@ Contenders take turns; every figure is the median of the turns, in microseconds 
 
 import argparse
 import contextlib
-import importlib.util
 import resource
+import runpy
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -38,11 +38,8 @@ CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
 
 
-def model(name: str) -> tc.Assembly:
-    spec = importlib.util.spec_from_file_location(name, HERE.parents[1] / "models" / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.assembly()
+def model(name: str, *choices) -> tc.Assembly:
+    return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"](*choices)
 
 
 def ours(assembly, samples: int, *, solver: str = "daqp", threads: int = 1, method: tc.Method | None = None) -> Contender:
@@ -161,7 +158,7 @@ def against_bodies(samples: int) -> None:
     batch.ENOUGH = 10_000  # many bodies have large Functions, which compile for minutes: short runs interpret them
     for blocks in (1, 2, 5, 10, 20, 30):
         count = max(samples // (4 * blocks**2), 64)
-        both = {"linearized": ours(shapes.tower(blocks), count), "exact": ours(shapes.tower(blocks), count, method=EXACT)}
+        both = {"linearized": ours(model("tower", blocks), count), "exact": ours(model("tower", blocks), count, method=EXACT)}
         cost = medians(both)
         ratio = cost["exact"] / cost["linearized"]
         print(f"| {blocks} | {cost['linearized']:.1f} | {cost['exact']:.1f} | {ratio:.1f} |", flush=True)

@@ -1,4 +1,4 @@
-"""Assemblies of any size: a slab on a base with so many contact points, flat or curved, and a tower of blocks."""
+"""An assembly of any size: a slab on a base with so many contact points, flat or curved."""
 
 import numpy as np
 import trimesh
@@ -48,16 +48,3 @@ def _shell(long: float, wide: float, along: int, across: int, radius: float, thi
 
 def _contact_side(centres: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return np.asarray((np.abs(normals[:, 2]) > 0.3) & (np.abs(centres[:, 2]) < THICK - 1e-6))
-
-
-def tower(blocks: int) -> tc.Assembly:
-    """Free blocks, each resting on the one below, the lowest on a fixed one."""
-    a = tc.Assembly(f"tower of {blocks}")
-    below = a.part("block 0", tc.Box(40, 40, 10), fixed=True)
-    for k in range(1, blocks + 1):
-        block = a.part(f"block {k}", tc.Box(40, 40, 10), at=(0, 0, 10 * k), fixed=False)
-        a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=1)
-        a.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
-        below = block
-    a.measure("top", below.point(20, 20, 10), along="z", tolerance=1)
-    return a

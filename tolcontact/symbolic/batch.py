@@ -61,20 +61,22 @@ class Expressions:
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if self._native is None:
-            with self._lock:
-                self._left -= len(inputs[0])
-                if self._left < 0:
-                    self._compile()
-                if self._native is None:
-                    return self._interpreted(inputs)[0]
-        return self._native(inputs)
+        if self._native is None and self._is_due(len(inputs[0])):
+            with contextlib.suppress(UnknownInstructionError):
+                self._native = Native(self._function)  # other threads go on interpreting meanwhile
+        if self._native is not None:
+            return self._native(inputs)
+        with self._lock:
+            return self._interpreted(inputs)[0]
 
-    def _compile(self) -> None:
-        try:
-            self._native = Native(self._function)
-        except UnknownInstructionError:
-            self._left = math.inf
+    def _is_due(self, count: int) -> bool:
+        """Whether the caller should compile the Function now, who is about to evaluate it `count` times: one of all callers."""
+        with self._lock:
+            self._left -= count
+            due = self._left < 0
+            if due:
+                self._left = math.inf
+            return due
 
 
 class Mapped:

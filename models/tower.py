@@ -1,0 +1,33 @@
+"""A tower of blocks, each set down on the one below: how high and how far out of place is the top?
+
+Every block is placed by a fixture of its own, off its place and askew as its locators let it. Where it would sink into the one
+below, contact pushes the two apart; where it hangs over a gap, it stays, since nothing presses it down. Expected: blocks do not
+sink into each other, so the top hardly ever stands lower than nominal; it stands higher on average, and varies much less than
+without contact. One free body per block: change BLOCKS to see what bodies cost. Resolve it with --resolution exact.
+
+z up. Lengths in mm. A tolerance is the full width of its zone.
+"""
+
+import tolcontact as tc
+
+BLOCKS = 9
+SIZE = (40.0, 40.0, 10.0)
+FIXTURE = 1.0
+
+
+def assembly(blocks: int = BLOCKS) -> tc.Assembly:
+    """So many free `blocks` on a fixed one."""
+    model = tc.Assembly("tower")
+    below = model.part("block 0", tc.Box(*SIZE), fixed=True)
+    for k in range(1, blocks + 1):
+        block = model.part(f"block {k}", tc.Box(*SIZE), at=(0, 0, k * SIZE[2]), fixed=False)
+        model.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=4), tolerance=FIXTURE)
+        model.contact(f"joint {k}", moving=block.face("-z"), reference=below.face("+z"), points=30)
+        below = block
+    model.measure("top", below.point(40, 40, 10), along="z", tolerance=1)
+    model.measure("lean", below.point(20, 20, 10), along="x", tolerance=1)
+    return model
+
+
+if __name__ == "__main__":
+    tc.main(assembly)  # the same as: tolcontact run models/tower.py
