@@ -40,8 +40,9 @@ def _label(name: str, long_name: str) -> Variable:
     return Variable(name, (name,), str, long_name)
 
 
+NUMBERS = Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
 COORDINATES = (
-    Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"}),
+    NUMBERS,
     _label(STATE, "state: raw as located, corrected after contact"),
     _label(PART, "part"),
     _label(PAIR, "contact pair"),

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as words
@@ -22,7 +23,8 @@ def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
     if not source.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
     try:
-        tree = xr.open_datatree(source, engine="netcdf4")
+        # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
+        tree = xr.open_datatree(source, engine="netcdf4", drop_variables=words.REALIZATION)
     except (OSError, ValueError) as error:
         raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
     missing = [v.name for v in words.ROWS if v not in words.POSES and v.name not in tree.ds] + [
@@ -31,6 +33,8 @@ def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
     if missing:
         tree.close()
         raise ArchiveError(f'"{path}" is not an archive of tolcontact: it has no {", ".join(missing)}')
+    numbers = pd.RangeIndex(tree.sizes[words.REALIZATION])
+    tree.coords[words.REALIZATION] = (words.REALIZATION, numbers, words.NUMBERS.all_attributes)
     return tree
 
 

@@ -71,7 +71,11 @@ def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
 def share(hits: np.ndarray | Sample) -> Estimate:
     """Share of True in a sample of booleans, exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
-    n, k = hits.count, sum(int(piece.sum()) for piece in hits.pieces())
+    return share_of(sum(int(piece.sum()) for piece in hits.pieces()), hits.count)
+
+
+def share_of(k: int, n: int) -> Estimate:
+    """`share` of `k` hits among `n`."""
     lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
     upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
     return k / n, float(lower), float(upper)

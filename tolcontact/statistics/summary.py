@@ -15,7 +15,7 @@ PERCENTILES = (0.135, 5, 50, 95, 99.865)
 STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
 PIECE = 100_000  # realizations that are read at once
 OUTSIDE = "outside tolerance"
-NOT_ASSEMBLABLE = words.STATUS_MEANINGS.index("not_assemblable")
+UNTOUCHED, NOT_ASSEMBLABLE = (words.STATUS_MEANINGS.index(word) for word in ("untouched", "not_assemblable"))
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
 
 
@@ -37,15 +37,16 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
     values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
     changes = np.array([_change(raw, corrected) for raw, corrected in samples])
-    status = rows[words.STATUS.name].values
+    by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in _statuses(rows)], axis=0)
+    total = int(by_status.sum())
     parts = rows[words.PART].values
     return xr.Dataset(
         {
             "statistic_value": ((words.MEASURE, words.STATE, "statistic", "bound"), values),
             "change": ((words.MEASURE, "change_of", "bound"), changes),
-            "touched": (("bound",), np.array(intervals.share(status != 0))),
-            "by_status": (("status_meaning",), [np.count_nonzero(status == k) for k in range(len(words.STATUS_MEANINGS))]),
-            "not_assemblable": (("bound",), np.array(intervals.share(status == NOT_ASSEMBLABLE))),
+            "touched": (("bound",), np.array(intervals.share_of(total - by_status[UNTOUCHED], total))),
+            "by_status": (("status_meaning",), by_status),
+            "not_assemblable": (("bound",), np.array(intervals.share_of(by_status[NOT_ASSEMBLABLE], total))),
             "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in _pieces(rows)], axis=0)),
             "iterations": (("of_iterations",), _iterations(rows)),
             "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
@@ -71,7 +72,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
         },
         attrs={
             "title": results.attrs.get("title", ""),
-            "realizations": len(status),
+            "realizations": total,
             **{word: results.attrs[word] for word in ("resolution", "objective", "active_set")},
             "smallest_range": _smallest_range(results, rows),
         },
@@ -91,6 +92,10 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
 def _pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
     for start in range(0, rows.sizes[words.REALIZATION], PIECE):
         yield rows.isel({words.REALIZATION: slice(start, start + PIECE)})
+
+
+def _statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
+    return (piece[words.STATUS.name].values for piece in _pieces(rows[[words.STATUS.name]]))
 
 
 def _sample(rows: xr.Dataset, name: str, state: str, measure: int) -> Sample:
@@ -129,8 +134,13 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
 
 def finished(results: xr.DataTree) -> int:
     """How many rows, from the first on, were written completely."""
-    unfinished = np.flatnonzero(results[words.STATUS.name].values == words.UNFINISHED)
-    return int(unfinished[0]) if unfinished.size else results.sizes[words.REALIZATION]
+    rows = 0
+    for piece in _statuses(results.to_dataset()):
+        unfinished = np.flatnonzero(piece == words.UNFINISHED)
+        if unfinished.size:
+            return rows + int(unfinished[0])
+        rows += len(piece)
+    return rows
 
 
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
