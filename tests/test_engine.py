@@ -123,8 +123,9 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
         )
         assert (active == expected[0]).all()
         assert np.allclose(moments, expected[1], rtol=1e-12, atol=1e-9)
-        for mask in (None, plain.gaps(relative[:, index], block.deviations) < activity):
-            deepest = [scan.deepest(later[:, index], block.deviations, mask) for scan in (compiled, plain)]
-            carried = np.isfinite(deepest[0][1])
-            assert (deepest[0][1] == deepest[1][1]).all()
-            assert (deepest[0][0][carried] == deepest[1][0][carried]).all()
+        for poses in (relative[:, index], later[:, index]):
+            assert (compiled.least(poses, block.deviations) == plain.least(poses, block.deviations)).all()
+            for mask in (None, plain.gaps(relative[:, index], block.deviations) < activity):
+                (points, depth), expected = (scan.deepest(poses, block.deviations, mask) for scan in (compiled, plain))
+                assert (points == expected[0]).all() and (depth == expected[1]).all()
+        assert plain.deepest(relative[:, index], block.deviations)[1].max() > 0.01

@@ -3,6 +3,7 @@
 import itertools
 import time
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,7 +15,7 @@ from tolcontact.errors import OptionError
 from tolcontact.method import Method
 from tolcontact.running import check_counts
 from tolcontact.simulation import CORRECTED, Status, simulate_blocks
-from tolcontact.symbolic import compile_program
+from tolcontact.symbolic import Program, compile_program
 
 WARM_UP = 64  # realizations before the clock runs
 QUANTILES = {"median": 0.5, "largest": 1.0}
@@ -27,13 +28,13 @@ def compare(
 
     Labels along the dimension `solver` name the solver, and the resolution and objective where they are not all the same.
 
-    seconds           (solver)                         wall time of all realizations, from draws to measures [s]
-    by_status         (solver, status_meaning)         number of realizations
-    kkt_residual      (solver)                         largest of the realizations that count as resolved [mm]
-    penetration       (solver)                         largest true penetration left [mm]
-    pose_difference   (solver, extent)                 largest distance of a part's surface points between both answers [mm]
-    measure_difference (solver, extent, measure)       in the measure's units
-    both_resolved     (solver)                         number of realizations that count in the differences
+    seconds            (solver)                   wall time of all realizations, from draws to measures [s]
+    by_status          (solver, status_meaning)   number of realizations
+    kkt_residual       (solver)                   largest of the realizations that count as resolved [mm]
+    penetration        (solver)                   largest true penetration left [mm]
+    pose_difference    (solver, extent)           largest distance of a part's surface points between both answers [mm]
+    measure_difference (solver, extent, measure)  in the measure's units
+    both_resolved      (solver)                   number of realizations that count in the differences
 
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
@@ -45,31 +46,14 @@ def compare(
     contestants = [(solver, method) for method in methods for solver in solvers]
     programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
-    runs = []
-    for program in programs:
-        list(simulate_blocks(program, samples=WARM_UP, seed=seed))
-        start = time.perf_counter()
-        blocks = list(simulate_blocks(program, samples=samples, seed=seed))
-        seconds = time.perf_counter() - start
-        names = ("status", "kkt_residual", "poses", "measured", "gap_min")
-        runs.append({"seconds": seconds, **{n: np.concatenate([getattr(block, n) for block in blocks]) for n in names}})
-    first = runs[0]
-    rows = [_row(run, first, corners) for run in runs]
-    dims = {"by_status": ("status_meaning",), "pose_difference": ("extent",), "measure_difference": ("extent", words.MEASURE)}
-    units = {"seconds": "s", "kkt_residual": "mm", "penetration": "mm", "pose_difference": "mm"}
+    first = _simulated(programs[0], samples, seed)
+    rows = [_row(first, first, corners), *(_row(_simulated(each, samples, seed), first, corners) for each in programs[1:])]
     return xr.Dataset(
-        {
-            name: (
-                ("solver", *dims.get(name, ())),
-                np.array([row[name] for row in rows]),
-                {"units": units[name]} if name in units else {},
-            )
-            for name in rows[0]
-        },
+        {of.name: (of.dims, np.array([row[of.name] for row in rows]), of.all_attributes) for of in words.COMPARED},
         coords={
-            "solver": [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
-            "status_meaning": list(words.STATUS_MEANINGS),
-            "extent": list(QUANTILES),
+            words.SOLVER: [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+            words.EXTENT: list(QUANTILES),
             words.MEASURE: [measure.name for measure in nominal.measures],
         },
         attrs={
@@ -81,6 +65,19 @@ def compare(
             "objective": ", ".join(dict.fromkeys(method.objective for method in methods)),
         },
     )
+
+
+def _simulated(program: Program, samples: int, seed: int) -> dict[str, Any]:
+    """How long it took [s], and of each realization what is compared, in the corrected state."""
+    list(simulate_blocks(program, samples=WARM_UP, seed=seed))
+    start = time.perf_counter()
+    blocks = []
+    for block in simulate_blocks(program, samples=samples, seed=seed):
+        states = (block.poses, block.measured, block.gap_min)
+        blocks.append((block.status, block.kkt_residual, *(values[:, CORRECTED].copy() for values in states)))
+    seconds = time.perf_counter() - start
+    names = ("status", "kkt_residual", "poses", "measured", "gap_min")
+    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*blocks, strict=True)), strict=True))}
 
 
 def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
@@ -96,16 +93,16 @@ def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
 def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
     resolved = np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED])
     both = resolved & np.isin(first["status"], [Status.UNTOUCHED, Status.RESOLVED])
-    poses, others = (each["poses"][both, CORRECTED] for each in (run, first))
+    poses, others = (each["poses"][both] for each in (run, first))
     turn = (poses - others)[:, :, :9].reshape(*poses.shape[:2], 3, 3)
     apart = np.einsum("kpij,pcj->kpci", turn, corners) + (poses - others)[:, :, None, 9:]
     distance = np.linalg.norm(apart, axis=3).max(axis=(1, 2), initial=0)
-    measured = np.abs(run["measured"] - first["measured"])[both, CORRECTED]
+    measured = np.abs(run["measured"] - first["measured"])[both]
     return {
         "seconds": run["seconds"],
         "by_status": np.bincount(run["status"], minlength=len(words.STATUS_MEANINGS)),
         "kkt_residual": run["kkt_residual"][resolved].max(initial=0),
-        "penetration": max(0.0, -float(run["gap_min"][:, CORRECTED].min(initial=0))),
+        "penetration": max(0.0, -float(run["gap_min"].min(initial=0))),
         "pose_difference": _extent(distance),
         "measure_difference": _extent(measured),
         "both_resolved": int(both.sum()),

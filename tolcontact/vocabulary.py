@@ -12,6 +12,7 @@ REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
 CHECKPOINT, NUMBER = "checkpoint", "number"
+SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
 
@@ -185,4 +186,15 @@ FIELD_SUMS = Variable(
     "f8",
     "running sums of the displacement field, from which an unfinished run goes on",
     "1",
+)
+
+# What a comparison of solvers holds.
+COMPARED = (
+    Variable("seconds", (SOLVER,), "f8", "wall time of all realizations, from draws to measures", "s"),
+    Variable("by_status", (SOLVER, STATUS_MEANING), "i8", "number of realizations", "1"),
+    Variable("kkt_residual", (SOLVER,), "f8", "largest KKT residual of the realizations that count as resolved", "mm"),
+    Variable("penetration", (SOLVER,), "f8", "largest true penetration left", "mm"),
+    Variable("pose_difference", (SOLVER, EXTENT), "f8", "largest distance of a surface point between both answers", "mm"),
+    Variable("measure_difference", (SOLVER, EXTENT, MEASURE), "f8", "difference of a measure, in its own units"),
+    Variable("both_resolved", (SOLVER,), "i8", "number of realizations that count in the differences", "1"),
 )

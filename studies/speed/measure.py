@@ -208,7 +208,7 @@ def clocked(where: dict[str, list[tuple[object, str]]]) -> Iterator[dict[str, fl
 def breakdown(samples: int) -> None:
     where = {
         "sampling": [(running, "draw")],
-        "scan": [(CompiledScan, "survey"), (CompiledScan, "deepest")],
+        "scan": [(CompiledScan, name) for name in ("survey", "least", "deepest")],
         "QP": [(batch.Mapped, "__call__")],
         "rows, update, measures": [(batch.Expressions, "__call__")],
         "fields": [(ArchiveWriter, "_add_to_fields")],

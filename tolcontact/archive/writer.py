@@ -19,7 +19,7 @@ from tolcontact import vocabulary as words
 from tolcontact.archive.header import declaration, now, run_settings, write_header
 from tolcontact.archive.reader import open_archive
 from tolcontact.archive.variables import ROW_CHUNK
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import Nominal, NominalPart, movers
 from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments
@@ -67,7 +67,7 @@ class ArchiveWriter:
         """Open the file and take up the sums of its last checkpoint."""
         self._file = _opened(path, "r+")
         self._nominal = nominal
-        self._moments = [[FieldMoments(part.vertices) for _ in words.STATES] for part in nominal.parts]
+        self._moments = [_of_states(nominal, part) for part in nominal.parts]
         summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
         self._slot = int(summed.argmax())
         self.rows = max(0, int(summed[self._slot]))
@@ -110,7 +110,7 @@ class ArchiveWriter:
 
     def _add_to_fields(self, R: np.ndarray, t: np.ndarray) -> None:
         for part, both in enumerate(self._moments):
-            for state, moments in enumerate(both):
+            for state, moments in enumerate(dict.fromkeys(both)):
                 moments.add(R[:, state, part], t[:, state, part])
 
     def check_point(self) -> None:
@@ -135,6 +135,12 @@ class ArchiveWriter:
                 group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
                 group[words.FIELD_INTERVAL.name][state] = moments.magnitude_bounds()
         self._file.sync()
+
+
+def _of_states(nominal: Nominal, part: NominalPart) -> list[FieldMoments]:
+    """Sums of the raw and of the corrected field, which are one where contact cannot move the part."""
+    raw = FieldMoments(part.vertices)
+    return [raw, FieldMoments(part.vertices) if movers(nominal.assembly, part.part) else raw]
 
 
 @contextlib.contextmanager

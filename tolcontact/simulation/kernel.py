@@ -11,7 +11,6 @@ from numba import njit
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
 LANES, CHUNK = 8, 256
-INF = np.inf
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -152,8 +151,10 @@ def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, whe
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def deepest(points, clusters, relative, deviations, may_carry, numbers, gaps_there):  # type: ignore[no-untyped-def]
-    """For each realization the deepest point of each cluster (n, cluster), and its gap; infinite where none may carry.
+def deepest(points, clusters, relative, deviations, may_carry, below, numbers, gaps_there):  # type: ignore[no-untyped-def]
+    """For each realization the deepest point of each cluster (n, cluster), and its gap, if that is less than `below`.
+
+    Else they are the cluster's first point, and `below`.
 
     points      as in `survey`
     clusters    (cluster + 1,): the first branch of each cluster, and the end
@@ -168,7 +169,7 @@ def deepest(points, clusters, relative, deviations, may_carry, numbers, gaps_the
         _bounds(branch_boxes, 0, middle.size, of, middle, reach)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
-            lowest, where = INF, leaves[branches[begin]]
+            lowest, where = below, leaves[branches[begin]]
             promising = begin
             for branch in range(begin + 1, end):
                 if middle[branch] - reach[branch] < middle[promising] - reach[promising]:

@@ -74,16 +74,20 @@ class PairScan:
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
         return active.sum(axis=1), moments
 
+    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """The least gap of all points (realization,) [mm]."""
+        return np.asarray(self.gaps(relative, deviations).min(axis=1))
+
     def deepest(
         self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """The deepest point of each cluster and its depth, both (realization, cluster); depth [mm], > 0 inside.
+        """The deepest point of each cluster and its depth, both (realization, cluster) [mm]; depth 0 where none is inside.
 
         Only points where `may_carry` (realization, point) holds are looked at, if it is given.
         """
-        gaps = self.gaps(relative, deviations)
+        gaps = np.minimum(self.gaps(relative, deviations), 0)
         if may_carry is not None:
-            gaps = np.where(may_carry, gaps, np.inf)
+            gaps = np.where(may_carry, gaps, 0)
         firsts = self.leaves[self.branches[self.clusters]]
         points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
         return points, -np.take_along_axis(gaps, points, axis=1)
@@ -99,15 +103,24 @@ class CompiledScan(PairScan):
         kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, moments.reshape(count, -1))
         return active, moments
 
+    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
+
     def deepest(
         self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        points = np.empty((len(relative), len(self.clusters) - 1), dtype=np.int64)
+        points, gaps = self._deepest(self.clusters, relative, deviations, may_carry, 0.0)
+        return points, -gaps
+
+    def _deepest(
+        self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, below: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(self._points, self.clusters, poses, heights, mask, points, gaps)
-        return points, -gaps
+        kernel.deepest(self._points, clusters, poses, heights, mask, below, points, gaps)
+        return points, gaps
 
     @cached_property
     def _points(self) -> tuple[np.ndarray, ...]:
@@ -195,5 +208,4 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
 
 def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """Least gap (row, pair) [mm] of each pair at X_RM (row, pair, 12)."""
-    each = [-scan.deepest(relative[:, k], deviations)[1].max(axis=1) for k, scan in enumerate(scans)]
-    return np.stack(each, axis=1)
+    return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

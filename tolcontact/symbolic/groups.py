@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.discretization import Nominal
-from tolcontact.discretization.nominal import movers
+from tolcontact.discretization import Nominal, movers
 from tolcontact.symbolic.correction import Carried
 from tolcontact.symbolic.objective import moment_table
 
