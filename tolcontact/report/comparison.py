@@ -11,10 +11,9 @@ def comparison_text(comparison: xr.Dataset) -> Group:
     """A comparison (see compare) as something that rich prints in 80 columns."""
     count = comparison.attrs["realizations"]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-    for column in ("solver", "us each", "unresolved", "residual", "pose, median", "pose, largest", "measure, largest"):
-        table.add_column(
-            column, justify="left" if column == "solver" else "right", min_width=len(column) if column == "solver" else 0
-        )
+    table.add_column("solver", vertical="bottom")
+    for column in ("us each", "un-\nresolved", "residual", "pose,\nmedian", "pose,\nlargest", "measure,\nlargest"):
+        table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
     for solver in comparison["solver"].values:
         of = comparison.sel(solver=solver)
         lost = int(of["by_status"].sel(status_meaning=["not_converged", "not_assemblable"]).sum())
