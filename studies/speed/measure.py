@@ -42,13 +42,21 @@ def model(name: str, *choices) -> tc.Assembly:
     return runpy.run_path(str(HERE.parents[1] / "models" / f"{name}.py"))["assembly"](*choices)
 
 
-def ours(assembly, samples: int, *, solver: str = "daqp", threads: int = 1, method: tc.Method | None = None) -> Contender:
+def ours(
+    assembly,
+    samples: int,
+    *,
+    solver: str = "daqp",
+    threads: int = 1,
+    method: tc.Method | None = None,
+    block: int = running.BLOCK,
+) -> Contender:
     program = tc.build(assembly, solver=solver, method=method)
     list(simulate_blocks(program, samples=256, seed=1))
 
     def turn() -> float:
         start = time.perf_counter()
-        blocks = [len(block) for block in simulate_blocks(program, samples=samples, seed=1, threads=threads)]
+        blocks = [len(done) for done in simulate_blocks(program, samples=samples, seed=1, threads=threads, block=block)]
         return 1e6 * (time.perf_counter() - start) / sum(blocks)
 
     return turn
@@ -154,14 +162,32 @@ def against_size(samples: int, figure: Path) -> None:
 
 
 def against_bodies(samples: int) -> None:
-    print("\n| free bodies | linearized [us] | exact [us] | exact / linearized |\n|---:|---:|---:|---:|")
-    batch.ENOUGH = 10_000  # many bodies have large Functions, which compile for minutes: short runs interpret them
+    print("\n| free bodies | realizations | linearized [us] | exact [us] | exact / linearized |\n|---:|---:|---:|---:|---:|")
     for blocks in (1, 2, 5, 10, 20, 30):
-        count = max(samples // (4 * blocks**2), 64)
+        count = min(samples // 4, 20 * samples // blocks**2)
         both = {"linearized": ours(model("tower", blocks), count), "exact": ours(model("tower", blocks), count, method=EXACT)}
         cost = medians(both)
         ratio = cost["exact"] / cost["linearized"]
-        print(f"| {blocks} | {cost['linearized']:.1f} | {cost['exact']:.1f} | {ratio:.1f} |", flush=True)
+        print(f"| {blocks} | {count} | {cost['linearized']:.1f} | {cost['exact']:.1f} | {ratio:.1f} |", flush=True)
+
+
+def against_packing(samples: int) -> None:
+    """Blocks four times as large pack what four blocks leave unsolved into the same batches."""
+    packed = 4 * running.BLOCK
+    print(f"\n| exact | blocks of {running.BLOCK} [us] | of {packed}, packed [us] | packed / not |\n|---|---:|---:|---:|")
+    cases = {
+        "RA1": model("ra1"),
+        "curved, 3003": shapes.slab(3000, 200.0),
+        "tower of 5": model("tower", 5),
+        "cells": model("cells"),
+    }
+    for name, a in cases.items():
+        sizes = (running.BLOCK, packed)
+        cost = medians({size: ours(a, max(samples, packed), method=EXACT, block=size) for size in sizes})
+        print(
+            f"| {name} | {' | '.join(f'{each:.1f}' for each in cost.values())} | {cost[packed] / cost[running.BLOCK]:.2f} |",
+            flush=True,
+        )
 
 
 def whole_runs(largest: int) -> None:
@@ -245,7 +271,9 @@ def breakdown(samples: int) -> None:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--quick", action="store_true", help="few realizations: does it run?")
-    options.add_argument("--only", choices=["loops", "size", "bodies", "breakdown", "runs"], help="one of the measurements")
+    options.add_argument(
+        "--only", choices=["loops", "size", "bodies", "packing", "breakdown", "runs"], help="one of the measurements"
+    )
     options.add_argument("--figure", type=Path, default=HERE / "cost.png")
     chosen = options.parse_args()
     samples = 2048 if chosen.quick else 16_384
@@ -253,6 +281,7 @@ def main() -> None:
         "loops": lambda: against_loops(samples),
         "size": lambda: against_size(samples, chosen.figure),
         "bodies": lambda: against_bodies(samples),
+        "packing": lambda: against_packing(samples),
         "breakdown": lambda: breakdown(samples),
         "runs": lambda: whole_runs(10_000 if chosen.quick else 10_000_000),
     }

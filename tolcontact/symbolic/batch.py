@@ -119,7 +119,8 @@ class Mapped:
         """Who evaluates which realizations; the narrower of WIDTHS may have idle places at the end."""
         start = 0
         while start < count:
-            call = self._calls[0] if count - start >= WIDTHS[0] else self._calls[1] if count - start > 1 else self._calls[2]
+            left = count - start
+            call = self._calls[0] if left >= WIDTHS[0] else self._calls[1] if left >= WIDTHS[1] // 2 else self._calls[2]
             stop = min(start + call.width, count)
             yield call, start, stop
             start = stop
