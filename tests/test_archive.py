@@ -213,6 +213,119 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     assert fields[0].identical(fields[1])
 
 
+KILLS = """
+import os, sys
+import netCDF4
+import xarray as xr
+from tests import cases
+import tolcontact as tc
+from tolcontact.archive import writer
+
+folder, before = sys.argv[1], sys.argv[2] == "before"
+program = tc.build(cases.stack(), solver="daqp")
+run = lambda path, **options: tc.run(program, samples=9000, seed=3, out=path, keep="measures", **options).close()
+run(f"{folder}/whole.nc")
+
+class Dying(netCDF4.Dataset):
+    left = 0
+    def sync(self):
+        Dying.left -= 1
+        if before and Dying.left == 0:
+            os._exit(9)
+        super().sync()
+        if Dying.left == 0:
+            os._exit(9)
+
+killed = 0
+while True:
+    path = f"{folder}/{killed}.nc"
+    child = os.fork()
+    if child == 0:
+        Dying.left, netCDF4.Dataset = killed + 1, Dying
+        run(path)
+        os._exit(0)
+    if os.waitpid(child, 0)[1] == 0:
+        break
+    killed += 1
+    with tc.open_archive(path) as left, tc.open_archive(f"{folder}/whole.nc") as whole:
+        done = left["status"].values != -1
+        assert (left["measured"].values[done] == whole["measured"].values[done]).all(), f"rows after kill {killed}"
+    first = []
+    run(path, resume=True, progress=first.append)
+    assert first[0] > 4096 or killed <= 5, f"kill {killed}: began at {first[0]}"
+    with tc.open_archive(path) as resumed, tc.open_archive(f"{folder}/whole.nc") as whole:
+        for group in ("/", "/field/middle", "/field/upper"):
+            both = [tree[group].to_dataset().drop_attrs() for tree in (resumed, whole)]
+            one, other = (each.drop_vars(["summed_rows", "sums"], errors="ignore") for each in both)
+            assert one.identical(other), f"{group} after kill {killed}"
+assert killed == 13, killed
+"""
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_run_may_be_killed_at_any_of_its_writes(when, tmp_path):
+    subprocess.run([sys.executable, "-c", KILLS, tmp_path, when], check=True)
+
+
+def test_resuming_with_fewer_realizations_completes_what_was_begun(archive, tmp_path):
+    path = tmp_path / "copy.nc"
+    path.write_bytes(archive.read_bytes())
+    tc.run(cases.stack(), samples=100, seed=3, solver="daqp", out=path, resume=True).close()
+    one, other = (xr.load_dataset(p, group="field/upper") for p in (path, archive))
+    assert one.identical(other)
+
+
+LONG = """
+import sys
+from tests import cases
+import tolcontact as tc
+tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=sys.argv[1],
+       progress=lambda rows: (print(rows, flush=True), sys.stdin.readline()))
+"""
+
+
+@pytest.mark.parametrize("how", ["resume", "overwrite"])
+def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
+    path = tmp_path / "live.nc"
+    with subprocess.Popen([sys.executable, "-c", LONG, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
+        run.stdout.readline()
+        with pytest.raises(ArchiveError, match="being written by another run"):
+            tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=path, **{how: True})
+        run.communicate("go on\n")
+    assert run.returncode == 0
+    with tc.open_archive(path) as tree:
+        assert (tree["status"].values != -1).all()
+    assert [p.name for p in tmp_path.iterdir()] == ["live.nc"]
+
+
+FULL = """
+import resource, sys
+from tests import cases
+import tolcontact as tc
+from tolcontact.errors import ArchiveError
+resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
+try:
+    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=sys.argv[1])
+except ArchiveError as error:
+    assert "cannot be written" in str(error), error
+    sys.exit(7)
+"""
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path):
+    assert subprocess.run([sys.executable, "-c", FULL, tmp_path / "full.nc"], check=False).returncode == 7
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp_path):
+    path = tmp_path / "begun.nc"
+    path.write_bytes(archive.read_bytes())
+    with netCDF4.Dataset(path, "r+") as file:
+        file["status"][:] = -1
+    with tc.open_archive(path) as tree, pytest.raises(ArchiveError, match="go on with --resume"):
+        tc.summarize(tree)
+
+
 @pytest.mark.parametrize("keep", ["measures", "poses", "all"])
 def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path):
     tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=tmp_path / "some.nc", keep=keep).close()
@@ -232,6 +345,8 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
     before = archive.read_bytes()
     with pytest.raises(ArchiveError, match="seed = 3, now it is 4"):
         tc.run(cases.stack(), samples=300, seed=4, solver="daqp", out=archive, resume=True)
+    with pytest.raises(tc.TolcontactError, match="choose one of the two"):
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive, resume=True, overwrite=True)
     with pytest.raises(ArchiveError, match="another model"):
         tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
     with pytest.raises(ArchiveError, match="resolution = linearized, now it is exact"):

@@ -41,7 +41,7 @@ def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
     done = call(tmp_path, *options, "--out", "both.nc")
     assert done.returncode == 0
     assert max(map(len, done.stdout.splitlines())) <= 80
-    assert "qpoases" in done.stdout and "unresolved" in done.stdout
+    assert "qpoases" in done.stdout and "resolved" in done.stdout
     with xr.open_dataset(tmp_path / "both.nc") as read:
         assert list(read.solver.values.astype(str)) == ["daqp", "qpoases"]
         assert read.seconds.attrs["units"] == "s"
@@ -77,3 +77,14 @@ def test_where_nothing_can_be_compared_the_json_says_null(tmp_path):
     said = json.loads(done.stdout, parse_constant=pytest.fail)["data_vars"]
     assert said["both_resolved"]["data"] == [0, 0]
     assert said["pose_difference"]["data"] == [[None, None], [None, None]]
+
+
+def test_labels_name_whatever_methods_differ_in():
+    methods = [tc.Method(), tc.Method(eta=1e-3), tc.Method(regularization="identity")]
+    found = tc.compare(cases.ra1(), ["daqp"], samples=20, methods=methods)
+    assert list(found["solver"].values) == [
+        "daqp regularization points eta 1e-06",
+        "daqp regularization points eta 0.001",
+        "daqp regularization identity eta 1e-06",
+    ]
+    assert (found["measure_difference"].sel(extent="largest").values[1:] > 0).all()

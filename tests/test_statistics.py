@@ -64,9 +64,25 @@ def test_a_percentile_beyond_the_sample_has_no_bound():
 
 
 def test_a_constant_has_no_spread():
-    x = np.full(100, 3.0)
-    assert intervals.variance(x) == (0, 0, 0)
-    assert np.isnan(intervals.variance_ratio(x, x)).all()
+    for value in (3.0, 17.3, 0.1):
+        x = np.full(1000, value)
+        assert intervals.mean(x) == (value, value, value)
+        assert intervals.variance(x) == (0, 0, 0)
+        assert np.isnan(intervals.variance_ratio(x, np.arange(1000.0))).all()
+
+
+@pytest.mark.parametrize("size", [2, 3, 5, 10, 30])
+def test_intervals_of_spreads_cover_in_small_samples(size):
+    rng = np.random.default_rng(2)
+    covered = np.zeros(2)
+    for _ in range(REPEATS):
+        before, other = rng.normal(size=(2, size))
+        found = intervals.variance(before), intervals.variance_ratio(0.6 * before + 0.8 * other, before)
+        covered += [lower <= 1 <= upper for _, lower, upper in found]
+        for percent in (0.135, 50):
+            estimate, lower, upper = intervals.percentile(before, percent)
+            assert lower <= estimate <= upper
+    assert (covered / REPEATS > 0.92).all()
 
 
 def test_fields_equal_the_plain_sums_over_realizations():

@@ -78,7 +78,7 @@ def run(
         task = bar.add_task(program.nominal.assembly.name, total=samples)
         results = run_model(
             program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume, keep=keep,
-            progress=lambda done: bar.update(task, completed=done),
+            progress=lambda done: bar.update(task, completed=done, total=max(samples, done)),
         )  # fmt: skip
     with results:
         _print_summary(results)

@@ -3,6 +3,7 @@
 import itertools
 import time
 from collections.abc import Sequence
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from tolcontact.simulation import CORRECTED, Status, simulate_blocks
 from tolcontact.symbolic import Program, compile_program
 
 WARM_UP = 64  # realizations before the clock runs
+SPEAKS = ("resolution", "objective")  # words whose values say what they are
 QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
@@ -26,13 +28,13 @@ def compare(
 ) -> xr.Dataset:
     """Simulate the same realizations with each solver and method. Differences are from the first one, in the corrected state.
 
-    Labels along the dimension `solver` name the solver, and the resolution and objective where they are not all the same.
+    Labels along the dimension `solver` name the solver, and what the methods differ in.
 
     seconds            (solver)                   wall time of all realizations, from draws to measures [s]
     by_status          (solver, status_meaning)   number of realizations
     kkt_residual       (solver)                   largest of the realizations that count as resolved [mm]
     penetration        (solver)                   largest true penetration left [mm]
-    pose_difference    (solver, extent)           largest distance of a part's surface points between both answers [mm]
+    pose_difference    (solver, extent)           largest distance of a part's bounding corners between both answers [mm]
     measure_difference (solver, extent, measure)  in the measure's units
     both_resolved      (solver)                   number of realizations that count in the differences
 
@@ -82,12 +84,12 @@ def _simulated(program: Program, samples: int, seed: int) -> dict[str, Any]:
 
 def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
     """What tells a method from the others."""
-    words_of = [[each.resolution, each.objective] for each in methods]
-    return [
-        own
-        for own, others in zip([method.resolution, method.objective], zip(*words_of, strict=True), strict=True)
-        if len({*others}) > 1
-    ]
+    names = [field.name for field in fields(Method) if len({getattr(each, field.name) for each in methods}) > 1]
+    return [_said(name, getattr(method, name)) for name in names]
+
+
+def _said(name: str, value: object) -> str:
+    return value if isinstance(value, str) and name in SPEAKS else f"{name} {value}"
 
 
 def _row(run: dict, first: dict, corners: np.ndarray) -> dict:

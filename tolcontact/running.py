@@ -45,6 +45,7 @@ def run(
 
     Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
+    To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations.
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
     """
@@ -67,11 +68,13 @@ def run(
             with open_archive(path) as tree:
                 return tree.load()
     path = Path(out)
+    if overwrite and resume:
+        raise OptionError("an archive cannot be overwritten and resumed; choose one of the two")
     check_writable(path, overwrite=overwrite, resume=resume)
     program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
     start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
     with start(path, program, seed=seed, samples=samples, keep=keep) as writer:
-        for done in simulate_blocks(program, samples=samples, seed=seed, start=writer.rows):
+        for done in simulate_blocks(program, samples=writer.samples, seed=seed, start=writer.rows):
             writer.append(done)
             if len(done) == BLOCK:
                 writer.check_point()

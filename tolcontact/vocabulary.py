@@ -179,6 +179,7 @@ FIELD_INTERVAL = Variable(
     "95 % confidence interval of six standard deviations of the displacement magnitude",
     "mm",
 )
+FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL)
 SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
 FIELD_SUMS = Variable(
     "sums",
@@ -194,7 +195,7 @@ COMPARED = (
     Variable("by_status", (SOLVER, STATUS_MEANING), "i8", "number of realizations", "1"),
     Variable("kkt_residual", (SOLVER,), "f8", "largest KKT residual of the realizations that count as resolved", "mm"),
     Variable("penetration", (SOLVER,), "f8", "largest true penetration left", "mm"),
-    Variable("pose_difference", (SOLVER, EXTENT), "f8", "largest distance of a surface point between both answers", "mm"),
+    Variable("pose_difference", (SOLVER, EXTENT), "f8", "largest distance of a corner of a part's bounding box", "mm"),
     Variable("measure_difference", (SOLVER, EXTENT, MEASURE), "f8", "difference of a measure, in its own units"),
     Variable("both_resolved", (SOLVER,), "i8", "number of realizations that count in the differences", "1"),
 )

@@ -271,9 +271,8 @@ def breakdown(samples: int) -> None:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--quick", action="store_true", help="few realizations: does it run?")
-    options.add_argument(
-        "--only", choices=["loops", "size", "bodies", "packing", "breakdown", "runs"], help="one of the measurements"
-    )
+    parts = ["loops", "size", "bodies", "packing", "breakdown", "runs"]
+    options.add_argument("--only", choices=parts, help="one of the measurements")
     options.add_argument("--figure", type=Path, default=HERE / "cost.png")
     chosen = options.parse_args()
     samples = 2048 if chosen.quick else 16_384

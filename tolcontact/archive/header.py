@@ -17,6 +17,7 @@ from tolcontact.assembly.document import to_document
 from tolcontact.discretization import Nominal
 from tolcontact.statistics import FieldMoments
 from tolcontact.symbolic import Program
+from tolcontact.vocabulary import Variable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
 
@@ -55,7 +56,7 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
             "Variation Simulation of Rigid Bodies with Contact Representation",
             "history": f"{now()} created",
-            "versions": ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)]),
+            "versions": versions(),
             **settings,
         }
     )
@@ -120,17 +121,28 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
 
 
 def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
+    group.createDimension(words.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
+    for variable, values in contact_values(nominal).items():
+        write(group, variable, values)
+
+
+def contact_values(nominal: Nominal) -> dict[Variable, Any]:
+    """What the group `contact` holds: which parts touch, and where."""
     pairs = nominal.pairs
-    group.createDimension(words.POINT, sum(len(pair.P_m) for pair in pairs))
-    write(group, words.MOVING_PART, [pair.moving for pair in pairs])
-    write(group, words.REFERENCE_PART, [-1 if pair.reference is None else pair.reference for pair in pairs])
-    if pairs:
-        write(group, words.PAIR_OF_POINT, np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]))
-        write(group, words.MOVING_POINT, np.vstack([pair.P_m for pair in pairs]))
-        write(group, words.REFERENCE_POINT, np.vstack([pair.P_r for pair in pairs]))
-        write(group, words.REFERENCE_NORMAL, np.vstack([pair.n_r for pair in pairs]))
-        none = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
-        write(group, words.LOCATOR_OF_POINT, np.concatenate(none))
+    parts = {
+        words.MOVING_PART: [pair.moving for pair in pairs],
+        words.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
+    }
+    if not pairs:
+        return parts
+    locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
+    return parts | {
+        words.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
+        words.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
+        words.REFERENCE_POINT: np.vstack([pair.P_r for pair in pairs]),
+        words.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
+        words.LOCATOR_OF_POINT: np.concatenate(locators),
+    }
 
 
 def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -> None:
@@ -153,6 +165,11 @@ def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -
 def declaration(program: Program) -> str:
     """The declared model as JSON."""
     return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
+
+
+def versions() -> str:
+    """What computes: names and versions."""
+    return ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)])
 
 
 def now() -> str:

@@ -2,22 +2,24 @@
 
 A file that is being extended breaks when its writer is killed at the wrong moment. So everything is laid out first, under
 another name: header, and room for all rows, each with the status "unfinished". Once the file stands under its own name,
-bytes are only overwritten in place, the status of a row after its data; whatever kills the writer, the file opens,
-finished rows stay, and `resume` goes on after them.
+bytes are only overwritten in place, the status of a row after its data; whatever kills the process, the file opens,
+finished rows stay, and `resume` goes on after them. (Nothing waits for the disk: a machine that loses power may lose more.)
 """
 
 import contextlib
+import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
-from tolcontact.archive.header import declaration, now, run_settings, write_header
+from tolcontact.archive.header import now, run_settings, versions, write_header
 from tolcontact.archive.reader import open_archive
+from tolcontact.archive.same_run import check_same_run
 from tolcontact.archive.variables import ROW_CHUNK
 from tolcontact.discretization import Nominal, NominalPart, movers
 from tolcontact.errors import ArchiveError
@@ -26,11 +28,16 @@ from tolcontact.statistics import FieldMoments
 from tolcontact.symbolic import Program
 from tolcontact.vocabulary import Variable
 
+_HDF_ERROR = -101  # of the netCDF library
 ROOM = 50 * ROW_CHUNK  # rows that are laid out at once
 
 
 class ArchiveWriter:
-    """An archive being written. Use it as a context manager."""
+    """An archive being written. Use it as a context manager.
+
+    rows      realizations that are in it with all that is known of them; the next block starts there
+    samples   realizations that it has room for
+    """
 
     def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> None:
         """Create the file with everything but its rows. `keep` says what it will hold of each realization (see `run`).
@@ -44,7 +51,7 @@ class ArchiveWriter:
 
     @classmethod
     def resume(cls, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> "ArchiveWriter":
-        """Open an archive to go on after its last checkpoint, up to `samples`.
+        """Open an archive to go on after its last checkpoint, up to `samples`, or to its own number if that is larger.
 
         Raises ArchiveError where the file is no archive, or holds another model or another run.
         """
@@ -54,19 +61,24 @@ class ArchiveWriter:
             shutil.copyfile(path, part)
             open_archive(part, shown=path).close()
             with _opened(part, "r+") as file:
-                _check_same_run(file, path, program, run_settings(program, seed, samples, keep))
+                check_same_run(file, path, program, run_settings(program, seed, samples, keep))
                 length = len(file.dimensions[words.REALIZATION])
                 _make_room(file, length, samples)
                 file.setncattr("samples", np.int64(max(samples, length)))
                 rows = max(0, int(file[words.SUMMED_ROWS.name][:].max()))
-                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations")
+                others = "" if file.versions == versions() else f" with {versions()}"
+                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
+                for each in program.nominal.parts:  # they stand for the rows of before
+                    for variable in words.FIELDS:
+                        file[f"field/{each.name}"][variable.name][...] = np.nan
         writer._go_on(path, program.nominal)
         return writer
 
     def _go_on(self, path: Path, nominal: Nominal) -> None:
         """Open the file and take up the sums of its last checkpoint."""
-        self._file = _opened(path, "r+")
+        self._path, self._file = path, _opened(path, "r+")
         self._nominal = nominal
+        self.samples = len(self._file.dimensions[words.REALIZATION])
         self._moments = [_of_states(nominal, part) for part in nominal.parts]
         summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
         self._slot = int(summed.argmax())
@@ -80,10 +92,15 @@ class ArchiveWriter:
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._file.close()
+        with _refusals_told(self._path):
+            self._file.close()
 
     def append(self, block: Block) -> None:
-        """Write the rows of a block, and see them to the disk."""
+        """Write the rows of a block, and hand them over to the system."""
+        with _refusals_told(self._path):
+            self._append(block)
+
+    def _append(self, block: Block) -> None:
         rows = slice(block.start, block.start + len(block))
         R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
         self._add_to_fields(R, t)
@@ -114,7 +131,11 @@ class ArchiveWriter:
                 moments.add(R[:, state, part], t[:, state, part])
 
     def check_point(self) -> None:
-        """Write the sums so far, from which a killed run goes on. The last ones stay until these are on the disk."""
+        """Write the sums so far, from which a killed run goes on. The last ones stay until these are written."""
+        with _refusals_told(self._path):
+            self._check_point()
+
+    def _check_point(self) -> None:
         self._slot = 1 - self._slot
         self._file[words.SUMMED_ROWS.name][self._slot] = -1
         self._file.sync()
@@ -128,6 +149,10 @@ class ArchiveWriter:
 
     def write_fields(self) -> None:
         """Displacement fields of all parts, from the sums over all rows."""
+        with _refusals_told(self._path):
+            self._write_fields()
+
+    def _write_fields(self) -> None:
         for part, both in zip(self._nominal.parts, self._moments, strict=True):
             group = self._file[f"field/{part.name}"]
             for state, moments in enumerate(both):
@@ -146,12 +171,36 @@ def _of_states(nominal: Nominal, part: NominalPart) -> list[FieldMoments]:
 @contextlib.contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
     """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
-    part = path.with_name(path.name + ".part")
+    _refuse_while_written(path)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
     try:
-        yield part
-        part.replace(path)
+        with _refusals_told(path):
+            yield part
+            part.replace(path)
     finally:
         part.unlink(missing_ok=True)
+
+
+def _refuse_while_written(path: Path) -> None:
+    """HDF5 locks a file that somebody writes to; replacing it would take it away from them."""
+    if path.is_file():
+        try:
+            netCDF4.Dataset(path).close()
+        except OSError as error:
+            if error.errno == _HDF_ERROR:
+                raise ArchiveError(
+                    f'archive "{path}" is being written by another run, or damaged; wait, delete it, or write to a new file'
+                ) from error
+
+
+@contextlib.contextmanager
+def _refusals_told(path: Path) -> Iterator[None]:
+    """What the system or the netCDF library refuses (a full disk, say) as an ArchiveError."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
+        raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
 def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
@@ -171,21 +220,4 @@ def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
 
 
 def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
-    try:
-        return netCDF4.Dataset(path, mode, format="NETCDF4")
-    except OSError as error:
-        raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror or error}') from error
-
-
-def _check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any]) -> None:
-    if there["model"][words.DECLARATION.name][...] != declaration(program):
-        raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
-    for part in program.nominal.parts:
-        if not np.array_equal(there[f"field/{part.name}"][words.FIELD_VERTICES.name][...], part.vertices):
-            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
-    for word, value in settings.items():
-        was = getattr(there, word, None)
-        if word != "samples" and was != value:
-            raise ArchiveError(
-                f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
-            )
+    return netCDF4.Dataset(path, mode, format="NETCDF4")

@@ -12,7 +12,7 @@ def comparison_text(comparison: xr.Dataset) -> Group:
     count = comparison.attrs["realizations"]
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     table.add_column("solver", vertical="bottom")
-    for column in ("us each", "un-\nresolved", "residual", "pose,\nmedian", "pose,\nlargest", "measure,\nlargest"):
+    for column in ("us each", "not\nresolved", "residual", "pose,\nmedian", "pose,\nlargest", "measure,\nlargest"):
         table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
     for solver in comparison["solver"].values:
         of = comparison.sel(solver=solver)

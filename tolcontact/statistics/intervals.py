@@ -28,7 +28,7 @@ def mean(x: np.ndarray | Sample) -> Estimate:
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Variance; interval on the log scale with the standard error that the fourth moment gives."""
+    """Variance; Bonett's interval (2006), on the log scale with the standard error that the fourth moment gives."""
     x = Sample.of(x)
     estimate, lower, upper = of_moments(x.count, *x.moments)
     return float(estimate), float(lower), float(upper)
@@ -53,14 +53,12 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     x = Sample.of(x)
     ranks = [_ranks(x.count, percent / 100) for percent in percents]
     values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
-    return [
-        (
-            float(one + (next_ - one) * share),
-            float(lower if below >= 0 else -np.inf),
-            float(upper if above < x.count else np.inf),
-        )
-        for (below, above, _, _, share), (lower, upper, one, next_) in zip(ranks, values, strict=True)
-    ]
+    found = []
+    for (below, above, _, _, share), (low, high, one, next_) in zip(ranks, values, strict=True):
+        lower, upper = low if below >= 0 else -np.inf, high if above < x.count else np.inf
+        # What lies between two order statistics may be beyond a bound, in small samples.
+        found.append((float(np.clip(one + (next_ - one) * share, lower, upper)), float(lower), float(upper)))
+    return found
 
 
 def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
@@ -85,12 +83,14 @@ def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> E
     """Variance of `after` over variance of `before`, from the same realizations (paired, on the log scale)."""
     after, before = Sample.of(after), Sample.of(before)
     ours, theirs = after.moments[0], before.moments[0]
-    if ours == 0 or theirs == 0:
+    if _is_constant(after) or _is_constant(before):
         return (float("nan"),) * 3
     # What each realization adds to the logarithm of the ratio; the sum of all is zero.
     pairs = zip(after.pieces(), before.pieces(), strict=True)
     influence2 = sum((((a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs) ** 2).sum() for a, b in pairs)
-    factor = np.exp(_Z * np.sqrt(influence2 / (after.count - 1) / after.count))
+    # The correction for small samples is Bonett's for one variance.
+    n = after.count
+    factor = np.exp(_Z * n / (n - _Z) * np.sqrt((influence2 / n + 3 / n) / (n - 1)))
     return ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor)
 
 
@@ -98,10 +98,17 @@ def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.nda
     """`variance` of samples of which only the second and fourth central moment are known, of any shape."""
     second, fourth = np.asarray(second), np.asarray(fourth)
     with np.errstate(invalid="ignore", divide="ignore"):
-        influence2 = np.where(second > 0, count * (fourth / second**2 - 1), 0.0)
-        factor = np.exp(_Z * np.sqrt(np.maximum(influence2, 0) / (count - 1) / count))
+        kurtosis = np.where(second > 0, fourth / second**2, 1.0)
+    correction = count / (count - _Z)
+    error = correction * np.sqrt(np.maximum(kurtosis - 1 + 3 / count, 0) / (count - 1))
     estimate = second * count / (count - 1)
-    return estimate, estimate / factor, estimate * factor
+    middle = correction * estimate
+    return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
+
+
+def _is_constant(x: Sample) -> bool:
+    """Whether what spread there is may be rounding."""
+    return bool(x.moments[0] <= (8 * np.finfo(float).eps * x.mean) ** 2)
 
 
 def _unbiased(x: Sample) -> float:

@@ -29,7 +29,9 @@ class Sample:
 
     @cached_property
     def mean(self) -> float:
-        return float(sum(piece.sum() for piece in self.pieces()) / self.count)
+        # From the first value on: equal numbers have themselves as their mean, to the last bit.
+        first = float(next(piece[0] for piece in self.pieces() if len(piece)))
+        return first + float(sum((piece - first).sum() for piece in self.pieces()) / self.count)
 
     @cached_property
     def moments(self) -> tuple[float, float]:

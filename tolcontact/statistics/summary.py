@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.errors import ArchiveError
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
@@ -13,6 +14,7 @@ from tolcontact.statistics.sample import Sample
 ESTIMATE = ("estimate", "lower", "upper")
 PERCENTILES = (0.135, 5, 50, 95, 99.865)
 STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
+LEAST = 2
 PIECE = 100_000  # realizations that are read at once
 OUTSIDE = "outside tolerance"
 UNTOUCHED, NOT_ASSEMBLABLE = (words.STATUS_MEANINGS.index(word) for word in ("untouched", "not_assemblable"))
@@ -31,8 +33,13 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     penetration     (state)                              largest true penetration of any contact point [mm]
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
+
+    Raises ArchiveError where fewer than LEAST realizations are finished.
     """
-    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
+    done = finished(results)
+    if done < LEAST:
+        raise ArchiveError(f"{done} realizations are finished, which is too few for statistics; go on with --resume")
+    rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
     measures = range(rows.sizes[words.MEASURE])
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
     values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
