@@ -39,6 +39,7 @@ class ContactResolver:
         self._size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._step = LinearStep(program, group)
         self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
+        self._accuracy = program.plugin.accuracy
         self._method = program.method
         self._surfaces = [program.nominal.pairs[pair].surface for pair in group.group.pairs]
         self._scans, self._candidates = [], []
@@ -85,6 +86,7 @@ class ContactResolver:
             relative=relative[rows],
             residual=np.full(len(rows), np.inf),
             slack=np.full((len(rows), len(scans)), np.inf),
+            astray=np.zeros(len(rows)),
             iterations=np.zeros(len(rows), dtype=int),
             multipliers=np.zeros((len(rows), self._step.spans[-1].stop)),
             slots=[Slots.empty(len(rows), SLOTS) for _ in self._step.varying],
@@ -109,9 +111,14 @@ class ContactResolver:
             scans = self._found(result.relative) if self._method.search == "iterated" else scans
         least = least_gaps(scans, result.relative, task.deviations)
         result.gap_min[rows, 1] = least
-        if self._method.resolution == "exact" and self._method.active_set == "closed":
+        if self._method.resolution == "exact":
             # The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts.
-            result.residual[:] = np.maximum(result.residual, np.max(-least - result.slack, axis=1))
+            for k, (scan, may_carry) in enumerate(zip(scans, task.may_carry, strict=True)):
+                inside = -least[:, k]
+                if may_carry is not None:
+                    inside = scan.deepest(result.relative[:, k], task.deviations, may_carry)[1].max(axis=1)
+                result.residual[:] = np.maximum(result.residual, inside - result.slack[:, k])
+            result.residual[:] = np.maximum(result.residual, result.astray)
         return result
 
     def _found(self, relative: np.ndarray) -> list[PairScan]:
@@ -158,7 +165,9 @@ class ContactResolver:
         if self._method.resolution == "linearized":
             self._step.take(task, result, scans, moving)
             return
-        best = result.poses.copy(), result.relative.copy(), np.full(result.slack.shape, np.inf)
+        kept = result.poses, result.relative, result.multipliers, result.astray, result.slack
+        best = [values.copy() for values in kept]
+        best[-1][:] = np.inf
         for number, firmness in enumerate(LINEAR + CURVED):
             curved = number >= len(LINEAR)
             step, scaled = self._step.take(task, result, scans, moving, firmness=firmness, newton=curved)
@@ -173,19 +182,23 @@ class ContactResolver:
                 return
             if curved:
                 self._keep_best(best, task, result, scans, moving)
-        in_conflict = (result.slack[moving] > self._step.tolerance).any(axis=1)
-        stuck = moving[in_conflict]
-        result.poses[stuck], result.relative[stuck], result.slack[stuck] = (kept[stuck] for kept in best)
+        stuck = moving[(result.slack[moving] > self._step.tolerance).any(axis=1)]
+        for values, better in zip(kept, best, strict=True):
+            values[stuck] = better[stuck]
+        # Without rest there is an answer only where penetration is: where the parts contradict each other.
+        in_conflict = (result.slack[moving] > self._accuracy).any(axis=1)
         result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, scaled[on]))
 
     def _keep_best(
-        self, best: tuple[np.ndarray, ...], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
+        self, best: list[np.ndarray], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
     ) -> None:
-        """Put into `best` (poses, relative, true penetration of each pair) what is better than it."""
+        """Put into `best` (poses, relative, multipliers, astray, true penetration of each pair) what is better than it."""
         inside = np.maximum(-least_gaps(scans, result.relative[rows], task.deviations[rows]), 0)
-        better = inside.max(axis=1) < best[-1][rows].max(axis=1)
-        for kept, new in zip(best, (result.poses[rows], result.relative[rows], inside), strict=True):
-            kept[rows[better]] = new[better]
+        wrong, before = np.maximum(inside.max(axis=1), result.astray[rows]), np.maximum(best[-1].max(axis=1), best[-2])[rows]
+        better = rows[wrong < before]
+        for values, new in zip(best[:-1], (result.poses, result.relative, result.multipliers, result.astray), strict=True):
+            values[better] = new[better]
+        best[-1][better] = inside[wrong < before]
 
     def _drift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
         """How far `rows` have come from their raw pose, in sizes of the parts. A force may find nothing to rest on."""

@@ -11,6 +11,7 @@ from numba import njit
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
 LANES, CHUNK = 8, 256
+ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen terms are rounded by less
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
@@ -24,14 +25,16 @@ def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
-def _bounds(boxes, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
+def _bounds(boxes, beyond, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
     """Of some boxes the gap in their middle, and how far gaps can be from that, into middle and reach (count,).
 
-    boxes (2, coordinate, box): centres and half widths of the coordinates, without the first one, which is 1.
+    boxes (2, coordinate, box): centres and half widths of the coordinates, without the first one, which is 1. `beyond`: how
+    far a point may stand out besides.
     """
+    least = beyond + ROUNDING * abs(of[0])
     for box in range(count):
         middle[box] = of[0]
-        reach[box] = 0.0
+        reach[box] = least
     for c in range(1, of.size):
         slope, size = of[c], abs(of[c])
         centres, halves = boxes[0, c - 1, first : first + count], boxes[1, c - 1, first : first + count]
@@ -81,18 +84,18 @@ def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[n
 def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
     """For each realization the number of points below `activity` (n,), and their moments (n, side * 10).
 
-    points        see PairScan: (basis, coordinates, locators, leaves, branches, boxes of the leaves, boxes of the branches)
+    points        see PairScan: (basis, coordinates, locators, leaves, branches, boxes of the leaves, of the branches, beyond)
     tables        (side * moment, point)
     leaf_sums     (leaf, side * moment), and
     branch_sums   (branch, side * moment): of all points there
     """
-    basis, coordinates, locators, leaves, branches, leaf_boxes, branch_boxes = points
+    basis, coordinates, locators, leaves, branches, leaf_boxes, branch_boxes, beyond = points
     of, gaps, counts, lanes = np.empty(basis.shape[1]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     middle_here, reach_here = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _coefficients(basis, relative[k], of)
-        _bounds(branch_boxes, 0, middle.size, of, middle, reach)
+        _bounds(branch_boxes, beyond, 0, middle.size, of, middle, reach)
         number = 0
         for branch in range(middle.size):
             if middle[branch] - reach[branch] >= activity:
@@ -103,7 +106,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                 for moment in range(moments.shape[1]):
                     moments[k, moment] += branch_sums[branch, moment]
                 continue
-            _bounds(leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle_here, reach_here)
+            _bounds(leaf_boxes, beyond, first_leaf, end_leaf - first_leaf, of, middle_here, reach_here)
             for leaf in range(first_leaf, end_leaf):
                 here = leaf - first_leaf
                 if middle_here[here] - reach_here[here] >= activity:
@@ -129,9 +132,9 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
 @njit(cache=True, nogil=True, error_model="numpy", inline="always")
 def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
     """The deepest point of some leaves, if it is below `lowest` or as low and before `where`; its gap and number."""
-    _, coordinates, locators, leaves, _, leaf_boxes, _ = points
+    _, coordinates, locators, leaves, _, leaf_boxes, _, beyond = points
     gaps, middle, reach = scratch
-    _bounds(leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle, reach)
+    _bounds(leaf_boxes, beyond, first_leaf, end_leaf - first_leaf, of, middle, reach)
     promising = 0
     for here in range(1, end_leaf - first_leaf):
         if middle[here] - reach[here] < middle[promising] - reach[promising]:
@@ -160,13 +163,13 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
     clusters    (cluster + 1,): the first branch of each cluster, and the end
     may_carry   (n, point), only these points are looked at; all where it is (n, 0)
     """
-    basis, _, _, leaves, branches, _, branch_boxes = points
+    basis, _, _, leaves, branches, _, branch_boxes, beyond = points
     of = np.empty(basis.shape[1])
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _coefficients(basis, relative[k], of)
-        _bounds(branch_boxes, 0, middle.size, of, middle, reach)
+        _bounds(branch_boxes, beyond, 0, middle.size, of, middle, reach)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
             lowest, where = below, leaves[branches[begin]]

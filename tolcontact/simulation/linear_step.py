@@ -133,6 +133,7 @@ class LinearStep:
         result.relative[rows[solved]] = answer["relative"].reshape(len(rows), *relative)[solved]
         result.residual[rows] = np.where(solved, residual, np.inf)
         result.slack[rows[solved]] = slack[solved]
+        result.astray[rows[solved]] = answer["astray"][solved, 0]
         multipliers = np.maximum(answer["multipliers"], 0)
         result.multipliers[rows[solved]] = multipliers[solved]
         slots = [s.carrying(multipliers[:, self.spans[k]]) for k, s in zip(self.varying, slots, strict=True)]

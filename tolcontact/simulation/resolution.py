@@ -36,6 +36,7 @@ class Resolution:
                 of the objective
     slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
                 for it, the true penetration at the best poses on the way, which are kept
+    astray      (row,) [mm]: how far two-sided locators, where they hold, are from their place at `poses`
     iterations  (row,): linear steps taken
     multipliers (row, row of the QP): reactions in the last QP
     slots       the points that carry most, for the next QP to start with; one for each pair whose points in the QP change
@@ -51,6 +52,7 @@ class Resolution:
     relative: np.ndarray
     residual: np.ndarray
     slack: np.ndarray
+    astray: np.ndarray
     iterations: np.ndarray
     multipliers: np.ndarray
     slots: list[Slots]

@@ -67,7 +67,7 @@ def simulate_block(
 ) -> Block:
     """Raw and corrected states for given deviations (realization, locator) [mm]."""
     if resolvers is None:
-        resolvers = [ContactResolver(program, group) for group in program.groups]
+        resolvers = [ContactResolver(program, group).twin() for group in program.groups]
     nominal, count, accuracy = program.nominal, len(deviations), program.plugin.accuracy
     placed = program.place(deviations=deviations)
     raw = placed["poses"].reshape(count, len(nominal.parts), ENTRIES)
@@ -92,6 +92,8 @@ def simulate_block(
         iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
         carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying(resolver.spans)
         reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions(resolver.spans)
+    lost = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are no numbers touch nothing
+    touched[lost], solved[lost], residual[lost] = True, False, np.inf
     measured = measured_raw.copy()
     measured[touched], _ = _observe(program, poses[touched])
 

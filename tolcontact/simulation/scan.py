@@ -8,6 +8,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -100,7 +101,9 @@ class CompiledScan(PairScan):
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, moments.reshape(count, -1))
+        kernel.survey(
+            self._points, self._tables, *self._sums, poses, heights, activity, active, moments.reshape(count, len(self._tables))
+        )
         return active, moments
 
     def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
@@ -123,15 +126,17 @@ class CompiledScan(PairScan):
         return points, gaps
 
     @cached_property
-    def _points(self) -> tuple[np.ndarray, ...]:
+    def _points(self) -> tuple[Any, ...]:
         """What the kernel knows of the points. The height of a point that stands out is not bounded."""
-        rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0) if self.locators is None else np.inf
+        rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0)
         boxes = []
         for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
             low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
             boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
-        columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
-        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes
+        columns, beyond = (
+            (np.array([], dtype=np.int64), 0.0) if self.locators is None else (self.locators.astype(np.int64), np.inf)
+        )
+        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes, beyond
 
     @cached_property
     def _tables(self) -> np.ndarray:

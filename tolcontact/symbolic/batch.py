@@ -62,7 +62,8 @@ class Expressions:
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Outputs (realization, stored entry) for inputs (realization, stored entry)."""
         if self._native is None and self._is_due(len(inputs[0])):
-            with contextlib.suppress(UnknownInstructionError):
+            # Whatever LLVM cannot do on this machine CasADi can.
+            with contextlib.suppress(UnknownInstructionError, RuntimeError):
                 self._native = Native(self._function)  # other threads go on interpreting meanwhile
         if self._native is not None:
             return self._native(inputs)
@@ -158,8 +159,11 @@ class _Buffered:
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:count] = array
             buffer[count:] = array[-1:]
-        with quiet() if self.is_new else contextlib.nullcontext():
-            self._evaluate()
+        try:
+            with quiet() if self.is_new else contextlib.nullcontext():
+                self._evaluate()
+        except RuntimeError:  # CasADi's only exception: bounds that are no numbers
+            return False
         self.is_new = False
         for buffer, array in zip(self._outputs, outputs, strict=True):
             array[:] = buffer[:count]

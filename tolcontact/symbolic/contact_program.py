@@ -32,7 +32,7 @@ SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
 INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "reactions", "bend", "P_m", "P_r", "n_r", "filled")
-OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step")
+OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step", "astray")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +86,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
                          length 1, or how far a gap remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|
+    astray               how far two-sided locators, where they hold, are from their place at `corrected` [mm]
     """
     standing = tuple(_standing(gaps[index], method) for index in group.pairs)
     varying = sum(points is None for points in standing)
@@ -205,6 +206,7 @@ def _around_the_solver(
         ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
         SLACK * s,
         ca.vertcat(ca.norm_inf(z), ca.norm_inf(y)),
+        ca.norm_inf(_held(nominal, group, poses, deviations)[1]) if held else ca.SX(0),
     ]
     step = _whitening(U_in) @ y
     results = [ca.densify(ca.substitute(result, z, step)) for result in results]
@@ -256,8 +258,13 @@ def _pairs(nominal: Nominal, group: Group, poses: Sequence[Pose]) -> list[Pose]:
     ]
 
 
-def _held(nominal: Nominal, group: Group, poses: Sequence[Pose], deviations: ca.SX, z: ca.SX) -> tuple[int, ca.SX]:
-    """How far the two-sided locators of the free parts are from where they hold their part [mm], and their number."""
+def _held(
+    nominal: Nominal, group: Group, poses: Sequence[Pose], deviations: ca.SX, z: ca.SX | None = None
+) -> tuple[int, ca.SX]:
+    """How far the two-sided locators of the free parts are from where they hold their part [mm], and their number.
+
+    To first order in `z`, if that is given.
+    """
     labels = np.cumsum([0, *(len(part.labels) for part in nominal.parts)])
     apart = []
     for part in group.free:

@@ -38,7 +38,7 @@ class ContactSolver:
         return self._solved(self._first, arrays)
 
     def again(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
-        """A second try of what was missed, with what the plugin's entry changes for that, and without memory of others."""
+        """A second try of what was missed, with what the plugin's entry changes for that, and without memory of the first."""
         if self._second is None:
             self._second = _PluginSolver(self._program, second=True)
         answer = self._solved(self._second, arrays)

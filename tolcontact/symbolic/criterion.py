@@ -103,14 +103,16 @@ def _springs(nominal: Nominal, group: Group, raw: Sequence[Pose], now: Sequence[
     return energy, total or 1.0
 
 
-def two_sided(nominal: Nominal, group: Group, part: int, poses: Sequence[Pose], z: ca.SX) -> ca.SX:
+def two_sided(nominal: Nominal, group: Group, part: int, poses: Sequence[Pose], z: ca.SX | None = None) -> ca.SX:
     """How far each two-sided locator of a part is from its nominal place, along its direction [mm] (locator, 1).
 
-    Seen from what the part is located on, and to first order in `z`.
+    Seen from what the part is located on; to first order in `z`, if that is given.
     """
     own = nominal.parts[part]
     X = poses[group.position(part)]
-    X_PM = X if own.parent is None else affine(relative(X, poses[group.position(own.parent)]), z)
+    X_PM = X if own.parent is None else relative(X, poses[group.position(own.parent)])
+    if own.parent is not None and z is not None:
+        X_PM = affine(X_PM, z)
     P, n = own.locator_points[~own.one_sided], own.locator_directions[~own.one_sided]
     return ca.vertcat(*(ca.dot(ca.DM(b), X_PM.place(ca.DM(a)) - ca.DM(a)) for a, b in zip(P, n, strict=True)))
 

@@ -47,7 +47,7 @@ PLUGINS = {
             second={"daqp": {"primal_tol": 1e-10, "dual_tol": 1e-12}},
         ),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}, 1e-9),
-        Plugin("highs", {"highs": {"output_flag": False}}, 1e-6),
+        Plugin("highs", {"highs": {"output_flag": False}}, 1e-6, second={}, remembers=True),
         Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}, 1e-6),
         Plugin("gurobi", {}, 1e-5),
         Plugin("cplex", {}, 1e-5),
