@@ -226,3 +226,21 @@ def bar_in_a_half_pipe(spacing: float) -> tc.Assembly:
     a.measure("height", bar.point(0, 0, 30), along="y")
     a.measure("aside", bar.point(0, 0, 30), along="x")
     return a
+
+
+def stopped(stops: int = 1) -> tc.Assembly:
+    """A block on six two-sided locators, and in its way one-sided ones, which push it."""
+    a = tc.Assembly("stopped")
+    a.part("base", tc.Box(100, 100, 10), at=(0, 0, -10), fixed=True)
+    block = a.part("block", tc.Box(50, 30, 20))
+    places = {
+        "Z1": ((5, 5, 0), "z"), "Z2": ((45, 5, 0), "z"), "Z3": ((25, 25, 0), "z"),
+        "Y1": ((5, 0, 10), "y"), "Y2": ((45, 0, 10), "y"), "X": ((0, 15, 10), "x"),
+    }  # fmt: skip
+    a.locate(
+        block,
+        [tc.Locator(name, *place, 1) for name, place in places.items()]
+        + [tc.Locator(f"stop {k}", (0, 5 + 7 * k, 5), "x", 1, one_sided=True) for k in range(stops)],
+    )
+    a.measure("face", block.point(50, 30, 20), along="x")
+    return a

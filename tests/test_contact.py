@@ -249,3 +249,19 @@ def test_a_free_part_carries_the_parts_that_stand_on_it():
     assert np.abs(run["poses"][:, CORRECTED, 1] - run["poses"][:, CORRECTED, 2]).max() < 1e-9
     assert np.abs(run["measured"][..., 0]).max() < 1e-9
     assert (run["status"] == Status.RESOLVED).sum() > 50
+
+
+@pytest.mark.parametrize("stops", [1, 2])
+@pytest.mark.parametrize("method", [{}, {"active_set": "initial"}, {"resolution": "exact"}], ids=str)
+def test_a_single_stop_holds(stops, method):
+    """Its height varies: a bound of the gap without it would pass over it."""
+    program, run = simulate(cases.stopped(stops), samples=200, solver="daqp", method=tc.Method(**method))
+    (pair,) = program.nominal.pairs
+    gaps = {}
+    for state in (RAW, CORRECTED):
+        R, t = R_t(run["poses"][:, state, 1])
+        places = pair.P_m @ R.swapaxes(1, 2) + t[:, None]
+        gaps[state] = ((places - pair.P_r) * pair.n_r).sum(axis=2) - run["deviations"][:, pair.locators]
+    assert (run["active"][:, 0] == (gaps[RAW] < 0).sum(axis=1)).all()
+    assert (gaps[RAW] < -0.1).any() and gaps[CORRECTED].min() > -1e-9
+    assert ((run["status"] == Status.RESOLVED) == (gaps[RAW] < 0).any(axis=1)).all()

@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.simulation import RAW, simulate_blocks
-from tolcontact.simulation.run import _observe
+from tolcontact.sampling import draw
+from tolcontact.simulation import RAW, Status, simulate_blocks
+from tolcontact.simulation.run import _observe, simulate_block
 from tolcontact.simulation.scan import PairScan, pair_scan
 from tolcontact.symbolic import batch, contact_program
 from tolcontact.symbolic.batch import Mapped
@@ -89,13 +90,25 @@ def test_only_corners_of_planar_contacts_can_be_the_deepest():
     assert np.abs(gaps.min(axis=1) - gaps[:, found.corners].min(axis=1)).max() < 1e-11
 
 
-@pytest.mark.parametrize("solver", ["daqp", "qpoases"])
+@pytest.mark.parametrize("solver", ["daqp", "qpoases", "highs"])
 def test_results_do_not_depend_on_the_number_of_threads(solver, monkeypatch):
     program = tc.build(cases.model("channel"), solver=solver, method=tc.Method(resolution="exact"))
     runs = [list(simulate_blocks(program, samples=260, seed=1, block=40, threads=threads)) for threads in (1, 2, 5, 1)]
     for name in ("poses", "measured", "gap_min", "reaction", "kkt_residual", "status", "iterations"):
         one, *others = (np.concatenate([getattr(block, name) for block in run]) for run in runs)
         assert all(np.array_equal(one, other) for other in others), name
+
+
+@pytest.mark.parametrize("make", [cases.ra1, cases.jaws], ids=["ra1", "jaws"])
+def test_what_is_no_number_is_a_row_that_did_not_converge(make):
+    program = tc.build(make(), solver="daqp")
+    deviations = draw(program.nominal, seed=1, start=0, stop=9)
+    expected = simulate_block(program, deviations)
+    deviations[4, 0] = np.nan
+    found = simulate_block(program, deviations)
+    assert found.status[4] == Status.NOT_CONVERGED and found.kkt_residual[4] == np.inf
+    others = np.arange(9) != 4
+    assert np.array_equal(found.poses[others], expected.poses[others])
 
 
 def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
@@ -107,7 +120,11 @@ def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notice
 
 
 @pytest.mark.parametrize("activity", [1e-9, 0.3])
-@pytest.mark.parametrize("make", [cases.ra1, cases.stack, lambda: cases.model("ra2")], ids=["ra1", "stack", "ra2"])
+@pytest.mark.parametrize(
+    "make",
+    [cases.ra1, cases.stack, lambda: cases.model("ra2"), cases.stopped, lambda: cases.stopped(2)],
+    ids=["ra1", "stack", "ra2", "one stop", "two stops"],
+)
 def test_compiled_scans_equal_those_in_numpy(make, activity):
     program = tc.build(make(), solver="daqp")
     block = next(simulate_blocks(program, samples=50, seed=1))

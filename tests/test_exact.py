@@ -8,7 +8,9 @@ from tests import cases, referee
 from tests.nonlinear import TrueProblem
 from tests.test_contact import R_t, simulate
 from tests.test_seating import table
+from tolcontact.sampling import draw
 from tolcontact.simulation import CORRECTED, RAW, Status
+from tolcontact.simulation.run import simulate_block
 
 JUDGED = {
     "ra1": (cases.ra1, "active points"),
@@ -94,6 +96,19 @@ def test_share_of_square_pins_that_do_not_fit():
     assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
     share = (run["status"] == Status.NOT_ASSEMBLABLE).mean()
     assert abs(share - 0.049133) < 3.3 * np.sqrt(0.049133 * (1 - 0.049133) / samples)
+
+
+def test_conflicts_do_not_loosen_two_sided_locators():
+    """Also with a solver that finds no rest there: poses of least penetration are poses that the locators allow."""
+    program = tc.build(cases.square_pins(), solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    block = simulate_block(program, draw(program.nominal, seed=8, start=0, stop=4000))
+    stuck = block.status == Status.NOT_ASSEMBLABLE
+    assert stuck.sum() > 100 and stuck[2217]
+    plate = program.nominal.parts[0]
+    R, t = R_t(block.poses[:, CORRECTED, 0])
+    places = plate.locator_points @ R.swapaxes(1, 2) + t[:, None]
+    moved = ((places - plate.locator_points) * plate.locator_directions).sum(axis=2)[:, ~plate.one_sided]
+    assert np.abs(moved[stuck | (block.status == Status.RESOLVED)]).max() < 1e-8
 
 
 def test_searching_again_follows_curved_surfaces():

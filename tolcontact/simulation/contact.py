@@ -25,6 +25,7 @@ CLUSTERS = 6
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
 NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
 SETTLED = 1e-6  # mm: poses that move less after a search have settled
+PRICE = 1e3  # of a locator that does not hold, beside penetration
 ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
 LOST = 1e5  # sizes of the parts: no step will bring it back
 
@@ -118,7 +119,9 @@ class ContactResolver:
                 if may_carry is not None:
                     inside = scan.deepest(result.relative[:, k], task.deviations, may_carry)[1].max(axis=1)
                 result.residual[:] = np.maximum(result.residual, inside - result.slack[:, k])
-            result.residual[:] = np.maximum(result.residual, result.astray)
+            # Nor does penetration excuse locators that do not hold.
+            excused = np.where(result.astray > self._accuracy, result.slack.max(axis=1), 0)
+            result.residual[:] = np.maximum(result.residual, result.astray + excused)
         return result
 
     def _found(self, relative: np.ndarray) -> list[PairScan]:
@@ -194,11 +197,12 @@ class ContactResolver:
     ) -> None:
         """Put into `best` (poses, relative, multipliers, astray, true penetration of each pair) what is better than it."""
         inside = np.maximum(-least_gaps(scans, result.relative[rows], task.deviations[rows]), 0)
-        wrong, before = np.maximum(inside.max(axis=1), result.astray[rows]), np.maximum(best[-1].max(axis=1), best[-2])[rows]
-        better = rows[wrong < before]
+        wrong = inside.max(axis=1) + PRICE * result.astray[rows]
+        is_better = wrong < best[-1][rows].max(axis=1) + PRICE * best[-2][rows]
+        better = rows[is_better]
         for values, new in zip(best[:-1], (result.poses, result.relative, result.multipliers, result.astray), strict=True):
             values[better] = new[better]
-        best[-1][better] = inside[wrong < before]
+        best[-1][better] = inside[is_better]
 
     def _drift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
         """How far `rows` have come from their raw pose, in sizes of the parts. A force may find nothing to rest on."""
