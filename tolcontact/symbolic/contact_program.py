@@ -162,7 +162,8 @@ def _around_the_solver(
     if method.resolution == "exact":
         curved = [quadratic(part, X, moves) for part, X in zip(group.carried, now, strict=True)]
         curvature = _curvature(nominal, group, method, moments, firmness, raw, curved, z, ca.vertcat(*bends) / goal.scale) - Q
-        # Rows that carry are held in the objective, too: it does not change the answer, and makes it convex again.
+        # Rows that carry are held in the objective, too: it does not change the answer, and makes it convex again, or nearly:
+        # what is checked are the freedoms of each mover, not those of several together.
         hold = (1 + 2 * ca.sum1(reactions) / goal.scale / group.length) * ca.if_else(reactions > 0, fill, 0)
         curvature += A.T @ ca.diag(hold) @ A
         counts = ca.logic_and(newton, _is_convex(Q + curvature))
