@@ -72,8 +72,8 @@ def run(
     method = Method(resolution=resolution, objective=objective)
     program = build(load_model(model), solver=solver, method=method)
     with Progress(
-        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn(),
-        console=Console(stderr=True), transient=True,
+        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TimeRemainingColumn(), console=Console(stderr=True), transient=True,
     ) as bar:  # fmt: skip
         task = bar.add_task(program.nominal.assembly.name, total=samples)
         results = run_model(
@@ -118,7 +118,7 @@ def compare(
         readable = found.astype(object).where(found.notnull(), None)
         typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
     else:
-        Console(highlight=False, width=80).print(comparison_text(found))
+        Console(highlight=False, markup=False, width=80).print(comparison_text(found))
 
 
 def _names(words: str) -> list[str]:
@@ -164,7 +164,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 def _print_summary(results: xr.DataTree) -> None:
     found = summarize(results)
-    Console(highlight=False).print(summary_text(found))
+    Console(highlight=False, markup=False).print(summary_text(found))
     failed = int(found["by_status"][Status.NOT_CONVERGED] + found["by_status"][Status.NOT_ASSEMBLABLE])
     if failed > FAILED_SHARE * found.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)

@@ -7,11 +7,13 @@ Contenders take turns; every figure is the median of the turns, in microseconds 
 
 import argparse
 import contextlib
+import hashlib
 import resource
 import runpy
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import matplotlib as mpl
@@ -31,7 +33,7 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
-TURNS = 5
+TURNS, PAIRS = 5, 11
 batch.ENOUGH = 0  # compile Functions at once: what counts here is the cost of many realizations
 EXACT = tc.Method(resolution="exact")
 CLOSED = "loop over qpsolvers, daqp, until closed"
@@ -98,13 +100,13 @@ def against_loops(samples: int) -> None:
         "curved, 3003 points": (shapes.slab(3000, 200.0), samples // 2),
     }
     columns = {}
-    for name, (a, samples) in cases.items():
-        contenders = {f"ours, {solver}": ours(a, samples, solver=solver) for solver in ("daqp", "qpoases")}
+    for name, (a, many) in cases.items():
+        contenders = {f"ours, {solver}": ours(a, many, solver=solver) for solver in ("daqp", "qpoases")}
         # Not highs: CasADi's copy of it and highspy's, which qpsolvers loads, crash each other in one process.
         contenders |= {f"ours, {solver}": ours(a, fewest, solver=solver) for solver in ("piqp", "proxqp", "osqp")}
         for solver in ("daqp", "qpoases"):
-            contenders[f"ours, {solver}, all processors"] = ours(a, samples, solver=solver, threads=running.processors())
-        contenders["ours, daqp, exact"] = ours(a, samples // 2, method=EXACT)
+            contenders[f"ours, {solver}, all processors"] = ours(a, many, solver=solver, threads=running.processors())
+        contenders["ours, daqp, exact"] = ours(a, many // 2, method=EXACT)
         contenders["loop over DAQP's own interface"] = loop(a, few, peers.with_daqp)
         contenders["the same, until closed"] = loop(a, few, peers.with_daqp, "closed")
         for solver, count in {
@@ -136,6 +138,41 @@ def against_loops(samples: int) -> None:
             f" (qpoases {of['ours, qpoases'] / of['ours, qpoases, all processors']:.2f}); exact costs"
             f" {of['ours, daqp, exact'] / of['ours, daqp']:.1f} times linearized"
         )
+
+
+def against_threads(samples: int) -> None:
+    """One thread and all, one after the other: quartiles of many ratios, since others use the machine, too."""
+    threads = running.processors()
+    print(
+        f"\n| {threads} threads against one, {PAIRS} pairs | lower quartile | median | upper quartile |\n|---|---:|---:|---:|"
+    )
+    contenders = {"what the machine gives: hashing in C": [hashing(each) for each in (1, threads)]}
+    cases = {
+        "RA1": (model("ra1"), 4 * samples),
+        "RA2": (model("ra2"), samples),
+        "curved": (shapes.slab(3000, 200.0), samples // 2),
+    }
+    for name, (a, many) in cases.items():
+        for solver in ("daqp", "qpoases"):
+            contenders[f"{name}, {solver}"] = [ours(a, many, solver=solver, threads=each) for each in (1, threads)]
+    ratios = {contender: [] for contender in contenders}
+    for _ in range(PAIRS):
+        for contender, (one, every) in contenders.items():
+            ratios[contender].append(one() / every())
+    for contender, found in ratios.items():
+        print(f"| {contender} |", " | ".join(f"{ratio:.2f}" for ratio in np.quantile(found, [0.25, 0.5, 0.75])), "|")
+
+
+def hashing(threads: int) -> Contender:
+    """Work that shares nothing: neither memory nor the interpreter."""
+
+    def turn() -> float:
+        start = time.perf_counter()
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(lambda salt: hashlib.pbkdf2_hmac("sha256", b"", bytes([salt]), 100_000), range(16)))
+        return 1e6 * (time.perf_counter() - start)
+
+    return turn
 
 
 def against_size(samples: int, figure: Path) -> None:
@@ -274,13 +311,14 @@ def breakdown(samples: int) -> None:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--quick", action="store_true", help="few realizations: does it run?")
-    parts = ["loops", "size", "bodies", "packing", "breakdown", "runs"]
+    parts = ["loops", "threads", "size", "bodies", "packing", "breakdown", "runs"]
     options.add_argument("--only", choices=parts, help="one of the measurements")
     options.add_argument("--figure", type=Path, default=HERE / "cost.png")
     chosen = options.parse_args()
     samples = 2048 if chosen.quick else 16_384
     measurements = {
         "loops": lambda: against_loops(samples),
+        "threads": lambda: against_threads(samples),
         "size": lambda: against_size(samples, chosen.figure),
         "bodies": lambda: against_bodies(samples),
         "packing": lambda: against_packing(samples),
