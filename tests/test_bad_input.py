@@ -263,14 +263,14 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path):
 
 
 def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
-    bracketed = GOOD["measure"].replace("'height'", "'bolt [M8] [/b]'")  # which is no markup
+    bracketed = GOOD["measure"].replace("'height'", "'bolt [M8] [red]'")  # which is no markup
     model = script(tmp_path, {"measure": bracketed})
     ran = call(tmp_path, "run", model, "--samples", "200", "--out", "out.nc")
     told = call(tmp_path, "summary", "out.nc")
     assert ran.returncode == told.returncode == 0
     assert ran.stdout.startswith(told.stdout)
     assert max(map(len, told.stdout.splitlines())) <= 80
-    for words in ("6 sigma", "variance", "outside", "touched by contact", "bolt [M8] [/b]"):
+    for words in ("6 sigma", "variance", "outside", "touched by contact", "bolt [M8] [red]"):
         assert words in told.stdout
 
 
