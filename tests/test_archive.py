@@ -275,6 +275,15 @@ def test_resuming_with_fewer_realizations_completes_what_was_begun(archive, tmp_
     assert one.identical(other)
 
 
+def test_resuming_is_refused_where_contact_points_were_others(archive, tmp_path):
+    path = tmp_path / "copy.nc"
+    path.write_bytes(archive.read_bytes())
+    with netCDF4.Dataset(path, "r+") as file:
+        file["contact/moving_point"][3, 1] += 0.01
+    with pytest.raises(ArchiveError, match="contact points were others"):
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, resume=True)
+
+
 LONG = """
 import sys
 from tests import cases

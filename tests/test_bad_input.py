@@ -252,6 +252,16 @@ def test_an_existing_archive_is_not_overwritten_without_being_asked(tmp_path):
     assert (tmp_path / "out.nc").read_bytes() != before
 
 
+def test_a_comment_in_the_script_does_not_make_another_model(tmp_path):
+    model = script(tmp_path, {})
+    run = ("run", model, "--samples", "50", "--out", "out.nc")
+    first = call(tmp_path, *run)
+    model.write_text("# moved\n" + model.read_text())
+    again = call(tmp_path, *run, "--resume")
+    assert first.returncode == again.returncode == 0, again.stderr
+    assert again.stdout == first.stdout
+
+
 def test_a_file_that_is_no_archive_is_refused(tmp_path):
     (tmp_path / "notes.nc").write_text("these are notes\n")
     for name in ("notes.nc", "nowhere.nc"):
@@ -263,14 +273,14 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path):
 
 
 def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
-    bracketed = GOOD["measure"].replace("'height'", "'bolt [M8] [red]'")  # which is no markup
-    model = script(tmp_path, {"measure": bracketed})
+    bracketed = HEADER.replace('"top"', '"top [red]"')  # which is no markup
+    model = script(tmp_path, {"whole": bracketed + "".join(GOOD.values())})
     ran = call(tmp_path, "run", model, "--samples", "200", "--out", "out.nc")
     told = call(tmp_path, "summary", "out.nc")
     assert ran.returncode == told.returncode == 0
     assert ran.stdout.startswith(told.stdout)
     assert max(map(len, told.stdout.splitlines())) <= 80
-    for words in ("6 sigma", "variance", "outside", "touched by contact", "bolt [M8] [red]"):
+    for words in ("6 sigma", "variance", "outside", "touched by contact", "top [red]"):
         assert words in told.stdout
 
 

@@ -111,6 +111,13 @@ def test_what_is_no_number_is_a_row_that_did_not_converge(make):
     assert np.array_equal(found.poses[others], expected.poses[others])
 
 
+def test_a_block_alone_does_not_depend_on_those_before():
+    program = tc.build(cases.stack(), solver="qpoases", method=tc.Method(resolution="exact"))
+    deviations = draw(program.nominal, seed=1, start=0, stop=50)
+    one, other = (simulate_block(program, deviations) for _ in range(2))
+    assert np.array_equal(one.poses, other.poses)
+
+
 def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
     monkeypatch.setattr(batch, "ENOUGH", 150)
     program = tc.build(cases.ra1(), solver="daqp")
