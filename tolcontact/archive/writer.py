@@ -76,7 +76,8 @@ class ArchiveWriter:
 
     def _go_on(self, path: Path, nominal: Nominal) -> None:
         """Open the file and take up the sums of its last checkpoint."""
-        self._path, self._file = path, _opened(path, "r+")
+        with _refusals_told(path):
+            self._path, self._file = path, _opened(path, "r+")
         self._nominal = nominal
         self.samples = len(self._file.dimensions[words.REALIZATION])
         self._moments = [_of_states(nominal, part) for part in nominal.parts]

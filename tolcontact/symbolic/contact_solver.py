@@ -58,9 +58,7 @@ class ContactSolver:
     def _solved_together(self, solver: "_PluginSolver", inputs: list[np.ndarray]) -> list[np.ndarray]:
         assembled = self._assemble(inputs)
         H, f, A, lower, _, U, length = assembled
-        before = inputs[INPUTS.index("reactions")]
-        likely = np.where(before.any(axis=1, keepdims=True), before, lower[:, : before.shape[1]]) > 0
-        solution, failed = solver(assembled, likely)
+        solution, failed = solver(assembled, inputs[INPUTS.index("reactions")])
         outputs = self._finish([*inputs, H, f, A, lower, U, length, *solution])
         for output in outputs:
             output[failed] = np.nan
@@ -85,16 +83,18 @@ class _PluginSolver:
         with quiet():
             self._solve = Mapped(qp, given)
 
-    def __call__(self, assembled: list[np.ndarray], likely: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    def __call__(self, assembled: list[np.ndarray], before: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
         """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) where the solver gave up.
 
-        likely (realization, row): rows that probably carry, those that did in the step before, in a first step the violated
-        ones. A solver that starts from the previous problem's rows has less to change where problems alike follow each other.
+        A solver that starts from the previous problem's rows has less to change where problems alike follow each other:
+        those in which the same rows probably carry, that did `before` (realization, row), or in a first step are violated.
         """
         problems = [assembled[i] for i in self._inputs]
         if not self._remembers:
             solved, failed = self._solve(problems)
             return [solved[i] for i in self._results], failed
+        violated = assembled[ASSEMBLED["lba"]][:, : before.shape[1]]
+        likely = np.where(before.any(axis=1, keepdims=True), before, violated) > 0
         order = np.lexsort(np.packbits(likely, axis=1).T)
         solved, failed = self._solve([problem[order] for problem in problems])
         back = np.argsort(order)
