@@ -17,7 +17,7 @@ from tolcontact.simulation import kernel
 from tolcontact.symbolic import MOMENTS, GapMap
 
 SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
-BEYOND = 1e300
+BEYOND = 1e300  # where no point is
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,9 +101,8 @@ class CompiledScan(PairScan):
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
-        kernel.survey(
-            self._points, self._tables, *self._sums, poses, heights, activity, active, moments.reshape(count, len(self._tables))
-        )
+        flat = moments.reshape(count, len(self._tables))
+        kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
         return active, moments
 
     def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
@@ -133,10 +132,8 @@ class CompiledScan(PairScan):
         for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
             low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
             boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
-        columns, beyond = (
-            (np.array([], dtype=np.int64), 0.0) if self.locators is None else (self.locators.astype(np.int64), np.inf)
-        )
-        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes, beyond
+        columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
+        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes, np.inf if columns.size else 0.0
 
     @cached_property
     def _tables(self) -> np.ndarray:
