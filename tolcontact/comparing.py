@@ -50,17 +50,20 @@ def compare(
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
     first = _simulated(programs[0], samples, seed)
     rows = [_row(first, first, corners), *(_row(_simulated(each, samples, seed), first, corners) for each in programs[1:])]
+    labels = {
+        words.SOLVER: [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
+        words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+        words.EXTENT: list(QUANTILES),
+    }
     return xr.Dataset(
         {of.name: (of.dims, np.array([row[of.name] for row in rows]), of.all_attributes) for of in words.COMPARED},
         coords={
-            words.SOLVER: [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
-            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
-            words.EXTENT: list(QUANTILES),
+            **{of.name: (of.dims, labels[of.name], of.all_attributes) for of in words.COMPARED_LABELS},
             words.MEASURE: [measure.name for measure in nominal.measures],
         },
         attrs={
             "title": f"comparison of solvers on {assembly.name}",
-            "reference_solver": " ".join([solvers[0], *_apart(methods[0], methods)]),
+            "reference_solver": labels[words.SOLVER][0],
             "realizations": samples,
             "seed": seed,
             "resolution": ", ".join(dict.fromkeys(method.resolution for method in methods)),
