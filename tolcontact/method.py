@@ -1,6 +1,7 @@
 """The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
 
 from dataclasses import dataclass
+from math import pi
 
 from tolcontact.errors import OptionError
 
@@ -30,6 +31,10 @@ class Method:
     activity        a contact point counts as active below this gap [mm]
     search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected again
                     at the corrected pose until they stay (paper, 2.2)
+    near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other starts,
+                    and never certified
+    near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
+                    their raw places, is doubted, too, and certified only if the faces themselves are free of penetration
     """
 
     resolution: str = "linearized"
@@ -39,6 +44,8 @@ class Method:
     active_set: str = "closed"
     activity: float = 1e-9
     search: str = "fixed"
+    near_turn: float = 1.0
+    near_travel: float = 0.5
 
     def __post_init__(self) -> None:
         choices = {
@@ -55,5 +62,9 @@ class Method:
             raise OptionError(f"eta is {self.eta!r}; expected a small number between 0 and 1")
         if not 0 <= self.activity < float("inf"):
             raise OptionError(f"activity is {self.activity!r}; expected a gap in mm, 0 or above")
+        if not 0 < self.near_turn <= pi:
+            raise OptionError(f"near_turn is {self.near_turn!r}; expected an angle in rad, above 0 and at most pi")
+        if not 0 < self.near_travel < float("inf"):
+            raise OptionError(f"near_travel is {self.near_travel!r}; expected a number of part sizes above 0")
         if self.search == "iterated" and self.resolution != "exact":
             raise OptionError('search is "iterated" with a linearized resolution; it needs resolution "exact"')

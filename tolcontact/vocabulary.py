@@ -16,7 +16,7 @@ SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
 
-STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable")
+STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable", "doubtful")
 UNFINISHED = -1
 
 
@@ -91,6 +91,8 @@ KKT_RESIDUAL = Variable(
     "mm",
 )
 ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "linear steps that the contact problem took", "1")
+STARTS = Variable("starts", (REALIZATION,), "i1", "places that the steps to an answer were started from", "1")
+SECOND_ANSWERS = Variable("second_answers", (REALIZATION,), "i4", "QPs that another solver had to answer", "1")
 STATUS = Variable(
     "status",
     (REALIZATION,),
@@ -112,6 +114,8 @@ ROWS = (
     REACTION,
     KKT_RESIDUAL,
     ITERATIONS,
+    STARTS,
+    SECOND_ANSWERS,
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)

@@ -16,7 +16,7 @@ from tolcontact.assembly import Mesh
 from tolcontact.assembly.document import to_document
 from tolcontact.discretization import Nominal
 from tolcontact.statistics import FieldMoments
-from tolcontact.symbolic import Program
+from tolcontact.symbolic import ACCURACY, Program
 from tolcontact.vocabulary import Variable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
@@ -28,8 +28,8 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
     return {
         "solver": program.plugin.name,
         "solver_options": json.dumps(program.plugin.options),
-        "solver_second_try": json.dumps(program.plugin.second),
-        "solver_accuracy": program.plugin.accuracy,
+        "solver_second": ", ".join(program.plugin.second),
+        "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
         "weighting": method.objective if method.objective.endswith("points") else "none",
@@ -38,6 +38,8 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
         "active_set": method.active_set,
         "activity": method.activity,
         "search": method.search,
+        "near_turn": method.near_turn,
+        "near_travel": method.near_travel,
         "sampler": "monte-carlo",
         "seed": np.int64(seed),
         "samples": np.int64(samples),

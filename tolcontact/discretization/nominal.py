@@ -1,7 +1,8 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
+from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.layout import lay_out
@@ -50,6 +52,11 @@ class NominalPart:
     parent: int | None
     free: bool
 
+    @cached_property
+    def body(self) -> trimesh.Trimesh:
+        """Its mesh in its nominal place."""
+        return trimesh.Trimesh(self.place(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
+
     def place(self, p: np.ndarray) -> np.ndarray:
         """Own coordinates (..., 3) to nominal assembly coordinates (..., 3) [mm]."""
         R_WP, t_WP = self.placement
@@ -62,7 +69,7 @@ class ContactPoints:
 
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     `locators` holds the column of the deviation of each such point, by which the support stands out along n^r; it is
-    None for a pair of faces, whose `surface` is the reference face in its nominal place.
+    None for a pair of faces, whose `surface` is the reference face in its nominal place, and `own` the moving one.
     """
 
     name: str
@@ -73,6 +80,7 @@ class ContactPoints:
     n_r: np.ndarray
     locators: np.ndarray | None = None
     surface: Surface | None = None
+    own: Surface | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +91,19 @@ class Nominal:
     parts: tuple[NominalPart, ...]
     pairs: tuple[ContactPoints, ...]
     measures: tuple[Measure, ...]
+    _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
+
+    def face_pair(self, index: int) -> FacePair | None:
+        """The faces of a pair as they are; None for one-sided locators, which have none."""
+        pair = self.pairs[index]
+        if pair.own is None or pair.surface is None or pair.reference is None:
+            return None
+        if index not in self._face_pairs:
+            self._face_pairs[index] = FacePair(
+                side(pair.own, self.parts[pair.moving].body, len(pair.P_m)),
+                side(pair.surface, self.parts[pair.reference].body, len(pair.P_m)),
+            )
+        return self._face_pairs[index]
 
     @property
     def locator_labels(self) -> tuple[str, ...]:
@@ -266,7 +287,8 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
             + (" and overhangs the rim" if not over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
-    _, normals, _ = own.placed(*moving.placement).project(P_m[kept])
+    placed_own = own.placed(*moving.placement)
+    _, normals, _ = placed_own.project(P_m[kept])
     if ((normals * n_r[kept]).sum(axis=1) > 0).all():
         raise GeometryFault(
             f"its faces {pair.moving} and {pair.reference} look the same way, so one cannot rest on the other; "
@@ -280,6 +302,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         P_r[kept],
         n_r[kept],
         surface=target,
+        own=placed_own,
     )
 
 

@@ -74,6 +74,14 @@ class Surface:
         normals are interpolated between the corners of a facet: they change steadily as a point moves.
         """
         triangle, nearest = self.nearest(points)
+        over = self._overhang(points, triangle, nearest) <= max(margin, 1e-6 * self.mesh.scale)
+        return nearest, self.normals(triangle, nearest), over
+
+    def overhang(self, points: np.ndarray) -> np.ndarray:
+        """How far `points` (point, 3) [mm] stand beside the surface (point,) [mm]: 0 over it."""
+        return self._overhang(points, *self.nearest(points))
+
+    def _overhang(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> np.ndarray:
         facet = np.asarray(self.mesh.face_normals)[triangle]
         offset = points - nearest
         sideways = np.linalg.norm(offset - (offset * facet).sum(axis=1, keepdims=True) * facet, axis=1)
@@ -82,8 +90,7 @@ class Surface:
         # triangle may also touch the rim with a corner only.
         at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]
         at_rim |= (coordinates > 1 - 1e-9) & self._rim_corners[triangle]
-        overhangs = (sideways > max(margin, 1e-6 * self.mesh.scale)) & at_rim.any(axis=1)
-        return nearest, self.normals(triangle, nearest), ~overhangs
+        return np.where(at_rim.any(axis=1), sideways, 0.0)
 
 
 def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:

@@ -15,6 +15,7 @@ class Status(enum.IntEnum):
     RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
     NOT_CONVERGED = 2  # they do not hold, or one linear step cannot open all gaps: penetration remains
     NOT_ASSEMBLABLE = 3  # no pose without penetration was found near; the pose is the one of least penetration
+    DOUBTFUL = 4  # the conditions hold, but only far from the raw pose: beyond the limits of the method, so not certified
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +32,8 @@ class Block:
     status        (n,), Status
     kkt_residual  (n,) [mm], 0 where untouched
     iterations    (n,): linear steps taken, 0 where untouched
+    starts        (n,): places the steps were started from, 0 where untouched
+    second_answers (n,): QPs that another solver had to answer
     """
 
     start: int
@@ -44,6 +47,8 @@ class Block:
     status: np.ndarray
     kkt_residual: np.ndarray
     iterations: np.ndarray
+    starts: np.ndarray
+    second_answers: np.ndarray
 
     def __len__(self) -> int:
         return len(self.status)

@@ -4,6 +4,8 @@ The linearized resolution takes one linear step. The exact one goes on from the 
 they stay: a sequence of QPs. The first steps are like the paper's. What has not come to rest by then has freedoms that next to
 nothing holds, while the curvature of gaps and objective counts: it goes on with Newton steps, and holds those freedoms
 firmly first. With an iterated search, contact points are then projected again, and all of this repeated until the poses stay.
+
+Where that ends in a conflict, without an answer, or far from the raw pose, it is tried again from other starts.
 """
 
 import copy
@@ -11,15 +13,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tolcontact.simulation.linear_step import LinearStep
-from tolcontact.simulation.resolution import Resolution, Task
+from tolcontact import poses as pose
+from tolcontact.simulation.doubt import Doubt
+from tolcontact.simulation.linear_step import PENETRATION, LinearStep
+from tolcontact.simulation.resolution import CARRIES, Resolution, State, Task
 from tolcontact.simulation.scan import PairScan, least_gaps, pair_scan
-from tolcontact.simulation.search import placed, reach, search
+from tolcontact.simulation.search import reach, search
 from tolcontact.simulation.slots import Slots
-from tolcontact.symbolic import SLOTS, ContactGroup, Program
+from tolcontact.symbolic import ACCURACY, SLOTS, ContactGroup, Program
 
 LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
 CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
+STRIDE, CAREFUL = 0.5, 0.05  # rad: what a step may turn a part by; linear rows are wrong long before
 SEARCHES = 40
 CLUSTERS = 6
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
@@ -28,6 +33,7 @@ SETTLED = 1e-6  # mm: poses that move less after a search have settled
 PRICE = 1e3  # of a locator that does not hold, beside penetration
 ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
 LOST = 1e5  # sizes of the parts: no step will bring it back
+BETTER = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
 
 
 class ContactResolver:
@@ -37,12 +43,12 @@ class ContactResolver:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
+        self._energy = group.solve.energy
         self._size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._step = LinearStep(program, group)
-        self._at_rest = max(program.plugin.accuracy / 10, AT_REST)
-        self._accuracy = program.plugin.accuracy
         self._method = program.method
-        self._surfaces = [program.nominal.pairs[pair].surface for pair in group.group.pairs]
+        self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
+        self._standing = group.program.standing
         self._scans, self._candidates = [], []
         for position, index in enumerate(group.group.pairs):
             pair, gaps = program.nominal.pairs[index], program.gaps[index]
@@ -52,6 +58,7 @@ class ContactResolver:
             some = self._method.search == "fixed" and self._method.active_set == "closed"
             self._candidates.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if some else self._scans[-1])
         self._reaches = [reach(scan) for scan in self._scans] if self._method.search == "iterated" else []
+        self._doubt = Doubt(program.nominal, group.group, self._method, self._size)
 
     def twin(self) -> "ContactResolver":
         """The same for another thread."""
@@ -79,57 +86,132 @@ class ContactResolver:
         surveyed = self._scans if self._method.search == "fixed" else scans
         surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
         least = least_gaps(scans, relative, deviations)
-        inside = (least < -self._step.tolerance).any(axis=1)
+        inside = (least < -PENETRATION).any(axis=1)
         rows = np.arange(len(poses)) if self._method.objective == "seating" else np.flatnonzero(inside)
-        result = Resolution(
-            rows=rows,
-            poses=poses[rows][:, self.parts],
-            relative=relative[rows],
-            residual=np.full(len(rows), np.inf),
-            slack=np.full((len(rows), len(scans)), np.inf),
-            astray=np.zeros(len(rows)),
-            iterations=np.zeros(len(rows), dtype=int),
-            multipliers=np.zeros((len(rows), self._step.spans[-1].stop)),
-            slots=[Slots.empty(len(rows), SLOTS) for _ in self._step.varying],
-            gap_min=np.stack([least, least], axis=1),
-            active=np.stack([active for active, _ in surveys], axis=1),
-        )
         scans = [scan.take(rows) for scan in scans]
         task = Task(
-            raw=result.poses.copy(),
+            raw=poses[rows][:, self.parts],
+            relative=relative[rows],
             deviations=deviations[rows],
             moments=np.concatenate([self._moments(k, moments[rows]) for k, (_, moments) in enumerate(surveys)], axis=1),
             may_carry=[self._may_carry(scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
         )
-        self._repeat(task, result, scans, np.arange(len(rows)))
+        state = self._state(task.raw, task.relative)
+        self._attempt(task, state, scans, STRIDE)
+        starts = np.ones(len(rows), dtype=int)
+        if self._method.resolution == "exact":
+            self._start_elsewhere(task, state, starts)
+        gap_min = np.stack([least, least], axis=1)
+        gap_min[rows, 1] = state.gap_min
+        return Resolution(
+            rows=rows,
+            state=state,
+            starts=starts,
+            gap_min=gap_min,
+            active=np.stack([active for active, _ in surveys], axis=1),
+        )
+
+    def _state(self, poses: np.ndarray, relative: np.ndarray) -> State:
+        return State.start(poses, relative, self._step.spans[-1].stop, len(self._step.varying))
+
+    def _attempt(self, task: Task, state: State, scans: Sequence[PairScan], stride: float) -> None:
+        """Go from where `state` is to an answer; `scans` are of the contact points there."""
+        every = np.arange(len(task.raw))
+        self._repeat(task, state, scans, every, stride)
         if self._method.search == "iterated":
-            scans = self._settle(task, result)
+            self._settle(task, state, stride)
         if self._method.objective == "seating":
             # Nothing holds them: they are left where they were.
-            adrift = self._drift(task, result, np.arange(len(rows))) > ADRIFT
-            result.residual[adrift], result.slack[adrift], result.multipliers[adrift] = np.inf, 0, 0
-            result.poses[adrift], result.relative[adrift] = task.raw[adrift], relative[rows][adrift]
-            scans = self._found(result.relative) if self._method.search == "iterated" else scans
-        least = least_gaps(scans, result.relative, task.deviations)
-        result.gap_min[rows, 1] = least
+            adrift = self._drift(task, state, every) > ADRIFT
+            state.residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
+            state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
+        scans = self._found(state.relative)
+        state.gap_min[:] = least_gaps(scans, state.relative, task.deviations)
         if self._method.resolution == "exact":
-            # The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts.
-            for k, (scan, may_carry) in enumerate(zip(scans, task.may_carry, strict=True)):
-                inside = -least[:, k]
-                if may_carry is not None:
-                    inside = scan.deepest(result.relative[:, k], task.deviations, may_carry)[1].max(axis=1)
-                result.residual[:] = np.maximum(result.residual, inside - result.slack[:, k])
-            # Nor does penetration excuse locators that do not hold.
-            excused = np.where(result.astray > self._accuracy, result.slack.max(axis=1), 0)
-            result.residual[:] = np.maximum(result.residual, result.astray + excused)
-        return result
+            self._recheck(task, state, scans)
+        state.doubtful[:] = self._doubt.remains(task, state, lambda rows, pair: self._carriers(state, rows, pair))
+
+    def _recheck(self, task: Task, state: State, scans: Sequence[PairScan]) -> None:
+        """The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts."""
+        for k, (scan, may_carry) in enumerate(zip(scans, task.may_carry, strict=True)):
+            inside = -state.gap_min[:, k]
+            if may_carry is not None:
+                inside = scan.deepest(state.relative[:, k], task.deviations, may_carry)[1].max(axis=1)
+            state.residual[:] = np.maximum(state.residual, inside - state.slack[:, k])
+        # Nor does penetration excuse locators that do not hold.
+        excused = np.where(state.astray > ACCURACY, state.slack.max(axis=1), 0)
+        state.residual[:] = np.maximum(state.residual, state.astray + excused)
+
+    def _start_elsewhere(self, task: Task, state: State, starts: np.ndarray) -> None:
+        """Try again what is not certified, or far: from the nominal place, and then in small steps. Keep what is better."""
+        left = np.flatnonzero((state.rank > 0) | ~self._doubt.is_near(task, state))
+        for at_nominal, stride in ((True, STRIDE), (False, CAREFUL)):
+            if not left.size:
+                return
+            part = task.take(left)
+            poses, relative = self._at_nominal(part) if at_nominal else (part.raw, part.relative)
+            other = self._state(poses, relative)
+            self._attempt(part, other, self._found(relative), stride)
+            starts[left] += 1
+            for all_told, more in ((state.iterations, other.iterations), (state.second_answers, other.second_answers)):
+                all_told[left] += more
+                more[:] = all_told[left]
+            better = self._is_better(part, other, state.take(left))
+            state.put(left[better], other.take(better))
+            left = left[state.rank[left] > 0]
+
+    def _is_better(self, task: Task, state: State, than: State) -> np.ndarray:
+        """(row,): whether an answer has a lower rank than another one, or the same and a better objective."""
+        energy, before = (self._energy_of(task, each) for each in (state, than))
+        inside, before_inside = (each.slack.max(axis=1) for each in (state, than))
+        lower = energy < before - BETTER * np.abs(before)
+        gains = np.where(state.rank == 0, lower, (state.rank == 1) & (inside < before_inside - BETTER))
+        return np.asarray((state.rank < than.rank) | ((state.rank == than.rank) & gains))
+
+    def _energy_of(self, task: Task, state: State) -> np.ndarray:
+        return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
+
+    def _carriers(self, state: State, rows: np.ndarray, pair: int) -> tuple[np.ndarray, np.ndarray, float]:
+        """Of the points of a pair that carry in some rows which row each belongs to, its nominal place (point, 3), and the
+        usual distance of the pair's points [mm].
+        """
+        multipliers = state.multipliers[rows]
+        carries = multipliers[:, self.spans[pair]] > CARRIES * multipliers.max(axis=1, initial=0)[:, None]
+        standing = self._standing[pair]
+        if standing is None:
+            slots = state.slots[self._step.varying.index(pair)].take(rows)
+            row, column = np.nonzero(carries & slots.filled)
+            points = self._candidates[pair].P_m[slots.points[row, column]]
+        else:
+            row, column = np.nonzero(carries)
+            points = self._pairs[pair].P_m[standing[column]]
+        return row, points, 2 * reach(self._scans[pair])
+
+    def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:
+        """Poses and X_RM with the free parts in their nominal places, and on them what stands on them."""
+        poses = task.raw.copy()
+        for k, carried in enumerate(self._group.carried):
+            if carried.movers:
+                lowest = self._group.position(self._group.free[carried.movers[0]])
+                poses[:, k] = pose.compose(pose.inverse(task.raw[:, lowest]), task.raw[:, k])
+        return poses, self._relative(poses)
+
+    def _relative(self, poses: np.ndarray) -> np.ndarray:
+        """X_RM (row, pair, 12) at poses (row, part of the group, 12)."""
+        found = []
+        for pair in self._pairs:
+            moving = poses[:, self._group.position(pair.moving)]
+            if pair.reference is not None:
+                moving = pose.compose(pose.inverse(poses[:, self._group.position(pair.reference)]), moving)
+            found.append(moving)
+        return np.stack(found, axis=1)
 
     def _found(self, relative: np.ndarray) -> list[PairScan]:
         """Scans of the points that may carry, for X_RM (realization, pair, 12), projected again if the method says so."""
         if self._method.search == "fixed":
             return self._candidates
-        each = zip(self._scans, self._surfaces, self._reaches, strict=True)
-        return [search(scan, surface, relative[:, k], margin) for k, (scan, surface, margin) in enumerate(each)]
+        each = zip(self._scans, self._pairs, self._reaches, strict=True)
+        return [search(scan, pair.surface, relative[:, k], margin) for k, (scan, pair, margin) in enumerate(each)]
 
     def _moments(self, pair: int, active: np.ndarray) -> np.ndarray:
         """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
@@ -147,71 +229,67 @@ class ContactResolver:
             return None
         return np.asarray(scan.gaps(relative, deviations) < self._method.activity)
 
-    def _settle(self, task: Task, result: Resolution) -> list[PairScan]:
-        """Search and resolve again until the poses stay; returns the scans of the last search."""
+    def _settle(self, task: Task, state: State, stride: float) -> None:
+        """Search and resolve again until the poses stay."""
         searching = np.arange(len(task.raw))
         for _ in range(SEARCHES):
-            before = result.poses[searching]
-            for slots in result.slots:  # what carried before may now be beyond the rim
+            before = state.poses[searching]
+            for slots in state.slots:  # what carried before may now be beyond the rim
                 slots.put(searching, Slots.empty(len(searching), SLOTS))
-            self._repeat(task, result, self._found(result.relative[searching]), searching)
-            moved = self._displacements(before, result.poses[searching])
+            self._repeat(task, state, self._found(state.relative[searching]), searching, stride)
+            moved = self._displacements(before, state.poses[searching])
             searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]
             if not searching.size:
-                break
-        else:
-            result.residual[searching] = np.maximum(result.residual[searching], moved)
-        return self._found(result.relative)
+                return
+        state.residual[searching] = np.maximum(state.residual[searching], moved)
 
-    def _repeat(self, task: Task, result: Resolution, scans: Sequence[PairScan], moving: np.ndarray) -> None:
+    def _repeat(self, task: Task, state: State, scans: Sequence[PairScan], moving: np.ndarray, stride: float) -> None:
         """Linear steps of the rows `moving` (`scans` are theirs) until they are at rest; in the linearized resolution one."""
         if self._method.resolution == "linearized":
-            self._step.take(task, result, scans, moving)
+            self._step.take(task, state, scans, moving, stride=stride)
             return
-        kept = result.poses, result.relative, result.multipliers, result.astray, result.slack
+        kept = state.poses, state.relative, state.multipliers, state.astray, state.slack
         best = [values.copy() for values in kept]
         best[-1][:] = np.inf
         for number, firmness in enumerate(LINEAR + CURVED):
             curved = number >= len(LINEAR)
-            step, scaled = self._step.take(task, result, scans, moving, firmness=firmness, newton=curved)
-            on = (firmness > 1) | ((step > self._at_rest) & ((scaled > NOISE) | (not curved)))
-            result.residual[moving[~on]] = np.maximum(result.residual[moving[~on]], scaled[~on])
+            step, scaled = self._step.take(task, state, scans, moving, stride=stride, firmness=firmness, newton=curved)
+            on = (firmness > 1) | ((step > AT_REST) & ((scaled > NOISE) | (not curved)))
+            state.residual[moving[~on]] = np.maximum(state.residual[moving[~on]], scaled[~on])
             if self._method.objective == "seating":
-                lost = on & (self._drift(task, result, moving) > LOST)
-                result.residual[moving[lost]] = np.inf
+                lost = on & (self._drift(task, state, moving) > LOST)
+                state.residual[moving[lost]] = np.inf
                 on &= ~lost
             moving, scans = moving[on], [scan.take(on) for scan in scans]
             if not moving.size:
                 return
             if curved:
-                self._keep_best(best, task, result, scans, moving)
-        stuck = moving[(result.slack[moving] > self._step.tolerance).any(axis=1)]
+                self._keep_best(best, task, state, scans, moving)
+        stuck = moving[(state.slack[moving] > PENETRATION).any(axis=1)]
         for values, better in zip(kept, best, strict=True):
             values[stuck] = better[stuck]
         # Without rest there is an answer only where penetration is: where the parts contradict each other.
-        in_conflict = (result.slack[moving] > self._accuracy).any(axis=1)
-        result.residual[moving] = np.maximum(result.residual[moving], np.where(in_conflict, 0, scaled[on]))
+        in_conflict = (state.slack[moving] > ACCURACY).any(axis=1)
+        state.residual[moving] = np.maximum(state.residual[moving], np.where(in_conflict, 0, scaled[on]))
 
-    def _keep_best(
-        self, best: list[np.ndarray], task: Task, result: Resolution, scans: Sequence[PairScan], rows: np.ndarray
-    ) -> None:
+    def _keep_best(self, best: list[np.ndarray], task: Task, state: State, scans: Sequence[PairScan], rows: np.ndarray) -> None:
         """Put into `best` (poses, relative, multipliers, astray, true penetration of each pair) what is better than it."""
-        inside = np.maximum(-least_gaps(scans, result.relative[rows], task.deviations[rows]), 0)
-        wrong = inside.max(axis=1) + PRICE * result.astray[rows]
+        inside = np.maximum(-least_gaps(scans, state.relative[rows], task.deviations[rows]), 0)
+        wrong = inside.max(axis=1) + PRICE * state.astray[rows]
         is_better = wrong < best[-1][rows].max(axis=1) + PRICE * best[-2][rows]
         better = rows[is_better]
-        for values, new in zip(best[:-1], (result.poses, result.relative, result.multipliers, result.astray), strict=True):
+        for values, new in zip(best[:-1], (state.poses, state.relative, state.multipliers, state.astray), strict=True):
             values[better] = new[better]
         best[-1][better] = inside[is_better]
 
-    def _drift(self, task: Task, result: Resolution, rows: np.ndarray) -> np.ndarray:
+    def _drift(self, task: Task, state: State, rows: np.ndarray) -> np.ndarray:
         """How far `rows` have come from their raw pose, in sizes of the parts. A force may find nothing to rest on."""
-        return self._displacements(task.raw[rows], result.poses[rows]) / self._size
+        return self._displacements(task.raw[rows], state.poses[rows]) / self._size
 
     def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""
         apart = [
-            np.linalg.norm(placed(side.points, after[:, side.part]) - placed(side.points, before[:, side.part]), axis=2)
+            np.linalg.norm(pose.apply(after[:, side.part], side.points) - pose.apply(before[:, side.part], side.points), axis=2)
             for side in self._group.sides
         ]
         return np.asarray(np.max([each.max(axis=1) for each in apart], axis=0))

@@ -10,13 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tolcontact.simulation.resolution import Resolution, Task
+from tolcontact.simulation.resolution import State, Task
 from tolcontact.simulation.scan import PairScan
 from tolcontact.simulation.slots import CARRIES, Slots
 from tolcontact.symbolic import ENTRIES, ContactGroup, Program
 
 ROUNDS = 60
 PENETRATION = 1e-10  # mm: less than this is no penetration
+USABLE = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
 
 
 class LinearStep:
@@ -25,10 +26,10 @@ class LinearStep:
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self._solve = group.solve
         self._parts = len(group.group.parts)
-        self._plugin = program.plugin
+        self._remembers = program.plugin.remembers
+        self._usable = USABLE * group.group.length
         self.spans = group.program.spans
         self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
-        self.tolerance = max(program.plugin.accuracy / 100, PENETRATION)
 
     def twin(self) -> "LinearStep":
         """The same for another thread."""
@@ -38,29 +39,31 @@ class LinearStep:
 
     def start_over(self) -> None:
         """Forget all problems solved before, where the solver starts from the last one."""
-        if self._plugin.remembers:
+        if self._remembers:
             self._solve.start_over()
 
     def take(
         self,
         task: Task,
-        result: Resolution,
+        state: State,
         scans: Sequence[PairScan],
         moving: np.ndarray,
         *,
+        stride: float,
         firmness: float = 1.0,
         newton: bool = False,
     ) -> np.ndarray:
         """One linear step of the rows `moving`: the QP in which every point has its row.
 
-        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization. Returns the step's size
-        (2, row) [mm]: that of the largest increment, and in the norm of the objective.
+        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization, and of the step no more
+        is taken than turns a part by `stride` [rad]. Returns the step's size (2, row) [mm]: that of the largest increment,
+        and in the norm of the objective.
         """
-        now = result.poses[moving]
+        now = state.poses[moving]
         scans = [scans[k] for k in self.varying]
-        seen = self._deepest(task, scans, moving, result.relative[moving])
-        before = [slots.take(moving) for slots in result.slots]
-        reactions = result.multipliers[moving]
+        seen = self._deepest(task, scans, moving, state.relative[moving])
+        before = [slots.take(moving) for slots in state.slots]
+        reactions = state.multipliers[moving]
         bend = np.zeros((len(moving), ENTRIES * len(scans)))
         if newton:
             reactions = _carried(reactions, self.spans)
@@ -72,7 +75,7 @@ class LinearStep:
         for number in range(ROUNDS):
             more = np.full(len(open_), number == 0)
             for k, (points, depth) in enumerate(seen):
-                slots[k], grown = slots[k].with_deepest(points, depth, self.tolerance)
+                slots[k], grown = slots[k].with_deepest(points, depth, PENETRATION)
                 more |= grown
             open_ = open_[more]
             slots, scans = [s.take(more) for s in slots], [scan.take(more) for scan in scans]
@@ -81,20 +84,21 @@ class LinearStep:
             curved = {
                 "firmness": np.full(len(open_), firmness),
                 "newton": np.full(len(open_), float(newton)),
+                "stride": np.full(len(open_), stride),
                 "reactions": reactions[open_],
                 "bend": bend[open_],
             }
             if newton:
                 for k, b, s in zip(self.varying, before, slots, strict=True):
                     curved["reactions"][:, self.spans[k]] = b.take(open_).reactions_of(s.points)
-            seen, slots, step[:, open_] = self._solve_round(task, result, scans, moving[open_], now[open_], slots, curved)
-        result.iterations[moving] += 1
+            seen, slots, step[:, open_] = self._solve_round(task, state, scans, moving[open_], now[open_], slots, curved)
+        state.iterations[moving] += 1
         return step
 
     def _solve_round(
         self,
         task: Task,
-        result: Resolution,
+        state: State,
         scans: Sequence[PairScan],
         rows: np.ndarray,
         now: np.ndarray,
@@ -109,7 +113,7 @@ class LinearStep:
         held = [scan.rows(s.points, deviations) for scan, s in zip(scans, slots, strict=True)]
         nothing = np.zeros((len(rows), 0, 3))
         P_m, P_r, n_r = (np.concatenate([nothing, *(each[i] for each in held)], axis=1) for i in range(3))
-        answer = self._answer(
+        answer = self._solve(
             poses=now,
             raw=task.raw[rows],
             moments=task.moments[rows],
@@ -120,24 +124,25 @@ class LinearStep:
             n_r=n_r,
             filled=np.concatenate([np.zeros((len(rows), 0)), *(s.filled for s in slots)], axis=1),
         )
-        relative = result.relative.shape[1:]
+        relative = state.relative.shape[1:]
         slack = np.maximum(answer["slack"], 0)
-        residual = _residual(answer)
+        residual = answer["residual"][:, 0]
+        solved = residual <= self._usable  # what no solver could solve moves nothing
         seen = self._deepest(task, scans, rows, answer["linearized"].reshape(len(rows), *relative))
         # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
         seen = [(points, depth - slack[:, k, None]) for k, (points, depth) in zip(self.varying, seen, strict=True)]
         for _, deeper in seen:
             residual = np.maximum(residual, deeper.max(axis=1))
-        solved = np.isfinite(residual)
-        result.poses[rows[solved]] = answer["corrected"].reshape(len(rows), self._parts, ENTRIES)[solved]
-        result.relative[rows[solved]] = answer["relative"].reshape(len(rows), *relative)[solved]
-        result.residual[rows] = np.where(solved, residual, np.inf)
-        result.slack[rows[solved]] = slack[solved]
-        result.astray[rows[solved]] = answer["astray"][solved, 0]
+        state.poses[rows[solved]] = answer["corrected"].reshape(len(rows), self._parts, ENTRIES)[solved]
+        state.relative[rows[solved]] = answer["relative"].reshape(len(rows), *relative)[solved]
+        state.residual[rows] = np.where(solved, residual, np.inf)
+        state.slack[rows[solved]] = slack[solved]
+        state.astray[rows[solved]] = answer["astray"][solved, 0]
+        state.second_answers[rows] += answer["second"][:, 0].astype(int)
         multipliers = np.maximum(answer["multipliers"], 0)
-        result.multipliers[rows[solved]] = multipliers[solved]
+        state.multipliers[rows[solved]] = multipliers[solved]
         slots = [s.carrying(multipliers[:, self.spans[k]]) for k, s in zip(self.varying, slots, strict=True)]
-        for kept, s in zip(result.slots, slots, strict=True):
+        for kept, s in zip(state.slots, slots, strict=True):
             kept.put(rows, s)
         seen = [(points, np.where(solved[:, None], deeper, -np.inf)) for points, deeper in seen]
         return seen, slots, np.where(solved, answer["step"].T, 0.0)
@@ -152,23 +157,6 @@ class LinearStep:
             found.append(scan.deepest(relative[:, k], task.deviations[rows], None if may_carry is None else may_carry[rows]))
         return found
 
-    def _answer(self, **problems: np.ndarray) -> dict[str, np.ndarray]:
-        """Outputs of the QPs. Those that the solver missed are tried again, without curvature.
-
-        qpOASES starts each problem from the previous one, and rarely (some 1e-5 of all) loses its way from there; DAQP may
-        go in circles where rows contradict each other.
-        """
-        answer = self._solve(**problems)
-        lost = np.flatnonzero(~(_residual(answer) <= self._plugin.accuracy))
-        if lost.size and (self._plugin.second is not None or problems["newton"].any()):
-            again = self._solve.again(
-                **{name: values[lost] for name, values in problems.items()} | {"newton": np.zeros(len(lost))}
-            )
-            better = _residual(again) < _residual(answer)[lost]
-            for name, values in again.items():
-                answer[name][lost[better]] = values[better]
-        return answer
-
 
 def _carried(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
     """Multipliers (row, row of the QP), zero where they are nothing beside the largest of their pair."""
@@ -182,10 +170,3 @@ def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
     weighted = slots.reactions[..., None] * n_r
     turning = (weighted[..., :, None] * P_m[..., None, :]).sum(axis=1)
     return np.concatenate([turning.reshape(len(turning), 9), weighted.sum(axis=1)], axis=1)
-
-
-def _residual(answer: dict[str, np.ndarray]) -> np.ndarray:
-    """KKT residual (row,) [mm]; infinite where the solver gave nothing usable."""
-    residual = np.maximum(answer["stationarity"], answer["natural_residual"])[:, 0]
-    usable = np.isfinite(residual) & np.isfinite(answer["corrected"]).all(axis=1)
-    return np.where(usable, residual, np.inf)

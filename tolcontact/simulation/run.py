@@ -68,30 +68,32 @@ def simulate_block(
     """Raw and corrected states for given deviations (realization, locator) [mm]."""
     if resolvers is None:
         resolvers = [ContactResolver(program, group).twin() for group in program.groups]
-    nominal, count, accuracy = program.nominal, len(deviations), program.plugin.accuracy
+    nominal, count = program.nominal, len(deviations)
     placed = program.place(deviations=deviations)
     raw = placed["poses"].reshape(count, len(nominal.parts), ENTRIES)
     measured_raw, relative_raw = _observe(program, raw)
 
     poses = raw.copy()
     touched, stuck, solved = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
-    residual = np.zeros(count)
-    iterations, carrying = np.zeros(count, dtype=int), np.zeros((count, len(nominal.pairs)), dtype=int)
-    reaction, active = np.zeros((count, len(nominal.pairs))), np.zeros((count, len(nominal.pairs)), dtype=int)
-    gap_min = np.empty((count, 2, len(nominal.pairs)))
+    doubtful, residual = np.zeros(count, dtype=bool), np.zeros(count)
+    iterations, starts, second_answers = (np.zeros(count, dtype=int) for _ in range(3))
+    carrying, reaction = np.zeros((count, len(nominal.pairs)), dtype=int), np.zeros((count, len(nominal.pairs)))
+    active, gap_min = np.zeros((count, len(nominal.pairs)), dtype=int), np.empty((count, 2, len(nominal.pairs)))
     for resolver in resolvers:
         found = resolver.resolve(raw, relative_raw, deviations)
-        poses[np.ix_(found.rows, resolver.parts)] = found.poses
+        rows, state = found.rows, found.state
+        poses[np.ix_(rows, resolver.parts)] = state.poses
         gap_min[:, :, resolver.pairs], active[:, resolver.pairs] = found.gap_min, found.active
-        touched[found.rows] = True
-        residual[found.rows] = np.maximum(residual[found.rows], found.residual)
-        slack = found.slack.max(axis=1)
-        stuck[found.rows] |= slack > accuracy
-        # A conflict is believed where it exceeds what the solver left undone.
-        solved[found.rows] &= np.isfinite(found.residual) & (found.residual <= np.maximum(accuracy, slack))
-        iterations[found.rows] = np.maximum(iterations[found.rows], found.iterations)
-        carrying[np.ix_(found.rows, resolver.pairs)] = found.carrying(resolver.spans)
-        reaction[np.ix_(found.rows, resolver.pairs)] = found.reactions(resolver.spans)
+        touched[rows] = True
+        residual[rows] = np.maximum(residual[rows], state.residual)
+        stuck[rows] |= state.in_conflict
+        solved[rows] &= state.solved
+        doubtful[rows] |= state.doubtful
+        iterations[rows] = np.maximum(iterations[rows], state.iterations)
+        starts[rows] = np.maximum(starts[rows], found.starts)
+        second_answers[rows] += state.second_answers
+        carrying[np.ix_(rows, resolver.pairs)] = found.carrying(resolver.spans)
+        reaction[np.ix_(rows, resolver.pairs)] = found.reactions(resolver.spans)
     lost = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are no numbers touch nothing
     touched[lost], solved[lost], residual[lost] = True, False, np.inf
     measured = measured_raw.copy()
@@ -99,6 +101,7 @@ def simulate_block(
 
     conflict = Status.NOT_ASSEMBLABLE if program.method.resolution == "exact" else Status.NOT_CONVERGED
     status = np.where(solved, np.where(stuck, conflict, Status.RESOLVED), Status.NOT_CONVERGED)
+    status = np.where(solved & doubtful, Status.DOUBTFUL, status)
     status = np.where(touched, status, Status.UNTOUCHED)
     return Block(
         start=start,
@@ -112,6 +115,8 @@ def simulate_block(
         status=status.astype(np.int8),
         kkt_residual=residual,
         iterations=iterations,
+        starts=starts,
+        second_answers=second_answers,
     )
 
 

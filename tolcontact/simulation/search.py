@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import KDTree
 
+from tolcontact import poses as pose
 from tolcontact.discretization.surface import Surface
 from tolcontact.simulation.scan import PairScan
 
@@ -25,7 +26,7 @@ class FoundScan(PairScan):
         return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        apart = placed(self.P_m, relative) - self.feet
+        apart = pose.apply(relative, self.P_m) - self.feet
         n = self.normals
         gaps = n[..., 0] * apart[..., 0] + n[..., 1] * apart[..., 1] + n[..., 2] * apart[..., 2]
         return np.where(self.over, gaps, np.inf)
@@ -51,20 +52,10 @@ def search(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin
     if surface is None:
         return scan
     shape = (len(relative), len(scan.P_m), 3)
-    feet, normals, over = surface.project(placed(scan.P_m, relative).reshape(-1, 3), margin=margin)
+    feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
     return FoundScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),
         normals=normals.reshape(shape),
         over=over.reshape(shape[:2]),
     )
-
-
-def placed(P: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """Where points P (point, 3) are at poses (realization, 12): (realization, point, 3) [mm]."""
-    R = poses[:, None, :9]
-    columns = [
-        R[..., 3 * i] * P[:, 0] + R[..., 3 * i + 1] * P[:, 1] + R[..., 3 * i + 2] * P[:, 2] + poses[:, None, 9 + i]
-        for i in range(3)
-    ]
-    return np.stack(columns, axis=2)

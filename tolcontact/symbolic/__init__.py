@@ -2,17 +2,20 @@
 
 from tolcontact.symbolic.contact_program import SLOTS
 from tolcontact.symbolic.gap_map import GapMap
+from tolcontact.symbolic.groups import Group
 from tolcontact.symbolic.objective import MOMENTS
-from tolcontact.symbolic.plugins import usable_plugins
+from tolcontact.symbolic.plugins import ACCURACY, usable_plugins
 from tolcontact.symbolic.pose import ENTRIES
 from tolcontact.symbolic.program import ContactGroup, Program, compile_program
 
 __all__ = [
+    "ACCURACY",
     "ENTRIES",
     "MOMENTS",
     "SLOTS",
     "ContactGroup",
     "GapMap",
+    "Group",
     "Program",
     "compile_program",
     "usable_plugins",

@@ -31,27 +31,34 @@ from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
 SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
-INPUTS = ("poses", "raw", "moments", "deviations", "firmness", "newton", "reactions", "bend", "P_m", "P_r", "n_r", "filled")
-OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "stationarity", "natural_residual", "slack", "step", "astray")
+INPUTS = (
+    "poses", "raw", "moments", "deviations", "firmness", "newton", "stride", "reactions", "bend", "P_m", "P_r", "n_r", "filled",
+)  # fmt: skip
+ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
+OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "residual", "slack", "step", "astray")
 
 
 @dataclass(frozen=True, eq=False)
 class ContactProgram:
     """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
 
+    energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
     slacks       how many of the QP's last variables are slacks: they are not negative
+    equalities   how many of its last rows are equations: two-sided locators, where the objective holds them
     standing     for each pair of the group the contact points that always have a row, None where slots hold changing points
     """
 
     assemble: ca.Function
     plugin: Plugin
     finish: ca.Function
+    energy: ca.Function
     slacks: int
+    equalities: int
     standing: tuple[np.ndarray | None, ...]
 
-    def qp(self, *, second: bool = False) -> ca.Function:
-        """A new solver, without memory of any problem; for a second try if asked."""
-        return solver(self.plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"), second=second)
+    def qp(self, plugin: Plugin) -> ca.Function:
+        """A new solver of a plugin, without memory of any problem."""
+        return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
 
     @property
     def spans(self) -> list[slice]:
@@ -72,20 +79,22 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     deviations (l)       of all locators of the model [mm]
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
+    stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
     reactions (k)        where it counts: the reaction that a row's point had before
     bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
                          by the entries of X_RM
     P_m, P_r, n_r (3, m) the contact points in the slots
     filled (m)           1 where a slot holds a point, 0 where it is empty
 
-    corrected (12 p)     poses after the correction
+    corrected (12 p)     poses after the correction; in an exact resolution after as much of it as `stride` allows
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
     relative (12 q)      X_RM of every pair at `corrected`
     multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
-    stationarity, natural_residual   KKT residuals [mm], in y: max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows of
-                         length 1, or how far a gap remains negative
+    residual             KKT residual [mm], in y: the larger of max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows
+                         of length 1, or how far a gap remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
-    step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|
+    step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|; of
+                         the whole correction
     astray               how far two-sided locators, where they hold, are from their place at `corrected` [mm]
     """
     standing = tuple(_standing(gaps[index], method) for index in group.pairs)
@@ -99,13 +108,14 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
         ca.SX.sym("deviations", len(nominal.locator_labels)),
         ca.SX.sym("firmness"),
         ca.SX.sym("newton"),
+        ca.SX.sym("stride"),
         ca.SX.sym("reactions", rows),
         ca.SX.sym("bend", ENTRIES * varying),
         *(ca.SX.sym(name, 3, slots) for name in ("P_m", "P_r", "n_r")),
         ca.SX.sym("filled", slots),
     ]
-    assemble, finish = _around_the_solver(nominal, group, standing, method, inputs)
-    return ContactProgram(assemble, plugin, finish, len(group.pairs), standing)
+    assemble, finish, energy, held = _around_the_solver(nominal, group, standing, method, inputs)
+    return ContactProgram(assemble, plugin, finish, energy, len(group.pairs), held, standing)
 
 
 def _standing(gaps: GapMap, method: Method) -> np.ndarray | None:
@@ -116,9 +126,12 @@ def _standing(gaps: GapMap, method: Method) -> np.ndarray | None:
 
 def _around_the_solver(
     nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None], method: Method, inputs: list[ca.SX]
-) -> tuple[ca.Function, ca.Function]:
-    """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs)."""
-    entries, raw_entries, moments, deviations, firmness, newton, reactions, bend, P_m, P_r, n_r, filled = inputs
+) -> tuple[ca.Function, ca.Function, ca.Function, int]:
+    """What stands before and after the solver: (inputs -> H, f, A, bounds, U) and (those, solution -> outputs).
+
+    Besides the objective, and the number of two-sided locators that are held.
+    """
+    entries, raw_entries, moments, deviations, firmness, newton, stride, reactions, bend, P_m, P_r, n_r, filled = inputs
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -197,22 +210,27 @@ def _around_the_solver(
     f_in, lower_in, length_in = (ca.SX.sym("v", vector.shape) for vector in (f, lower, length))
     excess = A_in @ x - lower_in
     natural = ca.vertcat(ca.fmin(excess[:slots], -lam_a[:slots]), ca.fmin(s, -lam_s), ca.fmin(excess[:slots] * length_in, 0))
-    complementarity = ca.norm_inf(natural)
+    residuals = [ca.norm_inf(natural), *([ca.norm_inf(excess[slots:])] if held else [])]
     results = [
         ca.vertcat(*(pose.vector() for pose in poses)),
         ca.vertcat(*linearized),
         ca.vertcat(*(X_RM.vector() for X_RM in _pairs(nominal, group, poses))),
         -lam_a[:slots] / length_in * fill * goal.scale,
-        ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x),
-        ca.fmax(complementarity, ca.norm_inf(excess[slots:])) if held else complementarity,
+        ca.mmax(ca.vertcat(ca.norm_inf(H_in @ x + f_in + A_in.T @ lam_a + lam_x), *residuals)),
         SLACK * s,
         ca.vertcat(ca.norm_inf(z), ca.norm_inf(y)),
         ca.norm_inf(_held(nominal, group, poses, deviations)[1]) if held else ca.SX(0),
     ]
     step = _whitening(U_in) @ y
-    results = [ca.densify(ca.substitute(result, z, step)) for result in results]
+    taken = {"corrected": step, "relative": step, "astray": step}
+    if method.resolution == "exact":
+        turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
+        taken = dict.fromkeys(taken, step * ca.fmin(1, stride * group.length / ca.norm_inf(turns)))
+    results = [ca.densify(ca.substitute(it, z, taken.get(name, step))) for name, it in zip(OUTPUTS, results, strict=True)]
     finish = ca.Function("finish", [*inputs, H_in, f_in, A_in, lower_in, U_in, length_in, x, lam_a, lam_x], results)
-    return assemble, finish
+    least = ca.substitute(ca.substitute(goal.energy, z, at_rest), firmness, 1)
+    energy = ca.Function("energy", [entries, raw_entries, moments, deviations], [least], list(ENERGY_INPUTS), ["energy"])
+    return assemble, finish, energy, held
 
 
 def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[tuple[ca.SX, ...]]:

@@ -1,14 +1,17 @@
-"""The contact QP of one group, solved for many realizations: assemble, solve, finish."""
+"""The contact QP of one group, solved for many realizations: assemble, solve, polish, finish."""
 
 import copy
 
 import numpy as np
 
-from tolcontact.symbolic.batch import Expressions, Mapped, flat, quiet
+from tolcontact.symbolic.batch import Batch, Expressions, Mapped, flat, quiet
 from tolcontact.symbolic.contact_program import INPUTS, OUTPUTS, ContactProgram
+from tolcontact.symbolic.plugins import ACCURACY, PLUGINS, Plugin
+from tolcontact.symbolic.polishing import polished
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
+ROUGH = 1e-2 * ACCURACY  # mm: an answer with a larger KKT residual is polished
 
 
 class ContactSolver:
@@ -17,6 +20,8 @@ class ContactSolver:
     def __init__(self, program: ContactProgram) -> None:
         self._program = program
         self._assemble, self._finish = Expressions(program.assemble), Expressions(program.finish)
+        self._energy = Batch(program.energy)
+        self._plugin = program.plugin
         self.start_over()
 
     def twin(self) -> "ContactSolver":
@@ -27,24 +32,36 @@ class ContactSolver:
 
     def start_over(self) -> None:
         """Forget all problems solved before: some plugins start from the last one."""
-        self._first: _PluginSolver = _PluginSolver(self._program)
-        self._second: _PluginSolver | None = None
+        self._first: _PluginSolver = _PluginSolver(self._program, self._plugin)
+        self._others: dict[str, _PluginSolver] = {}
 
     def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
         """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
-        They are NaN where the solver gave up.
+        Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
+        others, without curvature. `residual` is infinite, and other outputs may be NaN, where all gave up.
         """
-        return self._solved(self._first, arrays)
-
-    def again(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
-        """A second try of what was missed, with what the plugin's entry changes for that, and without memory of the first."""
-        if self._second is None:
-            self._second = _PluginSolver(self._program, second=True)
-        answer = self._solved(self._second, arrays)
-        if self._program.plugin.remembers:
-            self.start_over()
+        answer = self._solved(self._first, arrays)
+        answer["second"] = np.zeros_like(answer["residual"])
+        for name in self._plugin.second:
+            lost = np.flatnonzero(~(answer["residual"][:, 0] <= ACCURACY))
+            if not lost.size:
+                break
+            if name not in self._others:
+                self._others[name] = _PluginSolver(self._program, PLUGINS[name])
+            problems = {word: values[lost] for word, values in arrays.items()} | {"newton": np.zeros(len(lost))}
+            again = self._solved(self._others[name], problems)
+            again["second"] = np.ones((len(lost), 1))
+            better = again["residual"][:, 0] < answer["residual"][lost, 0]
+            for word, values in again.items():
+                answer[word][lost[better]] = values[better]
+            if PLUGINS[name].remembers:
+                del self._others[name]
         return answer
+
+    def energy(self, **arrays: np.ndarray) -> np.ndarray:
+        """The objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
+        return self._energy(**arrays)["energy"][:, 0]
 
     def _solved(self, solver: "_PluginSolver", arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         inputs = [flat(arrays[name]) for name in INPUTS]
@@ -57,22 +74,49 @@ class ContactSolver:
 
     def _solved_together(self, solver: "_PluginSolver", inputs: list[np.ndarray]) -> list[np.ndarray]:
         assembled = self._assemble(inputs)
-        H, f, A, lower, _, U, length = assembled
         solution, failed = solver(assembled, inputs[INPUTS.index("reactions")])
-        outputs = self._finish([*inputs, H, f, A, lower, U, length, *solution])
-        for output in outputs:
-            output[failed] = np.nan
+        outputs = self._finished(inputs, assembled, solution)
+        residual = outputs[OUTPUTS.index("residual")]
+        residual[failed] = np.inf
+        rough = np.flatnonzero((residual[:, 0] > ROUGH) & np.isfinite(residual[:, 0]))
+        if rough.size:
+            inputs, assembled = ([array[rough] for array in arrays] for arrays in (inputs, assembled))
+            polished = self._polished(assembled, [array[rough] for array in solution])
+            again = self._finished(inputs, assembled, polished)
+            better = again[OUTPUTS.index("residual")][:, 0] < residual[rough, 0]
+            for output, values in zip(outputs, again, strict=True):
+                output[rough[better]] = values[better]
         return outputs
+
+    def _finished(self, inputs: list[np.ndarray], assembled: list[np.ndarray], solution: list[np.ndarray]) -> list[np.ndarray]:
+        H, f, A, lower, _, U, length = assembled
+        outputs = self._finish([*inputs, H, f, A, lower, U, length, *solution])
+        usable = np.isfinite(outputs[OUTPUTS.index("corrected")]).all(axis=1)
+        residual = outputs[OUTPUTS.index("residual")]
+        residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf
+        return outputs
+
+    def _polished(self, assembled: list[np.ndarray], solution: list[np.ndarray]) -> list[np.ndarray]:
+        problem = {}
+        for name in ("h", "g", "a", "lba"):
+            sparsity, stored = self._program.assemble.sparsity_out(ASSEMBLED[name]), assembled[ASSEMBLED[name]]
+            dense = np.zeros((len(stored), sparsity.numel()))
+            dense[:, sparsity.find()] = stored
+            shape = (sparsity.size2(), sparsity.size1()) if name in ("h", "a") else (sparsity.numel(),)
+            problem[name] = dense.reshape(len(stored), *shape)
+            if name in ("h", "a"):
+                problem[name] = problem[name].swapaxes(1, 2)
+        return polished(problem, solution, self._program.equalities, self._program.slacks)
 
 
 class _PluginSolver:
-    """The plugin's solver, with a memory of its own."""
+    """A plugin's solver, with a memory of its own."""
 
-    def __init__(self, program: ContactProgram, *, second: bool = False) -> None:
-        self._remembers = program.plugin.remembers
+    def __init__(self, program: ContactProgram, plugin: Plugin) -> None:
+        self._remembers = plugin.remembers
         # Whatever the thread: quiet() has one lock, so that CasADi's objects are made one after the other.
         with quiet():
-            qp = program.qp(second=second)
+            qp = program.qp(plugin)
         self._inputs = [ASSEMBLED[name] for name in qp.name_in() if name in ASSEMBLED]
         self._results = [qp.name_out().index(name) for name in ("x", "lam_a", "lam_x")]
         at_least = np.zeros(qp.numel_in("g"))

@@ -8,51 +8,43 @@ import numpy as np
 
 from tolcontact.errors import OptionError
 
+ACCURACY = 1e-8  # mm: KKT residual up to which a QP counts as solved, whichever plugin solved it
+
 
 @dataclass(frozen=True)
 class Plugin:
     """A conic plugin of CasADi.
 
     options     what we ask of it
-    accuracy    residual of the KKT conditions [mm] up to which its answers count as solved. An interior-point solver
-                (piqp) needs a strict one: where a row hardly carries, an answer 0.1 mm off can have a residual of 1e-7 mm.
-    second      what changes in a second try of what it missed; None if it would give the same answer again
+    second      names of the plugins that answer in its place, one after the other, where its own answer misses ACCURACY
     remembers   whether it starts each problem from the answer to the previous one
     """
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
-    accuracy: float = 1e-8
-    second: dict[str, Any] | None = None
+    second: tuple[str, ...] = ("qpoases", "daqp")
     remembers: bool = False
 
 
 PLUGINS = {
     plugin.name: plugin
     for plugin in (
-        Plugin(
-            "qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}, second={}, remembers=True
-        ),
+        # Rarely (some 1e-5 of all problems) it loses its way from the problem before: a new memory finds it.
+        Plugin("qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}, remembers=True),
         Plugin(
             "osqp",
             {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}},
-            1e-5,
-            second={},
             remembers=True,
         ),
-        # Where rows contradict each other, its strict tolerances are below the rounding of multipliers: it goes in circles.
-        Plugin(
-            "daqp",
-            {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}},
-            second={"daqp": {"primal_tol": 1e-10, "dual_tol": 1e-12}},
-        ),
-        Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}, 1e-9),
-        Plugin("highs", {"highs": {"output_flag": False}}, 1e-6, second={}, remembers=True),
-        Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}, 1e-6),
-        Plugin("gurobi", {}, 1e-5),
-        Plugin("cplex", {}, 1e-5),
-        Plugin("mosek", {}, 1e-5),
-        Plugin("xpress", {}, 1e-5),
+        # Where rows contradict each other, and two-sided locators hold besides, it goes in circles.
+        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}, second=("qpoases",)),
+        Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
+        Plugin("highs", {"highs": {"output_flag": False}}, remembers=True),
+        Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}),
+        Plugin("gurobi"),
+        Plugin("cplex"),
+        Plugin("mosek"),
+        Plugin("xpress"),
     )
 }
 REFUSED = {
@@ -89,10 +81,9 @@ def usable_plugins() -> list[str]:
     return [name for name in PLUGINS if is_usable(name)]
 
 
-def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity, *, second: bool = False) -> ca.Function:
-    """A QP solver for these sparsities, or for a second try; it reports failure in its outputs, never by an exception."""
-    options = {**plugin.options, **((plugin.second or {}) if second else {}), "error_on_fail": False}
-    return ca.conic("qp", plugin.name, {"h": h, "a": a}, options)
+def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
+    """A QP solver for these sparsities; it reports failure in its outputs, never by an exception."""
+    return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**plugin.options, "error_on_fail": False})
 
 
 def is_usable(name: str) -> bool:

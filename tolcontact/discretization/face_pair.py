@@ -1,0 +1,101 @@
+"""Both faces of a contact pair as they are: how deep one lies in the other, not at contact points only."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import igl
+import numpy as np
+import trimesh
+
+from tolcontact import poses as pose
+from tolcontact.discretization.surface import Surface
+
+PROBES = 2000  # points of a face at least, beside the corners of its triangles
+DENSER = 4  # times as close as contact points, as far as MOST allows
+MOST = 20_000
+TOGETHER = 16  # poses at once
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """A face in its nominal place, and the body that it belongs to.
+
+    points   (point, 3) [mm], all over the face, its corners among them
+    """
+
+    face: Surface
+    body: trimesh.Trimesh
+    points: np.ndarray
+
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """How deep `points` (point, 3) [mm] lie behind the face, in the body; 0 outside, and where the face has no part.
+
+        Distance to the face [mm]. Of a body that is not closed whatever is behind the face counts as inside.
+        """
+        depth = np.zeros(len(points))
+        lower, upper = self.body.bounds
+        near = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
+        if self._plane is not None:
+            n, height = self._plane
+            near = near[points[near] @ n < height]
+        if near.size:
+            feet, normals, over = self.face.project(points[near])
+            offset = feet - points[near]
+            behind = over & ((offset * normals).sum(axis=1) > 0)
+            near, offset = near[behind], offset[behind]
+        if near.size and self._is_closed:
+            turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[near]))
+            near, offset = near[turns > 0.5], offset[turns > 0.5]
+        if near.size:
+            depth[near] = np.linalg.norm(offset, axis=1)
+        return depth
+
+    @cached_property
+    def _plane(self) -> tuple[np.ndarray, float] | None:
+        """Normal and height of the plane behind which a flat face lies; None of a face that is not flat."""
+        normals = self.face.corner_normals.reshape(-1, 3)
+        n = normals.mean(axis=0)
+        n /= np.linalg.norm(n)
+        return (n, float((self.face.mesh.vertices @ n).max())) if (normals @ n).min() > 1 - 1e-12 else None
+
+    @cached_property
+    def _is_closed(self) -> bool:
+        return bool(self.body.is_watertight)
+
+    @cached_property
+    def _vertices(self) -> np.ndarray:
+        return np.ascontiguousarray(self.body.vertices, dtype=np.float64)
+
+    @cached_property
+    def _faces(self) -> np.ndarray:
+        return np.ascontiguousarray(self.body.faces, dtype=np.int64)
+
+
+@dataclass(frozen=True, eq=False)
+class FacePair:
+    """The faces of a pair, ready to be checked at any pose."""
+
+    moving: Side
+    reference: Side
+
+    def depth(self, X_RM: np.ndarray) -> np.ndarray:
+        """Largest depth (row,) [mm] of one face in the other's body at X_RM (row, 12), both ways round."""
+        found = np.zeros(len(X_RM))
+        for first in range(0, len(X_RM), TOGETHER):
+            X = X_RM[first : first + TOGETHER]
+            sides = (self.reference, X, self.moving.points), (self.moving, pose.inverse(X), self.reference.points)
+            for body, motion, points in sides:
+                depth = body.depth(pose.apply(motion, points).reshape(-1, 3)).reshape(len(X), -1)
+                found[first : first + TOGETHER] = np.maximum(found[first : first + TOGETHER], depth.max(axis=1, initial=0))
+        return found
+
+
+def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
+    """A side of a pair with so many contact points."""
+    wanted = min(max(PROBES, contacts * DENSER**2), MOST)
+    step = float(np.sqrt(face.mesh.area / wanted))
+    vertices, _ = trimesh.remesh.subdivide_to_size(face.mesh.vertices, face.mesh.faces, max_edge=step, max_iter=30)
+    points = np.unique(np.asarray(vertices), axis=0)
+    if len(points) > MOST:
+        points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
+    return Side(face, body, points)

@@ -1,0 +1,60 @@
+"""Polish: the solution of a QP, from the rows that carry in a solver's answer to it, at the level of rounding.
+
+Solvers stop where their own tolerance is met, in which more or less of the true residual shows. Which rows carry they know
+long before; the rest is one linear system, the optimality conditions with those rows as equations.
+"""
+
+import numpy as np
+
+GIVE = 1e-9  # by which rows may give way, so that rows that depend on each other have a solution; refinement takes it back
+REFINEMENTS = 4
+
+
+def polished(problem: dict[str, np.ndarray], answer: list[np.ndarray], equalities: int, slacks: int) -> list[np.ndarray]:
+    """x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba, with the last rows equations and the last x >= 0.
+
+    problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
+    answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 where a row carries
+
+    Where the conditions have no solution it is no number.
+    """
+    H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
+    x, lam_a, lam_x = answer
+    count, rows, size = A.shape
+    # Of a row and its multiplier the smaller one is rounding, whatever the solver.
+    carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
+    carries[:, rows - equalities :] = True
+    at_zero = (-lam_x > x)[:, size - slacks :]
+    bounds = np.zeros((count, slacks, size))
+    bounds[:, :, size - slacks :] = np.eye(slacks)
+    every = np.concatenate([A, bounds], axis=1)
+    held = np.concatenate([carries, at_zero], axis=1)
+    wanted = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
+    C = np.where(held[..., None], every, 0.0)
+    idle = np.eye(rows + slacks) * ~held[:, None, :]
+    K = np.concatenate(
+        [np.concatenate([H, -C.swapaxes(1, 2)], axis=2), np.concatenate([C, idle], axis=2)],
+        axis=1,
+    )
+    right = np.concatenate([-g, np.where(held, wanted, 0.0)], axis=1)
+    given = K.copy()
+    given[:, size:, size:] += GIVE * np.eye(rows + slacks) * held[:, None, :]
+    solution = np.zeros_like(right)
+    inverse = _inverse(given)
+    for _ in range(REFINEMENTS):
+        rest = right - np.einsum("kij,kj->ki", K, solution)
+        solution += np.einsum("kij,kj->ki", inverse, rest)
+    x, multipliers = solution[:, :size], solution[:, size:]
+    lam_x = np.zeros_like(x)
+    lam_x[:, size - slacks :] = -multipliers[:, rows:]
+    return [x, -multipliers[:, :rows], lam_x]
+
+
+def _inverse(matrices: np.ndarray) -> np.ndarray:
+    """Inverses (QP, n, n), NaN where there is none: one such matrix must not spoil the others."""
+    try:
+        return np.linalg.inv(matrices)
+    except np.linalg.LinAlgError:
+        if len(matrices) == 1:
+            return np.full_like(matrices, np.nan)
+        return np.concatenate([_inverse(one[None]) for one in matrices])
