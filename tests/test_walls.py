@@ -25,7 +25,7 @@ ROOMS = {
 NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "errors", "vocabulary", "method", "assembly", "discretization", "symbolic", "sampling", "simulation", "statistics",
+    "errors", "vocabulary", "method", "poses", "assembly", "discretization", "symbolic", "sampling", "simulation", "statistics",
     "archive", "running", "comparing", "report", "script", "cli", "__init__",
 )  # fmt: skip
 

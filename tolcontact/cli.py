@@ -22,7 +22,7 @@ from tolcontact.comparing import compare as compare_solvers
 from tolcontact.errors import TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
 from tolcontact.report import comparison_text, summary_text
-from tolcontact.running import DEFAULT_SOLVER, build, check_counts, check_writable
+from tolcontact.running import DEFAULT_SOLVER, SURFACES, build, check_counts, check_writable
 from tolcontact.running import run as run_model
 from tolcontact.script import load_model
 from tolcontact.simulation import Status
@@ -61,12 +61,15 @@ def run(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"What to archive of each realization: {_or(KEPT)}.")] = "all",
+    surfaces: Annotated[
+        int, typer.Option(help="Number of realizations that are checked against the surfaces between contact points.")
+    ] = SURFACES,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
-    Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, or not assemblable.
+    Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
     """
-    check_counts(samples=samples, seed=seed)
+    check_counts(samples=samples, seed=seed, surfaces=surfaces)
     if out is not None:
         check_writable(out, overwrite=overwrite, resume=resume)
     method = Method(resolution=resolution, objective=objective)
@@ -77,7 +80,7 @@ def run(
     ) as bar:  # fmt: skip
         task = bar.add_task(program.nominal.assembly.name, total=samples)
         results = run_model(
-            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume, keep=keep,
+            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
             progress=lambda done: bar.update(task, completed=done, total=max(samples, done)),
         )  # fmt: skip
     with results:
@@ -165,7 +168,7 @@ def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 def _print_summary(results: xr.DataTree) -> None:
     found = summarize(results)
     Console(highlight=False, markup=False).print(summary_text(found))
-    failed = int(found["by_status"][Status.NOT_CONVERGED] + found["by_status"][Status.NOT_ASSEMBLABLE])
+    failed = sum(int(found["by_status"][status]) for status in (Status.NOT_CONVERGED, Status.NOT_ASSEMBLABLE, Status.DOUBTFUL))
     if failed > FAILED_SHARE * found.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
         raise typer.Exit(1)

@@ -32,5 +32,9 @@ class ArchiveError(TolcontactError):
     """An archive cannot be written, or a file is not an archive of tolcontact."""
 
 
+class ContactWarning(UserWarning):
+    """The contact points or the triangles of a pair of curved faces are coarse beside the tolerances."""
+
+
 class UnitsWarning(UserWarning):
     """A part has a strange size, and nobody said in which units its file counts."""

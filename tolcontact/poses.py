@@ -32,8 +32,8 @@ def compose(X: np.ndarray, inner: np.ndarray) -> np.ndarray:
 
 
 def inverse(X: np.ndarray) -> np.ndarray:
-    """The motion back."""
-    back = rotation(X).swapaxes(-1, -2)
+    """The motion back; also of poses that stretch a little, as paper (12) gives them."""
+    back = np.linalg.inv(rotation(X))
     return pose(back, -np.einsum("...ij,...j->...i", back, X[..., 9:]))
 
 

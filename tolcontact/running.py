@@ -13,10 +13,12 @@ from tolcontact.errors import ArchiveError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.run import BLOCK
+from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.symbolic import Program, compile_program
 from tolcontact.vocabulary import KEPT
 
 DEFAULT_SOLVER = "qpoases"
+SURFACES = 64
 Progress = Callable[[int], None]
 
 
@@ -39,17 +41,19 @@ def run(
     overwrite: bool = False,
     resume: bool = False,
     keep: str = "all",
+    surfaces: int = SURFACES,
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
     Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
+    `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations.
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
     """
-    check_counts(samples=samples, seed=seed)
+    check_counts(samples=samples, seed=seed, surfaces=surfaces)
     if keep not in KEPT:
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
     if out is None:
@@ -63,6 +67,7 @@ def run(
                 method=method,
                 out=path,
                 keep=keep,
+                surfaces=surfaces,
                 progress=progress,
             )
             with open_archive(path) as tree:
@@ -73,7 +78,7 @@ def run(
     check_writable(path, overwrite=overwrite, resume=resume)
     program = assembly if isinstance(assembly, Program) else build(assembly, solver=solver, method=method)
     start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
-    with start(path, program, seed=seed, samples=samples, keep=keep) as writer:
+    with start(path, program, seed=seed, samples=samples, keep=keep, surfaces=surfaces) as writer:
         for done in simulate_blocks(program, samples=writer.samples, seed=seed, start=writer.rows):
             writer.append(done)
             if len(done) == BLOCK:
@@ -81,13 +86,18 @@ def run(
             if progress:
                 progress(writer.rows)
         writer.write_fields()
+        rows = writer.chosen(seed)
+        if rows.size:
+            kept = writer.poses(rows)
+            found = check_surfaces(program, simulated_poses(program, rows, seed) if kept is None else kept)
+            writer.write_checked(rows, *found)
     return open_archive(path)
 
 
 def check_counts(**counts: int) -> None:
-    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed 0)."""
+    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed and surfaces 0)."""
     for word, value in counts.items():
-        least = {"samples": 2, "seed": 0}[word]
+        least = {"samples": 2, "seed": 0, "surfaces": 0}[word]
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
             raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above and below 2^63")
 

@@ -11,13 +11,14 @@ COMPONENTS = (*AXES, "magnitude")
 REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
-CHECKPOINT, NUMBER = "checkpoint", "number"
+CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
 
 STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable", "doubtful")
 UNFINISHED = -1
+ROUNDED = 1e-9  # mm: less penetration than this is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +185,24 @@ FIELD_INTERVAL = Variable(
     "mm",
 )
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL)
+CHECKED_REALIZATION = Variable(
+    "realization_checked", (CHECKED,), "i8", "number of a realization that was checked; -1: none", "1"
+)
+SURFACE_PENETRATION = Variable(
+    "surface_penetration",
+    (CHECKED, PAIR),
+    "f8",
+    "largest depth of one face in the other part's body in the corrected state, at points much denser than contact points; "
+    "NaN: one-sided locators, which have no faces",
+    "mm",
+)
+BESIDE = Variable(
+    "beside",
+    (CHECKED, PAIR),
+    "f8",
+    "how far contact points that touch stand beside the rim of the reference face; NaN where that is not known",
+    "mm",
+)
 SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
 FIELD_SUMS = Variable(
     "sums",

@@ -11,6 +11,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
+from tolcontact.archive.checked import nothing_checked
 from tolcontact.archive.variables import define, write
 from tolcontact.assembly import Mesh
 from tolcontact.assembly.document import to_document
@@ -47,8 +48,11 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
     }
 
 
-def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any]) -> None:
-    """All attributes, dimensions, labels and groups; of the rows and of the fields what they will be called."""
+def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
+    """All attributes, dimensions, labels and groups; of the rows and of the fields what they will be called.
+
+    `surfaces` is the number of realizations that will be checked against the surfaces.
+    """
     nominal = program.nominal
     file.setncatts(
         {
@@ -93,6 +97,10 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
     _write_model(file.createGroup("model"), nominal, declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
     _write_sample(file.createGroup("sample"), nominal, deviations=settings["kept"] == "all")
+    checked = file.createGroup("surface")
+    checked.createDimension(words.CHECKED, surfaces)
+    for variable, nothing in nothing_checked(surfaces, len(nominal.pairs)).items():
+        write(checked, variable, nothing)
     for part in nominal.parts:
         group = file.createGroup(f"field/{part.name}")
         for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):

@@ -16,7 +16,7 @@ from tolcontact.symbolic import Program
 SAME = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 
-def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any]) -> None:
+def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
     """Raise ArchiveError where the archive `there`, in the file `path`, is of another model or another run."""
     if not there.dimensions[words.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
@@ -28,6 +28,9 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
     for variable, values in contact_values(program.nominal).items():
         if not _same(there["contact"][variable.name], values):
             raise ArchiveError(f'"{path}": contact points were others (by {there.versions}); write to a new file')
+    room = len(there["surface"].dimensions[words.CHECKED])
+    if room != surfaces:
+        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
     for word, value in settings.items():
         was = getattr(there, word, None)
         if word != "samples" and was != value:

@@ -17,6 +17,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
+from tolcontact.archive.checked import archived_poses, choose, nothing_checked
 from tolcontact.archive.header import now, run_settings, versions, write_header
 from tolcontact.archive.reader import open_archive
 from tolcontact.archive.same_run import check_same_run
@@ -39,18 +40,19 @@ class ArchiveWriter:
     samples   realizations that it has room for
     """
 
-    def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> None:
-        """Create the file with everything but its rows. `keep` says what it will hold of each realization (see `run`).
+    def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str, surfaces: int) -> None:
+        """Create the file with everything but its rows. `keep` says what it will hold of each realization, and `surfaces` how
+        many will be checked against the surfaces (see `run`).
 
         Raises ArchiveError where it cannot be written.
         """
         with _replacing(path) as part, _opened(part, "w") as file:
-            write_header(file, program, run_settings(program, seed, samples, keep))
+            write_header(file, program, run_settings(program, seed, samples, keep), surfaces)
             _make_room(file, 0, samples)
         self._go_on(path, program.nominal)
 
     @classmethod
-    def resume(cls, path: Path, program: Program, *, seed: int, samples: int, keep: str) -> "ArchiveWriter":
+    def resume(cls, path: Path, program: Program, *, seed: int, samples: int, keep: str, surfaces: int) -> "ArchiveWriter":
         """Open an archive to go on after its last checkpoint, up to `samples`, or to its own number if that is larger.
 
         Raises ArchiveError where the file is no archive, or holds another model or another run.
@@ -61,14 +63,17 @@ class ArchiveWriter:
             shutil.copyfile(path, part)
             open_archive(part, shown=path).close()
             with _opened(part, "r+") as file:
-                check_same_run(file, path, program, run_settings(program, seed, samples, keep))
+                check_same_run(file, path, program, run_settings(program, seed, samples, keep), surfaces)
                 length = len(file.dimensions[words.REALIZATION])
                 _make_room(file, length, samples)
                 file.setncattr("samples", np.int64(max(samples, length)))
                 rows = max(0, int(file[words.SUMMED_ROWS.name][:].max()))
                 others = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
-                for each in program.nominal.parts:  # they stand for the rows of before
+                # What follows stands for the rows of before.
+                for variable, nothing in nothing_checked(surfaces, len(program.nominal.pairs)).items():
+                    file["surface"][variable.name][...] = nothing
+                for each in program.nominal.parts:
                     for variable in words.FIELDS:
                         file[f"field/{each.name}"][variable.name][...] = np.nan
         writer._go_on(path, program.nominal)
@@ -154,6 +159,23 @@ class ArchiveWriter:
         """Displacement fields of all parts, from the sums over all rows."""
         with _refusals_told(self._path):
             self._write_fields()
+
+    def chosen(self, seed: int) -> np.ndarray:
+        """Numbers (row,) of the realizations that are to be checked against the surfaces."""
+        return choose(self._file, len(self._file["surface"].dimensions[words.CHECKED]), seed)
+
+    def poses(self, rows: np.ndarray) -> np.ndarray | None:
+        """Corrected poses (row, part, 12) of some rows; None where they are not kept."""
+        return archived_poses(self._file, rows)
+
+    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
+        """What the check of some rows found, (row, pair) [mm]."""
+        with _refusals_told(self._path):
+            found = {words.SURFACE_PENETRATION: penetration, words.BESIDE: beside, words.CHECKED_REALIZATION: rows}
+            for variable, values in found.items():
+                if values.size:
+                    self._file["surface"][variable.name][: len(rows)] = values
+            self._file.sync()
 
     def _write_fields(self) -> None:
         for part, both in zip(self._nominal.parts, self._moments, strict=True):

@@ -46,6 +46,11 @@ class Tolerance:
         elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
             yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
 
+    @property
+    def width(self) -> float:
+        """Full width of the zone [mm]: the range, or six standard deviations of a distribution that says everything."""
+        return float(6 * self.distribution.std() if self.range is None else self.range)
+
     def __str__(self) -> str:
         if isinstance(self.distribution, str):
             return f"{self.distribution}, range {self.range:g} mm"

@@ -1,5 +1,7 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
+import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -10,6 +12,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
+from tolcontact.discretization.curvature import CHORD, facet_error, following, is_flat, sampling_error
 from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
@@ -18,10 +21,11 @@ from tolcontact.discretization.solids import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
 from tolcontact.discretization.units import warn_of_units
-from tolcontact.errors import ModelError
+from tolcontact.errors import ContactWarning, ModelError
 
 CONDITION_LIMIT = 1e8
 DEFAULT_REACH = 0.1
+DEFAULT_POINTS = 200
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,11 +277,18 @@ def _check_independent(points: np.ndarray, directions: np.ndarray, one_sided: np
 def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes) -> ContactPoints:
     moving, reference = placed[pair.moving.part], placed[pair.reference.part]
     own = patch(pair.moving, meshes)
-    target = patch(pair.reference, meshes).placed(*reference.placement)
-    sampled = own_vertices(own.mesh) if isinstance(pair.points, str) else spread(own.mesh, pair.points, pair.spacing)
-    P_m = moving.place(sampled)
-    P_r, n_r, over = target.project(P_m)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
+    target = patch(pair.reference, meshes).placed(*reference.placement)
+    placed_own = own.placed(*moving.placement)
+    if isinstance(pair.points, str):
+        sampled = own_vertices(own.mesh)
+    else:
+        evenly = DEFAULT_POINTS if pair.points is None and pair.spacing is None else pair.points
+        sampled = spread(own.mesh, evenly, pair.spacing)
+    P_m, finest = moving.place(sampled), assembly.finest()
+    if math.isfinite(finest) and not (is_flat(placed_own) and is_flat(target)):
+        P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
+    P_r, n_r, over = target.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)
     kept = over & (distance <= reach)
     if not kept.any():
@@ -287,7 +298,6 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
             + (" and overhangs the rim" if not over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
-    placed_own = own.placed(*moving.placement)
     _, normals, _ = placed_own.project(P_m[kept])
     if ((normals * n_r[kept]).sum(axis=1) > 0).all():
         raise GeometryFault(
@@ -304,6 +314,30 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         surface=target,
         own=placed_own,
     )
+
+
+def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndarray, finest: float, reach: float) -> np.ndarray:
+    """The contact points P_m (point, 3) of curved faces, with what curvature adds where the model leaves the choice open.
+
+    Warns of what they, or the triangles, leave unseen of more than CHORD times `finest`, the smallest tolerance range.
+    """
+    every = following(own, target, chord=CHORD * finest, within=reach)
+    if pair.points is None and pair.spacing is None:
+        P_m = np.concatenate([P_m, every])
+    errors = {
+        "between its contact points": sampling_error(P_m, every, target, unit=finest, within=reach),
+        "between the flat triangles and the round faces that they stand for": facet_error(own, target, reach),
+    }
+    advice = ("give it more points, or leave points and spacing out", "use a finer mesh")
+    for (where, error), what in zip(errors.items(), advice, strict=True):
+        if error > CHORD * finest:
+            warnings.warn(
+                f"{_where('contact pair', pair)}: parts may be off by up to {error:.2g} mm {where}, "
+                f"{error / finest:.2g} of the smallest tolerance range, {finest:.4g} mm; {what}",
+                ContactWarning,
+                stacklevel=6,
+            )
+    return P_m
 
 
 def _immovable(assembly: Assembly) -> list[str]:

@@ -93,12 +93,27 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
         yield f"pairs in conflict there: {', '.join(stuck)}"
     if unsure := by_status["not_converged"]:
         yield f"not converged: {unsure} of {count}; the poses where their steps ended count above"
+    if doubtful := by_status["doubtful"]:
+        yield f"doubtful: {doubtful} of {count} answers lie far from the raw pose, where faces are not what they were"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
-    yield f"largest true penetration: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
+    yield f"largest penetration at contact points: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
+    yield from _between(summary, count)
     yield from _advice(summary, corrected)
+
+
+def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
+    """What contact points do not see."""
+    checked, depth, beside = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
+    limit = ADVISED * summary.attrs["smallest_range"]
+    if checked:
+        yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
+        if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
+            yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, between contact points; use more points"
+        if beside > limit:
+            yield f"contact points that touch stand up to {beside:.3g} mm beside their reference face, on the plane of its rim"
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:

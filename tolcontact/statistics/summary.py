@@ -31,6 +31,9 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     not_assemblable (bound)                              share of realizations without a pose free of penetration
     conflicts       (pair)                               in how many of these a pair is among those in conflict
     penetration     (state)                              largest true penetration of any contact point [mm]
+    surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
+                                  in the other body, and how far contact points that touch stand beside the face
+    surfaces_checked              number of these realizations
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
 
@@ -57,6 +60,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
             "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in _pieces(rows)], axis=0)),
             "iterations": (("of_iterations",), _iterations(rows)),
             "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
+            **_checked(results),
             "field_extreme": (
                 (words.PART, words.STATE, "extreme", "bound"),
                 np.array([_field_extremes(results, str(part)) for part in parts]),
@@ -115,6 +119,17 @@ def _penetration(rows: xr.Dataset) -> np.ndarray:
         return np.zeros(len(words.STATES))
     least = [piece[words.GAP_MIN.name].min([words.REALIZATION, words.PAIR]).values for piece in _pieces(rows)]
     return np.asarray(np.maximum(-np.min(least, axis=0), 0))
+
+
+def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str, str]]]:
+    of = results["surface"].to_dataset()
+    largest = [np.nanmax(of[v.name].values, initial=0.0) for v in (words.SURFACE_PENETRATION, words.BESIDE)]
+    count = int((of[words.CHECKED_REALIZATION.name] != words.UNFINISHED).sum())
+    return {
+        "surface_penetration": ((), largest[0] if count else np.nan, {"units": "mm"}),
+        "beside": ((), largest[1] if count else np.nan, {"units": "mm"}),
+        "surfaces_checked": ((), count, {"units": "1"}),
+    }
 
 
 def _iterations(rows: xr.Dataset) -> list[float]:

@@ -1,0 +1,74 @@
+"""Which realizations of an archive are checked against the surfaces themselves, and what that found."""
+
+from collections.abc import Iterator
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.vocabulary import Variable
+
+PIECE = 100_000  # rows that are read at once
+CERTIFIED = [words.STATUS_MEANINGS.index(meaning) for meaning in ("untouched", "resolved")]
+
+
+def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
+    """Numbers (row,) of certified realizations, `count` at most, in order.
+
+    A third of them penetrate most at their contact points, a third have most points that carry, the rest are drawn.
+    """
+    rows = len(file.dimensions[words.REALIZATION])
+    deepest, busiest, drawn = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
+    lot = np.random.default_rng([seed, rows])
+    for first, status, gap, carrying in _pieces(file, rows):
+        number = first + np.flatnonzero(np.isin(status, CERTIFIED))
+        inside = -gap[number - first, 1].min(axis=1, initial=np.inf)
+        # Only what exceeds rounding is deeper than anything else.
+        deepest.add(number, np.where(inside > words.ROUNDED, inside, 0.0))
+        busiest.add(number, carrying[number - first].sum(axis=1))
+        drawn.add(number, lot.random(len(number)))
+    chosen = list(dict.fromkeys([*deepest.numbers, *busiest.numbers, *drawn.numbers]))
+    return np.sort(chosen[:count]).astype(np.int64)
+
+
+def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
+    for first in range(0, rows, PIECE):
+        some = slice(first, min(first + PIECE, rows))
+        status, gap, carrying = (
+            np.ma.getdata(file[variable.name][some]) for variable in (words.STATUS, words.GAP_MIN, words.CARRYING)
+        )
+        yield first, status, gap, carrying
+
+
+class _Largest:
+    """The numbers of the largest values above 0, the first of equals."""
+
+    def __init__(self, count: int) -> None:
+        self._count = count
+        self.numbers, self._values = np.zeros(0, dtype=np.int64), np.zeros(0)
+
+    def add(self, numbers: np.ndarray, values: np.ndarray) -> None:
+        numbers = np.concatenate([self.numbers, numbers[values > 0]])
+        values = np.concatenate([self._values, values[values > 0]])
+        order = np.lexsort((numbers, -values))[: self._count]
+        self.numbers, self._values = numbers[order], values[order]
+
+
+def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None:
+    """Corrected poses (row, part, 12) of some rows; None where the archive does not keep poses."""
+    if words.ROTATION.name not in file.variables:
+        return None
+    R, t = (
+        np.array([np.ma.getdata(file[variable.name][int(row), 1]) for row in rows])
+        for variable in (words.ROTATION, words.TRANSLATION)
+    )
+    return np.concatenate([R.reshape(*R.shape[:2], 9), t], axis=2)
+
+
+def nothing_checked(count: int, pairs: int) -> dict[Variable, np.ndarray]:
+    """What the group holds before anything was checked."""
+    return {
+        words.CHECKED_REALIZATION: np.full(count, words.UNFINISHED),
+        words.SURFACE_PENETRATION: np.full((count, pairs), np.nan),
+        words.BESIDE: np.full((count, pairs), np.nan),
+    }

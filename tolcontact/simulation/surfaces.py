@@ -1,0 +1,48 @@
+"""Certified answers against the surfaces themselves: what contact points do not see."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.sampling import draw
+from tolcontact.simulation.block import CORRECTED
+from tolcontact.simulation.run import simulate_block
+from tolcontact.symbolic import Program
+
+TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
+
+
+class Surfaces(NamedTuple):
+    """What was found at some poses, both (row, pair) [mm]; NaN for pairs that are no faces.
+
+    penetration   largest depth of one face in the other's body, seen at many points of both
+    beside        how far contact points that touch stand beside the rim of the reference face, which is not there
+    """
+
+    penetration: np.ndarray
+    beside: np.ndarray
+
+
+def check_surfaces(program: Program, poses: np.ndarray) -> Surfaces:
+    """Look at the faces of every pair at corrected poses (row, part, 12)."""
+    nominal, fixed = program.nominal, program.method.search == "fixed"
+    found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
+    for k, pair in enumerate(nominal.pairs):
+        faces = nominal.face_pair(k)
+        if faces is None or pair.reference is None:
+            continue
+        X_RM = pose.compose(pose.inverse(poses[:, pair.reference]), poses[:, pair.moving])
+        found.penetration[:, k] = faces.depth(X_RM)
+        if fixed:  # else contact points are those that stand over the face
+            places = pose.apply(X_RM, pair.P_m)
+            row, point = np.nonzero(((places - pair.P_r) * pair.n_r).sum(axis=2) < TOUCHES)
+            found.beside[:, k] = 0
+            np.maximum.at(found.beside[:, k], row, faces.reference.face.overhang(places[row, point]))
+    return found
+
+
+def simulated_poses(program: Program, rows: np.ndarray, seed: int) -> np.ndarray:
+    """Corrected poses (row, part, 12) of some realizations, simulated once more."""
+    drawn = [draw(program.nominal, seed=seed, start=int(row), stop=int(row) + 1) for row in rows]
+    return simulate_block(program, np.concatenate(drawn)).poses[:, CORRECTED]
