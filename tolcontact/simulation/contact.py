@@ -237,7 +237,7 @@ class ContactResolver:
             for slots in state.slots:  # what carried before may now be beyond the rim
                 slots.put(searching, Slots.empty(len(searching), SLOTS))
             self._repeat(task, state, self._found(state.relative[searching]), searching, stride)
-            moved = self._displacements(before, state.poses[searching])
+            moved = self._doubt.displacement(before, state.poses[searching])
             searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]
             if not searching.size:
                 return
@@ -284,12 +284,4 @@ class ContactResolver:
 
     def _drift(self, task: Task, state: State, rows: np.ndarray) -> np.ndarray:
         """How far `rows` have come from their raw pose, in sizes of the parts. A force may find nothing to rest on."""
-        return self._displacements(task.raw[rows], state.poses[rows]) / self._size
-
-    def _displacements(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Largest displacement (row,) [mm] of a contact point between two poses (row, part, 12)."""
-        apart = [
-            np.linalg.norm(pose.apply(after[:, side.part], side.points) - pose.apply(before[:, side.part], side.points), axis=2)
-            for side in self._group.sides
-        ]
-        return np.asarray(np.max([each.max(axis=1) for each in apart], axis=0))
+        return self._doubt.displacement(task.raw[rows], state.poses[rows]) / self._size

@@ -23,13 +23,14 @@ class Doubt:
 
     def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:
         self._nominal, self._pairs = nominal, group.pairs
-        self._method, self._size = method, size
+        self._size, self._farthest = size, method.near_travel * size
+        self._turned_far = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
-        self._corners = [(side.part, _corners(side.points)) for side in group.sides]
+        self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> np.ndarray:
         """(row,): whether no part has turned, and no contact point travelled, farther than the method's limits."""
-        return np.asarray(~(self._turns(task, state) > self._method.near_turn) & ~self._travels(task, state))
+        return np.asarray(~self._turned(task, state) & ~self._travelled(task, state))
 
     def remains(self, task: Task, state: State, carriers: Carriers) -> np.ndarray:
         """(row,): whether the doubt remains once the faces themselves were looked at.
@@ -38,9 +39,8 @@ class Doubt:
         points that carry: `carriers` gives those of some rows and a pair, which row each belongs to and where it is nominally
         (point, 3), and the usual distance of contact points.
         """
-        turned = self._turns(task, state) > self._method.near_turn
-        doubtful = turned.copy()
-        rows = np.flatnonzero(self._travels(task, state) & ~turned & state.solved & ~state.in_conflict)
+        doubtful = self._turned(task, state)
+        rows = np.flatnonzero(self._travelled(task, state) & ~doubtful & state.solved & ~state.in_conflict)
         for k, index in enumerate(self._pairs):
             faces, X_RM = self._nominal.face_pair(index) if rows.size else None, state.relative[rows, k]
             if faces is not None:
@@ -50,23 +50,29 @@ class Doubt:
                 doubtful[rows] |= faces.depth(X_RM) > INSIDE * self._size
         return doubtful
 
-    def _turns(self, task: Task, state: State) -> np.ndarray:
-        """Largest turn (row,) [rad] of a part from its raw pose."""
-        if not self._movers:
-            return np.zeros(len(task.raw))
-        return np.asarray(pose.turn(task.raw[:, self._movers], state.poses[:, self._movers]).max(axis=1))
+    def _turned(self, task: Task, state: State) -> np.ndarray:
+        """(row,): whether a part turned too far from its raw pose."""
+        apart = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
+        return np.asarray(((apart**2).sum(axis=2) > self._turned_far).any(axis=1))
 
-    def _travels(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether a contact point is farther from its raw place than the limit; seen at the corners around them."""
-        apart = state.poses - task.raw
-        far = np.zeros(len(apart))
-        for part, corners in self._corners:
-            moved = pose.apply(apart[:, part], corners)
-            far = np.maximum(far, (moved**2).sum(axis=2).max(axis=1))
-        return np.asarray(far > (self._method.near_travel * self._size) ** 2)
+    def _travelled(self, task: Task, state: State) -> np.ndarray:
+        """(row,): whether a contact point may be too far from its raw place."""
+        return np.asarray(self.displacement(task.raw, state.poses) > self._farthest)
+
+    def displacement(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """What no contact point moves farther than (row,) [mm] between two poses (row, part of the group, 12).
+
+        That of the centre of a ball around the points, and the ball's radius times the turn.
+        """
+        most = np.zeros(len(before))
+        for part, centre, radius in self._balls:
+            apart = after[:, part] - before[:, part]
+            turn = np.sqrt((apart[:, :9] ** 2).sum(axis=1))
+            most = np.maximum(most, np.linalg.norm(pose.apply(apart, centre)[:, 0], axis=1) + radius * turn)
+        return most
 
 
-def _corners(points: np.ndarray) -> np.ndarray:
-    """Corners (8, 3) of the box around points (point, 3)."""
-    limits = points.min(axis=0), points.max(axis=0)
-    return np.array([[limits[i][0], limits[j][1], limits[k][2]] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
+def _ball(points: np.ndarray) -> tuple[np.ndarray, float]:
+    """Centre (1, 3) and radius [mm] of a ball around points (point, 3)."""
+    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    return centre[None], float(np.linalg.norm(points - centre, axis=1).max())

@@ -11,7 +11,7 @@ from tolcontact.symbolic.polishing import polished
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
-ROUGH = 1e-2 * ACCURACY  # mm: an answer with a larger KKT residual is polished
+ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
 
 
 class ContactSolver:
