@@ -12,7 +12,7 @@ from tolcontact.discretization.surface import Surface
 
 HALVINGS = 40
 MOST = 5000  # points that curvature may ask for
-SOUP = 200_000  # triangles at which halving gives up
+SOUP = 30_000  # triangles at which halving gives up
 ACROSS = 4  # pieces of the smaller face that the first triangles see
 PROBES = 2000  # random displacements by which sets of points are compared
 TOGETHER = 500
@@ -41,7 +41,7 @@ def following(own: Surface, target: Surface, *, chord: float, within: float) -> 
         error = np.where(near & (length > coarse), np.maximum(error, length), error)  # too coarse to see anything
         split = error.max(axis=1) > chord
         done.append(triangles[~split].reshape(-1, 3))
-        if not split.any() or len(triangles) > SOUP:
+        if not split.any() or sum(map(len, done)) / 3 + split.sum() > SOUP:
             done.append(triangles[split].reshape(-1, 3))
             break
         triangles, worst = triangles[split], error[split].argmax(axis=1)
@@ -149,7 +149,7 @@ def _gaps(rows: np.ndarray, moves: np.ndarray) -> np.ndarray:
 def _ever_deepest(rows: np.ndarray, within: float, unit: float) -> np.ndarray:
     """Numbers of the points that are the deepest after some displacement, most often first."""
     times = np.zeros(len(rows), dtype=int)
-    for seed in range(2, 2 + 5):
+    for seed in (2, 3, 4):
         for moves in _moves(within, unit, seed):
             times += np.bincount(_gaps(rows, moves).argmin(axis=0), minlength=len(rows))
     order = np.argsort(-times, kind="stable")

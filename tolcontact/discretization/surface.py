@@ -9,6 +9,7 @@ from scipy.sparse import csr_array
 
 from tolcontact.discretization.edges import on_rim, rim
 
+FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
 CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they stand for one curved face
 
 
@@ -29,6 +30,17 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         return _corner_normals(self.mesh) if self._given is None else self._given
+
+    @cached_property
+    def curvature(self) -> float:
+        """How fast its normals turn, usually [1/mm]: of half its area by more, of half by less. 0 of a flat face."""
+        corners, normals = np.asarray(self.mesh.triangles), self.corner_normals
+        along, turn = (np.linalg.norm(np.roll(each, -1, axis=1) - each, axis=2) for each in (corners, normals))
+        fastest = (turn / np.maximum(along, 1e-300)).max(axis=1)
+        order = np.argsort(fastest)
+        middle = np.searchsorted(np.cumsum(self.mesh.area_faces[order]), self.mesh.area / 2)
+        usual = float(fastest[order[min(middle, len(order) - 1)]])
+        return usual if usual * self.mesh.scale > FLAT else 0.0
 
     @cached_property
     def _tree(self) -> igl.AABB:

@@ -3,7 +3,7 @@
 The linearized resolution takes one linear step. The exact one goes on from the poses reached, with their true gaps, until
 they stay: a sequence of QPs. The first steps are like the paper's. What has not come to rest by then has freedoms that next to
 nothing holds, while the curvature of gaps and objective counts: it goes on with Newton steps, and holds those freedoms
-firmly first. With an iterated search, contact points are then projected again, and all of this repeated until the poses stay.
+firmly first. With an iterated search, contact points are projected again before every linear step, until the poses stay.
 
 Where that ends in a conflict, without an answer, or far from the raw pose, it is tried again from other starts.
 """
@@ -25,11 +25,13 @@ from tolcontact.symbolic import ACCURACY, SLOTS, ContactGroup, Program
 LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
 CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
 STRIDE, CAREFUL = 0.5, 0.05  # rad: what a step may turn a part by; linear rows are wrong long before
-SEARCHES = 40
+SEARCHES = 100
+SHRINKS, CAUTION = 0.7, 10.0  # of the step before, or of the foreseen gain: what good steps reach; what others cost
+UNWORTHY = 1e-6  # mm, in the norm of the objective: its square is what a step gains
 CLUSTERS = 6
 AT_REST = 1e-9  # mm: a smaller step ends the exact resolution
 NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
-SETTLED = 1e-6  # mm: poses that move less after a search have settled
+SETTLED = 1e-8  # mm: a smaller step after a search ends it
 PRICE = 1e3  # of a locator that does not hold, beside penetration
 ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
 LOST = 1e5  # sizes of the parts: no step will bring it back
@@ -117,9 +119,10 @@ class ContactResolver:
     def _attempt(self, task: Task, state: State, scans: Sequence[PairScan], stride: float) -> None:
         """Go from where `state` is to an answer; `scans` are of the contact points there."""
         every = np.arange(len(task.raw))
-        self._repeat(task, state, scans, every, stride)
         if self._method.search == "iterated":
-            self._settle(task, state, stride)
+            self._settle(task, state, scans, stride)
+        else:
+            self._repeat(task, state, scans, every, stride)
         if self._method.objective == "seating":
             # Nothing holds them: they are left where they were.
             adrift = self._drift(task, state, every) > ADRIFT
@@ -229,19 +232,34 @@ class ContactResolver:
             return None
         return np.asarray(scan.gaps(relative, deviations) < self._method.activity)
 
-    def _settle(self, task: Task, state: State, stride: float) -> None:
-        """Search and resolve again until the poses stay."""
-        searching = np.arange(len(task.raw))
+    def _settle(self, task: Task, state: State, scans: Sequence[PairScan], stride: float) -> None:
+        """Linear steps, each about points that were projected anew, until they stay.
+
+        More than one step about the same points would let a round part roll on the planes that stand for its counterpart.
+        Linear rows do not know how the surfaces curve: steps that neither shrink nor gain are taken with more caution.
+        """
+        moving = np.arange(len(task.raw))
+        first = 1.0 if self._method.objective == "seating" else 0.0  # forces pull far where nothing holds
+        caution, before = np.full(len(moving), first), np.full(len(moving), np.inf)
+        energy = self._energy_of(task, state)
         for _ in range(SEARCHES):
-            before = state.poses[searching]
             for slots in state.slots:  # what carried before may now be beyond the rim
-                slots.put(searching, Slots.empty(len(searching), SLOTS))
-            self._repeat(task, state, self._found(state.relative[searching]), searching, stride)
-            moved = self._doubt.displacement(before, state.poses[searching])
-            searching, moved = searching[moved > SETTLED], moved[moved > SETTLED]
-            if not searching.size:
+                slots.put(moving, Slots.empty(len(moving), SLOTS))
+            step, scaled = self._step.take(task, state, scans, moving, stride=stride, caution=caution)
+            now = self._energy_of(task.take(moving), state.take(moving))
+            share = (energy - now) / np.maximum(scaled**2 / 2, 1e-300)  # of the gain that the QP foresaw
+            idle = (step > SHRINKS * before) & (share < 1 - SHRINKS)
+            caution = np.where(idle, np.maximum(CAUTION * caution, 1), np.where(share > SHRINKS, caution / CAUTION, caution))
+            on = (step > SETTLED) & ~(idle & (scaled < UNWORTHY))
+            if self._method.objective == "seating":
+                lost = on & (self._drift(task, state, moving) > LOST)
+                state.residual[moving[lost]] = np.inf
+                on &= ~lost
+            moving, caution, before, energy = moving[on], caution[on], step[on], now[on]
+            if not moving.size:
                 return
-        state.residual[searching] = np.maximum(state.residual[searching], moved)
+            scans = self._found(state.relative[moving])
+        state.residual[moving] = np.maximum(state.residual[moving], before)
 
     def _repeat(self, task: Task, state: State, scans: Sequence[PairScan], moving: np.ndarray, stride: float) -> None:
         """Linear steps of the rows `moving` (`scans` are theirs) until they are at rest; in the linearized resolution one."""

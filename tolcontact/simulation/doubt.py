@@ -15,6 +15,7 @@ from tolcontact.simulation.resolution import State, Task
 from tolcontact.symbolic import Group
 
 Carriers = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, float]]
+ROLLS = 0.3  # rad: points that slid farther around a curved face have planes there that are not its own
 INSIDE = 1e-4  # sizes of the parts: what the faces of a far answer may lie in each other, being triangles
 
 
@@ -26,11 +27,17 @@ class Doubt:
         self._size, self._farthest = size, method.near_travel * size
         self._turned_far = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
+        pairs = [nominal.pairs[index] for index in group.pairs]
+        self._curved = [
+            (k, pair.surface.curvature, *_ball(pair.P_m))
+            for k, pair in enumerate(pairs)
+            if pair.surface is not None and pair.surface.curvature > 0 and method.search == "fixed"
+        ]
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> np.ndarray:
         """(row,): whether no part has turned, and no contact point travelled, farther than the method's limits."""
-        return np.asarray(~self._turned(task, state) & ~self._travelled(task, state))
+        return np.asarray(~self._turned(task, state) & ~self._is_far(task, state))
 
     def remains(self, task: Task, state: State, carriers: Carriers) -> np.ndarray:
         """(row,): whether the doubt remains once the faces themselves were looked at.
@@ -40,7 +47,7 @@ class Doubt:
         (point, 3), and the usual distance of contact points.
         """
         doubtful = self._turned(task, state)
-        rows = np.flatnonzero(self._travelled(task, state) & ~doubtful & state.solved & ~state.in_conflict)
+        rows = np.flatnonzero(self._is_far(task, state) & ~doubtful & state.solved & ~state.in_conflict)
         for k, index in enumerate(self._pairs):
             faces, X_RM = self._nominal.face_pair(index) if rows.size else None, state.relative[rows, k]
             if faces is not None:
@@ -55,9 +62,12 @@ class Doubt:
         apart = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return np.asarray(((apart**2).sum(axis=2) > self._turned_far).any(axis=1))
 
-    def _travelled(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether a contact point may be too far from its raw place."""
-        return np.asarray(self.displacement(task.raw, state.poses) > self._farthest)
+    def _is_far(self, task: Task, state: State) -> np.ndarray:
+        """(row,): whether a contact point may be too far from its raw place, or too far around a curved reference face."""
+        far = self.displacement(task.raw, state.poses) > self._farthest
+        for k, curvature, centre, radius in self._curved:
+            far |= curvature * _displacement(state.relative[:, k] - pose.AT_REST, centre, radius) > ROLLS
+        return np.asarray(far)
 
     def displacement(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """What no contact point moves farther than (row,) [mm] between two poses (row, part of the group, 12).
@@ -66,10 +76,14 @@ class Doubt:
         """
         most = np.zeros(len(before))
         for part, centre, radius in self._balls:
-            apart = after[:, part] - before[:, part]
-            turn = np.sqrt((apart[:, :9] ** 2).sum(axis=1))
-            most = np.maximum(most, np.linalg.norm(pose.apply(apart, centre)[:, 0], axis=1) + radius * turn)
+            most = np.maximum(most, _displacement(after[:, part] - before[:, part], centre, radius))
         return most
+
+
+def _displacement(apart: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
+    """What no point of a ball moves farther than (row,) [mm], for differences of two poses (row, 12)."""
+    turn = np.sqrt((apart[:, :9] ** 2).sum(axis=1))
+    return np.asarray(np.linalg.norm(pose.apply(apart, centre)[:, 0], axis=1) + radius * turn)
 
 
 def _ball(points: np.ndarray) -> tuple[np.ndarray, float]:

@@ -50,14 +50,15 @@ class LinearStep:
         moving: np.ndarray,
         *,
         stride: float,
+        caution: np.ndarray | float = 0.0,
         firmness: float = 1.0,
         newton: bool = False,
     ) -> np.ndarray:
         """One linear step of the rows `moving`: the QP in which every point has its row.
 
-        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization, and of the step no more
-        is taken than turns a part by `stride` [rad]. Returns the step's size (2, row) [mm]: that of the largest increment,
-        and in the norm of the objective.
+        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization, of the step no more is
+        taken than turns a part by `stride` [rad], and `caution` (row,) makes steps smaller, but not their end. Returns the
+        step's size (2, row) [mm]: that of the largest increment, and in the norm of the objective.
         """
         now = state.poses[moving]
         scans = [scans[k] for k in self.varying]
@@ -85,6 +86,7 @@ class LinearStep:
                 "firmness": np.full(len(open_), firmness),
                 "newton": np.full(len(open_), float(newton)),
                 "stride": np.full(len(open_), stride),
+                "caution": np.broadcast_to(caution, len(moving))[open_],
                 "reactions": reactions[open_],
                 "bend": bend[open_],
             }

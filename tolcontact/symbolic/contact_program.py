@@ -20,7 +20,7 @@ import numpy as np
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.method import Method
 from tolcontact.symbolic.correction import FREEDOMS, increments, linear, published, quadratic, rigid
-from tolcontact.symbolic.criterion import criterion, two_sided
+from tolcontact.symbolic.criterion import criterion, proximity, two_sided
 from tolcontact.symbolic.gap import gap
 from tolcontact.symbolic.gap_map import GapMap
 from tolcontact.symbolic.groups import Group
@@ -32,7 +32,8 @@ SLOTS = 12
 SLACK = 1e-3
 FAR = 1e3
 INPUTS = (
-    "poses", "raw", "moments", "deviations", "firmness", "newton", "stride", "reactions", "bend", "P_m", "P_r", "n_r", "filled",
+    "poses", "raw", "moments", "deviations", "firmness", "newton", "stride", "caution", "reactions", "bend",
+    "P_m", "P_r", "n_r", "filled",
 )  # fmt: skip
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
 OUTPUTS = ("corrected", "linearized", "relative", "multipliers", "residual", "slack", "step", "astray")
@@ -80,6 +81,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
+    caution              in an iterated search: weight of the step itself, in all contact points [1], beside the objective
     reactions (k)        where it counts: the reaction that a row's point had before
     bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
                          by the entries of X_RM
@@ -109,6 +111,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
         ca.SX.sym("firmness"),
         ca.SX.sym("newton"),
         ca.SX.sym("stride"),
+        ca.SX.sym("caution"),
         ca.SX.sym("reactions", rows),
         ca.SX.sym("bend", ENTRIES * varying),
         *(ca.SX.sym(name, 3, slots) for name in ("P_m", "P_r", "n_r")),
@@ -131,7 +134,8 @@ def _around_the_solver(
 
     Besides the objective, and the number of two-sided locators that are held.
     """
-    entries, raw_entries, moments, deviations, firmness, newton, stride, reactions, bend, P_m, P_r, n_r, filled = inputs
+    entries, raw_entries, moments, deviations, firmness, newton, stride, caution, reactions, bend, *slotted = inputs
+    P_m, P_r, n_r, filled = slotted
     now, raw = poses_of(entries), poses_of(raw_entries)
     z = ca.SX.sym("z", FREEDOMS * len(group.free))
     at_rest = ca.SX.zeros(z.shape)
@@ -182,6 +186,8 @@ def _around_the_solver(
         counts = ca.logic_and(newton, _is_convex(Q + curvature))
         Q += ca.if_else(counts, curvature, 0)
         pull += ca.if_else(counts, A.T @ (hold * g), 0)
+    if method.search == "iterated":
+        Q += caution * ca.substitute(ca.hessian(proximity(group, now, moved, z), z)[0], z, at_rest) / group.length
     H, U = _conditioned(Q)
     whiten = _whitening(U)
     A = A @ whiten
