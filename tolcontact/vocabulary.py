@@ -94,6 +94,14 @@ KKT_RESIDUAL = Variable(
 ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "linear steps that the contact problem took", "1")
 STARTS = Variable("starts", (REALIZATION,), "i1", "places that the steps to an answer were started from", "1")
 SECOND_ANSWERS = Variable("second_answers", (REALIZATION,), "i4", "QPs that another solver had to answer", "1")
+SEARCHED = Variable(
+    "searched",
+    (REALIZATION,),
+    "i1",
+    "1: contact points were projected again at the corrected pose, onto curved faces, and gap_min is of those; 0: it is of "
+    "the archived ones",
+    "1",
+)
 STATUS = Variable(
     "status",
     (REALIZATION,),
@@ -117,6 +125,7 @@ ROWS = (
     ITERATIONS,
     STARTS,
     SECOND_ANSWERS,
+    SEARCHED,
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)

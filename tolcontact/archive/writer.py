@@ -122,6 +122,7 @@ class ArchiveWriter:
             words.ITERATIONS: block.iterations,
             words.STARTS: block.starts,
             words.SECOND_ANSWERS: block.second_answers,
+            words.SEARCHED: block.searched,
         }
         if words.DEVIATION.name in self._file["sample"].variables:
             self._file["sample"][words.DEVIATION.name][rows] = block.deviations
@@ -230,7 +231,9 @@ def _refusals_told(path: Path) -> Iterator[None]:
 
 def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
     """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
-    counts = (words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS, words.STARTS, words.SECOND_ANSWERS)
+    counts = (
+        words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS, words.STARTS, words.SECOND_ANSWERS, words.SEARCHED,
+    )  # fmt: skip
     room: dict[Variable, float] = dict.fromkeys(counts, words.UNFINISHED)
     for variable in (*words.ROWS, words.DEVIATION):
         stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)

@@ -74,6 +74,7 @@ class ContactPoints:
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     `locators` holds the column of the deviation of each such point, by which the support stands out along n^r; it is
     None for a pair of faces, whose `surface` is the reference face in its nominal place, and `own` the moving one.
+    `facets` [mm] is how far their triangles may lie off the round faces that they stand for.
     """
 
     name: str
@@ -85,6 +86,7 @@ class ContactPoints:
     locators: np.ndarray | None = None
     surface: Surface | None = None
     own: Surface | None = None
+    facets: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,6 +315,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         n_r[kept],
         surface=target,
         own=placed_own,
+        facets=facet_error(placed_own, target, reach),
     )
 
 

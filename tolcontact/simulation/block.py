@@ -34,6 +34,7 @@ class Block:
     iterations    (n,): linear steps taken, 0 where untouched
     starts        (n,): places the steps were started from, 0 where untouched
     second_answers (n,): QPs that another solver had to answer
+    searched      (n,) bool: contact points were projected again at the corrected pose
     """
 
     start: int
@@ -49,6 +50,7 @@ class Block:
     iterations: np.ndarray
     starts: np.ndarray
     second_answers: np.ndarray
+    searched: np.ndarray
 
     def __len__(self) -> int:
         return len(self.status)

@@ -10,6 +10,7 @@ Where that ends in a conflict, without an answer, or far from the raw pose, it i
 
 import copy
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from tolcontact.simulation.resolution import CARRIES, Resolution, State, Task
 from tolcontact.simulation.scan import PairScan, least_gaps, pair_scan
 from tolcontact.simulation.search import reach, search
 from tolcontact.simulation.slots import Slots
-from tolcontact.symbolic import ACCURACY, SLOTS, ContactGroup, Program
+from tolcontact.symbolic import ACCURACY, SLOTS, ContactGroup, Program, round_pairs
 
 LINEAR = (1.0,) * 8  # firmness of the first steps, which do not count curvature
 CURVED = (1e4,) * 6 + (1e2,) * 6 + (1.0,) * 80  # firmness of the steps after those
@@ -36,6 +37,19 @@ PRICE = 1e3  # of a locator that does not hold, beside penetration
 ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
 LOST = 1e5  # sizes of the parts: no step will bring it back
 BETTER = 1e-6  # of the objective, or mm of penetration: what another start must gain to be preferred
+
+
+class Start(NamedTuple):
+    """Where and how an answer is looked for.
+
+    at_nominal   from the nominal instead of the raw place
+    anew         with contact points that are projected again, before every step, onto curved faces
+    stride       what a step may turn a part by [rad]
+    """
+
+    at_nominal: bool = False
+    anew: bool = False
+    stride: float = STRIDE
 
 
 class ContactResolver:
@@ -59,7 +73,10 @@ class ContactResolver:
             # Where the paper's set of points may carry, those between the corners count, too.
             some = self._method.search == "fixed" and self._method.active_set == "closed"
             self._candidates.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if some else self._scans[-1])
-        self._reaches = [reach(scan) for scan in self._scans] if self._method.search == "iterated" else []
+        exact_fixed = self._method.resolution == "exact" and self._method.search == "fixed"
+        self._round = round_pairs(program.nominal, group.group) if exact_fixed else []
+        searched = self._round if self._method.search == "fixed" else range(len(self._pairs))
+        self._reaches = {k: reach(self._scans[k]) for k in searched}
         self._doubt = Doubt(program.nominal, group.group, self._method, self._size)
 
     def twin(self) -> "ContactResolver":
@@ -99,7 +116,7 @@ class ContactResolver:
             may_carry=[self._may_carry(scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
         )
         state = self._state(task.raw, task.relative)
-        self._attempt(task, state, scans, STRIDE)
+        self._attempt(task, state, scans, Start())
         starts = np.ones(len(rows), dtype=int)
         if self._method.resolution == "exact":
             self._start_elsewhere(task, state, starts)
@@ -116,23 +133,36 @@ class ContactResolver:
     def _state(self, poses: np.ndarray, relative: np.ndarray) -> State:
         return State.start(poses, relative, self._step.spans[-1].stop, len(self._step.varying))
 
-    def _attempt(self, task: Task, state: State, scans: Sequence[PairScan], stride: float) -> None:
+    def _attempt(self, task: Task, state: State, scans: Sequence[PairScan], start: Start) -> None:
         """Go from where `state` is to an answer; `scans` are of the contact points there."""
         every = np.arange(len(task.raw))
-        if self._method.search == "iterated":
-            self._settle(task, state, scans, stride)
+        anew = start.anew or self._method.search == "iterated"
+        if anew:
+            self._settle(task, state, scans, start.stride)
         else:
-            self._repeat(task, state, scans, every, stride)
+            self._repeat(task, state, scans, every, start.stride)
+        state.searched[:] = anew
         if self._method.objective == "seating":
             # Nothing holds them: they are left where they were.
             adrift = self._drift(task, state, every) > ADRIFT
             state.residual[adrift], state.slack[adrift], state.multipliers[adrift] = np.inf, 0, 0
             state.poses[adrift], state.relative[adrift] = task.raw[adrift], task.relative[adrift]
-        scans = self._found(state.relative)
+        scans = self._found(state.relative, anew=anew)
         state.gap_min[:] = least_gaps(scans, state.relative, task.deviations)
         if self._method.resolution == "exact":
             self._recheck(task, state, scans)
         state.doubtful[:] = self._doubt.remains(task, state, lambda rows, pair: self._carriers(state, rows, pair))
+        if not anew:
+            self._look_round(task, state)
+
+    def _look_round(self, task: Task, state: State) -> None:
+        """Doubt answers in which contact points have slid into a curved face, along planes that are not its own there."""
+        for k in self._round:
+            rows = np.flatnonzero(self._doubt.rolled(k, state))
+            if rows.size:
+                found = search(self._candidates[k], self._pairs[k].surface, state.relative[rows, k], self._reaches[k])
+                inside = -found.least(state.relative[rows, k], task.deviations[rows])
+                state.doubtful[rows] |= inside > self._doubt.allowed(k)
 
     def _recheck(self, task: Task, state: State, scans: Sequence[PairScan]) -> None:
         """The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts."""
@@ -146,15 +176,15 @@ class ContactResolver:
         state.residual[:] = np.maximum(state.residual, state.astray + excused)
 
     def _start_elsewhere(self, task: Task, state: State, starts: np.ndarray) -> None:
-        """Try again what is not certified, or far: from the nominal place, and then in small steps. Keep what is better."""
+        """Try again what is not certified, or far, from other starts. Keep what is better."""
         left = np.flatnonzero((state.rank > 0) | ~self._doubt.is_near(task, state))
-        for at_nominal, stride in ((True, STRIDE), (False, CAREFUL)):
+        for start in (*([Start(anew=True)] if self._round else []), Start(at_nominal=True), Start(stride=CAREFUL)):
             if not left.size:
                 return
             part = task.take(left)
-            poses, relative = self._at_nominal(part) if at_nominal else (part.raw, part.relative)
+            poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
             other = self._state(poses, relative)
-            self._attempt(part, other, self._found(relative), stride)
+            self._attempt(part, other, self._found(relative, anew=start.anew), start)
             starts[left] += 1
             for all_told, more in ((state.iterations, other.iterations), (state.second_answers, other.second_answers)):
                 all_told[left] += more
@@ -209,12 +239,17 @@ class ContactResolver:
             found.append(moving)
         return np.stack(found, axis=1)
 
-    def _found(self, relative: np.ndarray) -> list[PairScan]:
-        """Scans of the points that may carry, for X_RM (realization, pair, 12), projected again if the method says so."""
-        if self._method.search == "fixed":
-            return self._candidates
-        each = zip(self._scans, self._pairs, self._reaches, strict=True)
-        return [search(scan, pair.surface, relative[:, k], margin) for k, (scan, pair, margin) in enumerate(each)]
+    def _found(self, relative: np.ndarray, *, anew: bool = False) -> list[PairScan]:
+        """Scans of the points that may carry, for X_RM (realization, pair, 12); projected again if the method says so.
+
+        `anew`: those against curved faces are projected again in any case.
+        """
+        scans = self._candidates
+        if anew or self._method.search == "iterated":
+            scans = list(scans)
+            for k, margin in self._reaches.items():
+                scans[k] = search(scans[k], self._pairs[k].surface, relative[:, k], margin)
+        return scans
 
     def _moments(self, pair: int, active: np.ndarray) -> np.ndarray:
         """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
@@ -258,7 +293,7 @@ class ContactResolver:
             moving, caution, before, energy = moving[on], caution[on], step[on], now[on]
             if not moving.size:
                 return
-            scans = self._found(state.relative[moving])
+            scans = self._found(state.relative[moving], anew=True)
         state.residual[moving] = np.maximum(state.residual[moving], before)
 
     def _repeat(self, task: Task, state: State, scans: Sequence[PairScan], moving: np.ndarray, stride: float) -> None:

@@ -12,11 +12,11 @@ from tolcontact import poses as pose
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
 from tolcontact.simulation.resolution import State, Task
-from tolcontact.symbolic import Group
+from tolcontact.symbolic import Group, round_pairs
 
 Carriers = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, float]]
-ROLLS = 0.3  # rad: points that slid farther around a curved face have planes there that are not its own
-INSIDE = 1e-4  # sizes of the parts: what the faces of a far answer may lie in each other, being triangles
+INSIDE = 1e-4  # sizes of the parts, and
+SHARE = 0.01  # of the smallest tolerance range: what faces may lie in each other, beside what their triangles leave open
 
 
 class Doubt:
@@ -27,12 +27,11 @@ class Doubt:
         self._size, self._farthest = size, method.near_travel * size
         self._turned_far = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
-        pairs = [nominal.pairs[index] for index in group.pairs]
-        self._curved = [
-            (k, pair.surface.curvature, *_ball(pair.P_m))
-            for k, pair in enumerate(pairs)
-            if pair.surface is not None and pair.surface.curvature > 0 and method.search == "fixed"
-        ]
+        self._group_pairs = [nominal.pairs[index] for index in group.pairs]
+        self._open = min(INSIDE * size, SHARE * nominal.assembly.finest())
+        self._round = {
+            k: (self._group_pairs[k].surface.curvature, *_ball(self._group_pairs[k].P_m)) for k in round_pairs(nominal, group)
+        }
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> np.ndarray:
@@ -54,7 +53,7 @@ class Doubt:
                 row, points, spacing = carriers(rows, k)
                 beside = faces.reference.face.overhang(pose.apply(X_RM[row], points[:, None])[:, 0])
                 doubtful[rows[row[beside > spacing]]] = True
-                doubtful[rows] |= faces.depth(X_RM) > INSIDE * self._size
+                doubtful[rows] |= faces.depth(X_RM) > self.allowed(k)
         return doubtful
 
     def _turned(self, task: Task, state: State) -> np.ndarray:
@@ -63,11 +62,21 @@ class Doubt:
         return np.asarray(((apart**2).sum(axis=2) > self._turned_far).any(axis=1))
 
     def _is_far(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether a contact point may be too far from its raw place, or too far around a curved reference face."""
-        far = self.displacement(task.raw, state.poses) > self._farthest
-        for k, curvature, centre, radius in self._curved:
-            far |= curvature * _displacement(state.relative[:, k] - pose.AT_REST, centre, radius) > ROLLS
-        return np.asarray(far)
+        """(row,): whether a contact point may be too far from its raw place."""
+        return np.asarray(self.displacement(task.raw, state.poses) > self._farthest)
+
+    def allowed(self, k: int) -> float:
+        """How deep [mm] the faces of pair k of the group may lie in each other before an answer is doubted."""
+        return self._open + self._group_pairs[k].facets
+
+    def rolled(self, k: int, state: State) -> np.ndarray:
+        """(row,): whether points may have slid around the reference face of pair k until their planes are not its own.
+
+        Beside its foot a plane leaves a curved face by the curvature times half the square of the distance.
+        """
+        curvature, centre, radius = self._round[k]
+        slid = _displacement(state.relative[:, k] - pose.AT_REST, centre, radius)
+        return np.asarray(curvature * slid**2 / 2 > self.allowed(k))
 
     def displacement(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
         """What no contact point moves farther than (row,) [mm] between two poses (row, part of the group, 12).

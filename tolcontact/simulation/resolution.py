@@ -50,6 +50,7 @@ class State:
     second_answers (row,): QPs that another solver had to answer
     multipliers (row, row of the QP): reactions in the last QP
     gap_min     (row, pair of the group) [mm]: least true gap at `poses`, once the steps have ended
+    searched    (row,) bool: contact points were projected again at `poses`, onto curved faces at least
     doubtful    (row,) bool: `poses` are far from the raw ones, and what they stand on was not confirmed
     slots       the points that carry most, for the next QP to start with; one for each pair whose points in the QP change
     """
@@ -63,6 +64,7 @@ class State:
     second_answers: np.ndarray
     multipliers: np.ndarray
     gap_min: np.ndarray
+    searched: np.ndarray
     doubtful: np.ndarray
     slots: list[Slots]
 
@@ -95,6 +97,7 @@ class State:
             second_answers=np.zeros(count, dtype=int),
             multipliers=np.zeros((count, rows)),
             gap_min=np.full((count, pairs), np.nan),
+            searched=np.zeros(count, dtype=bool),
             doubtful=np.zeros(count, dtype=bool),
             slots=[Slots.empty(count, SLOTS) for _ in range(varying)],
         )

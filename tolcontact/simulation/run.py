@@ -75,7 +75,7 @@ def simulate_block(
 
     poses = raw.copy()
     touched, stuck, solved = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.ones(count, dtype=bool)
-    doubtful, residual = np.zeros(count, dtype=bool), np.zeros(count)
+    doubtful, searched, residual = np.zeros(count, dtype=bool), np.zeros(count, dtype=bool), np.zeros(count)
     iterations, starts, second_answers = (np.zeros(count, dtype=int) for _ in range(3))
     carrying, reaction = np.zeros((count, len(nominal.pairs)), dtype=int), np.zeros((count, len(nominal.pairs)))
     active, gap_min = np.zeros((count, len(nominal.pairs)), dtype=int), np.empty((count, 2, len(nominal.pairs)))
@@ -91,6 +91,7 @@ def simulate_block(
         doubtful[rows] |= state.doubtful
         iterations[rows] = np.maximum(iterations[rows], state.iterations)
         starts[rows] = np.maximum(starts[rows], found.starts)
+        searched[rows] |= state.searched
         second_answers[rows] += state.second_answers
         carrying[np.ix_(rows, resolver.pairs)] = found.carrying(resolver.spans)
         reaction[np.ix_(rows, resolver.pairs)] = found.reactions(resolver.spans)
@@ -117,6 +118,7 @@ def simulate_block(
         iterations=iterations,
         starts=starts,
         second_answers=second_answers,
+        searched=searched,
     )
 
 

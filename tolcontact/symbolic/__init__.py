@@ -2,7 +2,7 @@
 
 from tolcontact.symbolic.contact_program import SLOTS
 from tolcontact.symbolic.gap_map import GapMap
-from tolcontact.symbolic.groups import Group
+from tolcontact.symbolic.groups import Group, round_pairs
 from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import ACCURACY, usable_plugins
 from tolcontact.symbolic.pose import ENTRIES
@@ -18,5 +18,6 @@ __all__ = [
     "Group",
     "Program",
     "compile_program",
+    "round_pairs",
     "usable_plugins",
 ]

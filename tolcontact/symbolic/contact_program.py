@@ -23,7 +23,7 @@ from tolcontact.symbolic.correction import FREEDOMS, increments, linear, publish
 from tolcontact.symbolic.criterion import criterion, proximity, two_sided
 from tolcontact.symbolic.gap import gap
 from tolcontact.symbolic.gap_map import GapMap
-from tolcontact.symbolic.groups import Group
+from tolcontact.symbolic.groups import Group, round_pairs
 from tolcontact.symbolic.objective import MOMENTS
 from tolcontact.symbolic.plugins import Plugin, solver
 from tolcontact.symbolic.pose import ENTRIES, Pose, pose_of, poses_of, relative
@@ -81,7 +81,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
-    caution              in an iterated search: weight of the step itself, in all contact points [1], beside the objective
+    caution              where points are projected anew: weight of the step itself, in all contact points [1], beside the objective
     reactions (k)        where it counts: the reaction that a row's point had before
     bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
                          by the entries of X_RM
@@ -186,7 +186,7 @@ def _around_the_solver(
         counts = ca.logic_and(newton, _is_convex(Q + curvature))
         Q += ca.if_else(counts, curvature, 0)
         pull += ca.if_else(counts, A.T @ (hold * g), 0)
-    if method.search == "iterated":
+    if method.resolution == "exact" and (method.search == "iterated" or round_pairs(nominal, group)):
         Q += caution * ca.substitute(ca.hessian(proximity(group, now, moved, z), z)[0], z, at_rest) / group.length
     H, U = _conditioned(Q)
     whiten = _whitening(U)

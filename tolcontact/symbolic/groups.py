@@ -61,6 +61,12 @@ class Group:
         return BALL * self.length
 
 
+def round_pairs(nominal: Nominal, group: Group) -> list[int]:
+    """Positions of the pairs of a group whose reference face is curved."""
+    surfaces = [nominal.pairs[index].surface for index in group.pairs]
+    return [k for k, surface in enumerate(surfaces) if surface is not None and surface.curvature > 0]
+
+
 def contact_groups(nominal: Nominal) -> list[Group]:
     """The groups of parts that contact couples: what touches only fixed parts in common stays apart."""
     chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
