@@ -223,7 +223,7 @@ from tolcontact.archive import writer
 
 folder, before = sys.argv[1], sys.argv[2] == "before"
 program = tc.build(cases.stack(), solver="daqp")
-run = lambda path, **options: tc.run(program, samples=9000, seed=3, out=path, keep="measures", **options).close()
+run = lambda path, **options: tc.run(program, samples=9000, seed=3, out=path, keep="measures", surfaces=4, **options).close()
 run(f"{folder}/whole.nc")
 
 class Dying(netCDF4.Dataset):

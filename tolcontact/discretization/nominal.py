@@ -12,11 +12,12 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
-from tolcontact.discretization.curvature import CHORD, facet_error, following, is_flat, sampling_error
+from tolcontact.discretization.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
 from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.layout import lay_out
+from tolcontact.discretization.overlap import overlap_corners
 from tolcontact.discretization.solids import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
@@ -26,6 +27,7 @@ from tolcontact.errors import ContactWarning, ModelError
 CONDITION_LIMIT = 1e8
 DEFAULT_REACH = 0.1
 DEFAULT_POINTS = 200
+SAME = 1e-9  # of the part's size: points that are no farther apart are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,8 +290,12 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         evenly = DEFAULT_POINTS if pair.points is None and pair.spacing is None else pair.points
         sampled = spread(own.mesh, evenly, pair.spacing)
     P_m, finest = moving.place(sampled), assembly.finest()
-    if math.isfinite(finest) and not (is_flat(placed_own) and is_flat(target)):
+    if is_flat(placed_own) and is_flat(target):
+        if pair.points is None and pair.spacing is None:
+            P_m = np.concatenate([P_m, overlap_corners(placed_own, target)])
+    elif math.isfinite(finest):
         P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
+    P_m = distinct(P_m, SAME * moving.mesh.scale)
     P_r, n_r, over = target.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)
     kept = over & (distance <= reach)

@@ -52,6 +52,10 @@ class Start(NamedTuple):
     stride: float = STRIDE
 
 
+FLAT = (Start(at_nominal=True), Start(stride=CAREFUL))  # where it is tried again, if no face is curved, and
+ROUND = (Start(anew=True), Start(anew=True, at_nominal=True))  # if one is
+
+
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
@@ -178,7 +182,7 @@ class ContactResolver:
     def _start_elsewhere(self, task: Task, state: State, starts: np.ndarray) -> None:
         """Try again what is not certified, or far, from other starts. Keep what is better."""
         left = np.flatnonzero((state.rank > 0) | ~self._doubt.is_near(task, state))
-        for start in (*([Start(anew=True)] if self._round else []), Start(at_nominal=True), Start(stride=CAREFUL)):
+        for start in ROUND if self._round else FLAT:
             if not left.size:
                 return
             part = task.take(left)

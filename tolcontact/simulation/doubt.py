@@ -29,9 +29,10 @@ class Doubt:
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._open = min(INSIDE * size, SHARE * nominal.assembly.finest())
-        self._round = {
-            k: (self._group_pairs[k].surface.curvature, *_ball(self._group_pairs[k].P_m)) for k in round_pairs(nominal, group)
-        }
+        self._round = {}
+        for k in round_pairs(nominal, group):
+            surface, points = self._group_pairs[k].surface, self._group_pairs[k].P_m
+            self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> np.ndarray:

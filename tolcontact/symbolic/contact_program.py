@@ -81,7 +81,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
-    caution              where points are projected anew: weight of the step itself, in all contact points [1], beside the objective
+    caution              where points are projected anew: weight of the step itself, in all contact points, beside the objective
     reactions (k)        where it counts: the reaction that a row's point had before
     bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
                          by the entries of X_RM
