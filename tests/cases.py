@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
-from scipy.stats import uniform
+from scipy.stats import norm, uniform
 
 import tolcontact as tc
 
@@ -243,4 +243,154 @@ def stopped(stops: int = 1) -> tc.Assembly:
         + [tc.Locator(f"stop {k}", (0, 5 + 7 * k, 5), "x", 1, one_sided=True) for k in range(stops)],
     )
     a.measure("face", block.point(50, 30, 20), along="x")
+    return a
+
+
+def parked(*names: str, away: float = 0.5) -> list[tc.Locator]:
+    """One-sided stops that hold nothing once a part has come to rest: `name:x,y,z:direction`, that far behind the part."""
+    found = []
+    for said in names:
+        name, at, along = said.split(":")
+        point = tuple(float(c) for c in at.split(","))
+        found.append(tc.Locator(name, point, along, norm(-away, 1e-9), one_sided=True))
+    return found
+
+
+def hinged_ring(wedges: int, sigma: float = 0.05) -> tc.Assembly:
+    """Wedges hinged on one axis, one of them fixed, each face of each askew by its own angle; pushed together.
+
+    They close where the sum of the angles leaves room: see `excess_of_hinged_ring`. A face is a plate of its own, which turns
+    about the axis by its locator at 30 mm.
+    """
+    a = tc.Assembly("hinged ring")
+    half, open_ = np.pi / wedges, ring_opening(wedges, sigma) / 30 / (2 * wedges)
+    faces = []
+    for k in range(wedges):
+        c, s = np.cos(2 * half * k), np.sin(2 * half * k)
+        hub = a.part(f"hub {k}", tc.Box(20, 2, 10), at=(20 * c, 20 * s, 0), rotation=(0, 0, 2 * half * k), fixed=k == 0)
+        feet = [tc.Locator(f"Z{i}", p, "z", 0) for i, p in enumerate([(0, 0, 0), (20, 0, 0), (10, 2, 0)])]
+        axis = [tc.Locator("X", (-20, 0, 0), "x", 0), tc.Locator("Y", (-20, 0, 0), "y", 0)]
+        last = [tc.Locator("T", (10, 0, 0), "y", 0)] if k == 0 else parked("T:10,0,0:y", away=20)
+        a.locate(hub, [*feet, *axis, *last])
+        if k:
+            a.force(f"push {k}", at=hub.point(10, 0, 0), vector=(-0.1 * s, 0.1 * c, 0))
+        both = {}
+        for side, sign, y in (("ahead", 1, 1.0), ("behind", -1, 0.0)):
+            angle = 2 * half * k + sign * (half - open_)
+            frame = Frame(turn=(0, 0, angle))
+            plate = a.part(f"{side} {k}", tc.Box(20, 1, 10), **frame.place(20, -y, 0), fixed=True)
+            rest = [tc.Locator(f"Z{i}", p, "z", 0) for i, p in enumerate([(0, 0, 0), (20, 0, 0), (10, 1, 0)])]
+            about = [tc.Locator("X", (-20, y, 0), "x", 0), tc.Locator("Y", (-20, y, 0), "y", 0)]
+            a.locate(plate, [*rest, *about, tc.Locator("T", (10, y, 0), "y", norm(0, sigma))], on=hub)
+            both[side] = plate
+        faces.append(both)
+    for k in range(wedges):
+        moving, reference = faces[(k + 1) % wedges]["behind"].face("-y"), faces[k]["ahead"].face("+y")
+        a.contact(f"joint {k}", moving=moving, reference=reference, points=9, within=5)
+    a.measure("x", faces[0]["ahead"].point(0, 0, 0), along="x", tolerance=1)
+    return a
+
+
+def ring_opening(wedges: int, sigma: float = 0.05) -> float:
+    """What the hinged ring is open nominally, at 30 mm from the axis [mm]: some 19 % of the draws exceed it."""
+    return 0.87 * sigma * np.sqrt(2 * wedges)
+
+
+def excess_of_hinged_ring(nominal, deviations: np.ndarray, sigma: float = 0.05) -> np.ndarray:
+    """By how much (realization,) the wedges are wider than the full turn, at 30 mm from the axis [mm]."""
+    labels = nominal.locator_labels
+    wide = sum(
+        (1.0 if label.startswith("ahead") else -1.0) * deviations[:, column]
+        for column, label in enumerate(labels)
+        if label.endswith(".T") and not label.startswith("hub")
+    )
+    return wide - ring_opening(sum(label.startswith("ahead") for label in labels) // 6, sigma)
+
+
+def block_on_six(width: float, one_sided: int = 0) -> tc.Assembly:
+    """A block on six locators, some of them one-sided, that a force pushes against a wall it may not reach."""
+    a = tc.Assembly("block on six")
+    wall = a.part("wall", tc.Box(10, 100, 100), at=(100, 0, 0), fixed=True)
+    block = a.part("block", tc.Box(100, 100, 100), fixed=False)
+    places = [
+        ((10, 10, 0), "z"),
+        ((90, 10, 0), "z"),
+        ((50, 90, 0), "z"),
+        ((10, 0, 50), "y"),
+        ((90, 0, 50), "y"),
+        ((0, 50, 50), "x"),
+    ]
+    six = [tc.Locator(f"L{k}", p, d, width, one_sided=k >= 6 - one_sided) for k, (p, d) in enumerate(places)]
+    a.locate(block, six)
+    a.contact("side", moving=block.face("+x"), reference=wall.face("-x"))
+    a.force("push", at=block.point(50, 50, 50), vector=(1, 0, -1))
+    a.measure("corner", block.point(0, 0, 0), along="x", tolerance=1)
+    return a
+
+
+def shaft_in_a_v(sections: int = 720, sigma: float = 0.02, radius: float = 10.0, **points) -> tc.Assembly:
+    """A shaft along y under its weight in a V of two plates at 45 degrees, whose heights vary.
+
+    Its axis comes to (left + right) / sqrt 2 above its nominal place.
+    """
+    a = tc.Assembly("V")
+    plates = []
+    for name, turn in (("left", -np.pi / 4), ("right", np.pi / 4)):
+        frame = Frame(turn=(0, turn, 0))
+        plate = a.part(name, tc.Box(40, 80, 5), **frame.place(-20, -40, -5), fixed=True)
+        rest = {
+            "RX": ((20, 0, 2), "y"),
+            "X1": ((0, 40, 0), "x"),
+            "X2": ((0, 40, 5), "x"),
+            "X3": ((0, 80, 2), "x"),
+            "Y": ((20, 0, 4), "y"),
+        }
+        held = [tc.Locator(key, p, d, 0) for key, (p, d) in rest.items()]
+        a.locate(plate, [tc.Locator("H", (20, 40, 5), "z", norm(0, sigma)), *held])
+        plates.append(plate)
+    shape = trimesh.creation.cylinder(radius=radius, height=60, sections=sections)
+    shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    shaft = a.part("shaft", tc.Mesh(shape), at=(0, 0, radius * np.sqrt(2)), fixed=False)
+    stops = parked("Z1:0,-25,-10:z", "Z2:0,25,-10:z", "X1:-10,-25,0:x", "X2:-10,25,0:x", "T:0,0,10:x")
+    a.locate(shaft, [tc.Locator("Y", (0, -30, 0), "y", 0), *stops])
+    a.force("weight", at=shaft.point(0, 0, 0), vector=(0, 0, -10))
+    for plate in plates:
+        barrel = shaft.face(lambda c, n: abs(n[:, 1]) < 0.1)
+        a.contact(f"{plate.name} wall", moving=barrel, reference=plate.face("+z"), **points)
+    a.measure("height", shaft.point(0, 0, 0), along="z", tolerance=6 * sigma)
+    return a
+
+
+def peg_in_a_hole(clearance: float = 0.05, tolerance: float = 0.2) -> tc.Assembly:
+    """A round peg, free to spin, that a force pushes to the side of a hole whose place varies."""
+    a = tc.Assembly("peg")
+    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5 + clearance, 20, 10, sections=720)), fixed=True)
+    peg = a.part("peg", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=720)), fixed=False)
+    feet = [tc.Locator(f"Z{k}", (x, y, -5), "z", 0) for k, (x, y) in enumerate([(20, 0), (-20, 0), (0, 20)])]
+    sides = [tc.Locator(f"S{k}", (x, 0, 0), along, tolerance) for k, (x, along) in enumerate([(0, "x"), (0, "y"), (20, "y")])]
+    a.locate(plate, [*feet, *sides])
+    ends = [tc.Locator(f"Z{k}", (x, y, -10), "z", 0) for k, (x, y) in enumerate([(0, 0), (5, 0), (0, 5)])]
+    a.locate(peg, [*ends, *parked("X:-5,0,0:x", "Y1:0,-5,0:y", "Y2:4,-3,0:y")])
+    a.force("push", at=peg.point(0, 0, 0), vector=(1, -2, 0))
+    wall = plate.face(lambda c, n: (abs(n[:, 2]) < 0.1) & (np.hypot(c[:, 0], c[:, 1]) < 10))
+    a.contact("fit", moving=peg.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=wall)
+    a.measure("x", peg.point(0, 0, 0), along="x", tolerance=tolerance)
+    return a
+
+
+def ball_in_a_cone(tolerance: float = 0.2) -> tc.Assembly:
+    """A ball under its weight in a cone of 90 degrees that is off its place and askew: its centre comes to 10 sqrt 2 above."""
+    a = tc.Assembly("ball")
+    profile = np.array([[4, -8], [20, 8], [22, 8], [22, -10], [4, -10], [4, -8]], dtype=float)
+    shape = trimesh.creation.revolve(profile, sections=720)
+    shape.invert()
+    seat = a.part("seat", tc.Mesh(shape), fixed=True)
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(5, 10)), at=(0, 0, 10 * np.sqrt(2) - 12), fixed=False)
+    places = [((20, 0), "z"), ((-20, 0), "z"), ((0, 20), "z"), ((0, 0), "x"), ((0, 0), "y"), ((20, 0), "y")]
+    a.locate(seat, [tc.Locator(f"L{k}", (*xy, -10), along, tolerance) for k, (xy, along) in enumerate(places)])
+    a.locate(ball, parked("Z1:5,0,-8:z", "Z2:-5,0,-8:z", "Z3:0,5,-8:z", "X:-10,0,0:x", "Y1:0,-10,0:y", "Y2:3,-9,0:y"))
+    a.force("weight", at=ball.point(0, 0, 0), vector=(0, 0, -10))
+    hollow = seat.face(lambda c, n: (n[:, 2] > 0.3) & (np.hypot(c[:, 0], c[:, 1]) < 19.9))
+    a.contact("seat", moving=ball.face(lambda c, n: n[:, 2] < -0.2), reference=hollow)
+    a.measure("height", ball.point(0, 0, 0), along="z", tolerance=tolerance)
     return a

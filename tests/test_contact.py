@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases, referee
-from tolcontact.simulation import CORRECTED, RAW, Status, simulate_blocks
+from tolcontact.simulation import CORRECTED, RAW, Block, Status, simulate_blocks
 from tolcontact.symbolic import usable_plugins
 
 
@@ -13,18 +13,7 @@ def simulate(assembly, samples=200, seed=1, block=1000, **options):
     """Blocks joined to one: arrays by name, and the program."""
     program = tc.build(assembly, **options)
     blocks = list(simulate_blocks(program, samples=samples, seed=seed, block=block))
-    names = (
-        "deviations",
-        "poses",
-        "measured",
-        "gap_min",
-        "active",
-        "carrying",
-        "reaction",
-        "status",
-        "kkt_residual",
-        "iterations",
-    )
+    names = [name for name in Block.__dataclass_fields__ if name != "start"]
     return program, {name: np.concatenate([getattr(b, name) for b in blocks]) for name in names}
 
 

@@ -76,7 +76,7 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
 
 
 def shifted(R: np.ndarray, t: np.ndarray, pair: ContactPoints) -> float:
-    """By how much rims may be deeper than contact points, which are where rims overlapped nominally: the shift times the turn."""
+    """How much deeper than contact points, which are where faces overlapped nominally, rims may lie: shift times turn [mm]."""
     m, r = pair.moving, pair.reference
     turn, centre = R[r].T @ R[m], pair.P_m.mean(axis=0)
     angle = np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))
@@ -114,7 +114,7 @@ def main() -> None:
             except tc.TolcontactError:
                 total["refused"] += 1
                 break
-            round_ = any(pair.surface is not None and not pair.own.curvature == 0 for pair in program.nominal.pairs if pair.own)
+            round_ = any(pair.own.curvature > 0 for pair in program.nominal.pairs if pair.own is not None)
             run = simulate(program, said.samples // 10 if round_ else said.samples)
             runs[solver] = run
             statuses.update((solver, Status(status).name) for status in run["status"])

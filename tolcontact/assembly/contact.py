@@ -15,8 +15,9 @@ class ContactPair:
 
     The points are `points` of them spread evenly, or as many as keep every spot of the face within `spacing` [mm] of
     one, or the mesh's own vertices (`points="vertices"`). Where nothing is said they are 200 spread evenly, with the
-    corners of the region where flat faces overlap, and on curved faces as many more as curvature asks for. A point takes part when the reference face lies within
-    `within` [mm] of it in the nominal assembly (None: a tenth of the moving part's diagonal).
+    corners of the region where flat faces overlap, and on curved faces as many more as curvature asks for.
+    A point takes part when the reference face lies within `within` [mm] of it in the nominal assembly (None: a tenth of
+    the moving part's diagonal).
     """
 
     name: str

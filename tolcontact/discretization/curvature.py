@@ -6,7 +6,6 @@ middle lies deepest below the line between its ends, as seen from the reference 
 """
 
 import numpy as np
-import trimesh
 
 from tolcontact.discretization.surface import Surface
 
@@ -118,7 +117,9 @@ def _seen(target: Surface, places: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
 
 def distinct(points: np.ndarray, apart: float) -> np.ndarray:
     """The points (point, 3) of which no earlier one is the same, but for `apart` [mm]; in their order."""
-    first, _ = trimesh.grouping.unique_rows(np.round(points / apart))
+    # Counted from one of them: far from the origin their numbers would be too large.
+    cells = np.round((points - points[:1]) / apart).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
     return np.asarray(points[np.sort(first)])
 
 

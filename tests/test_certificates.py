@@ -1,0 +1,214 @@
+"""What a certificate says holds for bodies, near the raw pose, and does not hang on luck."""
+
+import warnings
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from studies.certificates.judge import contradictions
+from studies.certificates.scenes import scene
+from tests import cases
+from tests.test_contact import R_t, simulate
+from tolcontact import poses as pose
+from tolcontact.errors import ContactWarning, OptionError
+from tolcontact.simulation import CORRECTED, RAW, Status
+from tolcontact.symbolic.plugins import PLUGINS
+
+SEATED = tc.Method(objective="seating", resolution="exact")
+SOLVERS = ("daqp", "qpoases")
+
+
+def turned(run):
+    """Largest turn (realization,) of a part between both states."""
+    return pose.turn(run["poses"][:, RAW], run["poses"][:, CORRECTED]).max(axis=1)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("wedges", [3, 6])
+def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
+    """The excess of an impossible ring is left over, shared by the joints, to the second order of the angles."""
+    program, run = simulate(cases.hinged_ring(wedges), samples=400, solver=solver, method=SEATED)
+    excess = cases.excess_of_hinged_ring(program.nominal, run["deviations"])
+    assert 40 < (excess > 0).sum() < 120
+    assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
+    assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
+    assert turned(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
+    left = -run["gap_min"][excess > 0, CORRECTED].min(axis=1)
+    # The rim of the faces is 40 mm from the axis, the excess is told at 30.
+    assert (left <= excess[excess > 0] * 40 / 30 * 1.01 + 1e-4).all() and (left > 0).all()
+
+
+@pytest.mark.parametrize("one_sided", [0, 1, 3])
+@pytest.mark.parametrize("width", [0.2, 0.02])
+def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_sided):
+    runs = [simulate(cases.block_on_six(width, one_sided), samples=100, solver=s, method=SEATED)[1] for s in SOLVERS]
+    for run in runs:
+        assert (run["status"] == runs[0]["status"]).all()
+        assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
+        assert turned(run).max() < 0.01
+    assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > 50
+    assert np.abs(runs[0]["poses"] - runs[1]["poses"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
+    """CASES C8, in two frames and in blocks of two sizes: the same status in every row."""
+    method = tc.Method(resolution="exact")
+    _, still = simulate(cases.model("channel"), samples=3000, seed=seed, block=4096, solver=solver, method=method)
+    assert (still["status"] == Status.RESOLVED).all()
+    _, small = simulate(cases.model("channel"), samples=1000, seed=seed, block=37, solver=solver, method=method)
+    assert (small["status"] == still["status"][:1000]).all()
+    assert np.abs(small["poses"] - still["poses"][:1000]).max() < 1e-6
+
+
+@pytest.mark.parametrize("solver", ["osqp", "highs", "proxqp", "piqp"])
+def test_every_solver_certifies_what_the_others_do(solver):
+    if solver not in tc_solvers():
+        pytest.skip(f"{solver} does not come with this CasADi")
+    _, reference = simulate(cases.stack(), samples=300, solver="daqp")
+    _, run = simulate(cases.stack(), samples=300, solver=solver)
+    assert (run["status"] == reference["status"]).all()
+    assert np.abs(run["poses"] - reference["poses"]).max() < 1e-6  # freedoms that only eta holds enlarge the residual
+    assert run["kkt_residual"].max() < 1e-8
+
+
+def tc_solvers():
+    from tolcontact.symbolic import usable_plugins
+
+    return usable_plugins()
+
+
+def test_what_a_solver_misses_another_one_answers(monkeypatch):
+    """A solver that stops after one iteration: the poses are those of a good one, and the archive says who answered."""
+    _, good = simulate(cases.stack(), samples=100, solver="qpoases")
+    lazy = PLUGINS["daqp"].__class__("daqp", {"daqp": {"iter_limit": 1}}, second=("qpoases",))
+    monkeypatch.setitem(PLUGINS, "daqp", lazy)
+    _, run = simulate(cases.stack(), samples=100, solver="daqp")
+    assert run["second_answers"].sum() > 30 and good["second_answers"].sum() == 0
+    assert np.abs(run["poses"] - good["poses"]).max() < 1e-8
+    assert (run["status"] == good["status"]).all()
+    monkeypatch.setitem(PLUGINS, "daqp", PLUGINS["daqp"].__class__("daqp", lazy.options, second=()))
+    _, alone = simulate(cases.stack(), samples=100, solver="daqp")
+    lost = alone["status"] == Status.NOT_CONVERGED
+    assert lost.sum() > 30
+    assert np.abs(alone["poses"][lost, CORRECTED] - alone["poses"][lost, RAW]).max() < 5  # and moves nothing far
+
+
+def test_far_answers_are_not_certified():
+    """The limit is the method's: at half a degree hardly any answer of a tower is near."""
+    near = tc.Method(resolution="exact", objective="all points")
+    strict = tc.Method(resolution="exact", objective="all points", near_turn=np.radians(0.5))
+    _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=near)
+    _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=strict)
+    far = turned(free) > strict.near_turn
+    assert far.sum() > 5
+    assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 3).all()
+    assert (run["status"][~far] == free["status"][~far]).all()
+    assert turned(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
+
+
+@pytest.mark.parametrize("option", [{"near_turn": 0.0}, {"near_turn": 4.0}, {"near_travel": 0.0}, {"near_travel": np.inf}])
+def test_limits_that_are_none_are_refused(option):
+    with pytest.raises(OptionError, match=next(iter(option))):
+        tc.Method(**option)
+
+
+def errors_of_the_v(program, run):
+    labels = program.nominal.locator_labels
+    left, right = (run["deviations"][:, labels.index(f"{side}.H")] for side in ("left", "right"))
+    return run["measured"][:, CORRECTED, 0] - (left + right) / np.sqrt(2)
+
+
+def told(make, **options):
+    """A simulation, and what it warned of."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ContactWarning)
+        program, run = simulate(make, **options)
+    return program, run, [str(one.message) for one in caught if one.category is ContactWarning]
+
+
+def test_a_shaft_in_a_v_rests_where_it_should():
+    """Default points: bias below a thousandth of the tolerance range, or a warning that names the error."""
+    program, run, _ = told(cases.shaft_in_a_v(1440), samples=200, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert np.abs(errors_of_the_v(program, run)).max() < 1e-3 * 0.12
+    program, run, warned = told(cases.shaft_in_a_v(64), samples=100, solver="daqp", method=SEATED)
+    assert np.abs(errors_of_the_v(program, run)).max() < 0.02
+    assert len(warned) == 2 and "0.012 mm between the flat triangles" in warned[0] and 'contact pair "left wall"' in warned[0]
+    program, run, warned = told(cases.shaft_in_a_v(1440, points=200), samples=100, solver="daqp", method=SEATED)
+    assert np.abs(errors_of_the_v(program, run)).max() > 0.01
+    assert len(warned) == 2 and "between its contact points" in warned[0]
+
+
+def test_a_peg_that_can_spin_lies_at_the_side_of_its_hole():
+    """Planes at fixed points let it roll into the wall: such answers are tried again with points projected anew."""
+    _, run, _ = told(cases.peg_in_a_hole(), samples=8, solver="daqp", method=SEATED)
+    resolved = run["status"] == Status.RESOLVED
+    assert resolved.sum() >= 6 and np.isin(run["status"][~resolved], [Status.NOT_CONVERGED, Status.DOUBTFUL]).all()
+    _, t = R_t(run["poses"][:, CORRECTED])
+    apart = (t[:, 1] - t[:, 0])[resolved, :2]
+    assert np.abs(np.linalg.norm(apart, axis=1) - 0.05).max() < 1e-3 * 0.2
+    assert np.abs(apart @ [1, -2] / np.sqrt(5) - 0.05).max() < 1e-3 * 0.2
+    assert run["searched"][resolved].all()
+
+
+def test_a_ball_rests_in_a_cone():
+    _, run, _ = told(cases.ball_in_a_cone(), samples=6, solver="daqp", method=SEATED)
+    resolved = run["status"] == Status.RESOLVED
+    assert resolved.sum() >= 5
+    R, t = R_t(run["poses"][resolved, CORRECTED])
+    apex, axis = R[:, 0] @ [0, 0, -12.0] + t[:, 0], R[:, 0] @ [0, 0, 1.0]
+    centre = R[:, 1] @ [0, 0, 10 * np.sqrt(2) - 12] + t[:, 1]
+    height = ((centre - apex) * axis).sum(axis=1)
+    assert np.abs(height - 10 * np.sqrt(2)).max() < 1e-3 * 0.2
+    assert np.linalg.norm(centre - apex - height[:, None] * axis, axis=1).max() < 1e-3  # on the cone's axis
+
+
+def test_surfaces_are_checked_between_contact_points(tmp_path):
+    """A shaft on few points sinks into the walls; the archive says how deep, and the true answer agrees."""
+    method = SEATED
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ContactWarning)
+        model = cases.shaft_in_a_v(1440, points=200)
+        with tc.run(model, samples=100, solver="daqp", method=method, out=tmp_path / "v.nc", surfaces=20) as results:
+            surface, summary = results["surface"].to_dataset().load(), tc.summarize(results)
+        program, run = simulate(model, samples=100, solver="daqp", method=method)
+        again = tc.run(model, samples=100, solver="daqp", method=method, keep="measures", surfaces=20)
+    rows = surface["realization_checked"].values
+    assert len(set(rows)) == 20 and (np.diff(rows) > 0).all() and rows.min() >= 0 and rows.max() < 100
+    # A shaft that lies too low by h lies h / sqrt 2 deep in both walls.
+    low = -errors_of_the_v(program, run)[rows] / np.sqrt(2)
+    walls = surface["surface_penetration"].values[:, :2]
+    assert low.min() > 0.01
+    assert np.abs(walls.mean(axis=1) - low).max() < 1e-3
+    assert float(summary["surface_penetration"]) == walls.max() and int(summary["surfaces_checked"]) == 20
+    assert np.abs(again["surface/surface_penetration"].values[:, :2] - walls).max() < 1e-6
+
+
+def test_points_beside_the_rim_of_a_face_are_told():
+    """RA1's top block stands out over the end of the base."""
+    results = tc.run(cases.ra1(), samples=300, solver="daqp")
+    summary = tc.summarize(results)
+    assert float(summary["surface_penetration"]) < 1e-9
+    assert 1 < float(summary["beside"]) < 15
+
+
+@pytest.mark.parametrize("seed", range(0, 60, 2))
+def test_nothing_contradicts_a_certificate(seed):
+    """Random scenes: see studies/certificates, which judges many more."""
+    runs = []
+    for solver in SOLVERS:
+        assembly, method = scene(seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ContactWarning)
+            try:
+                program, run = simulate(assembly, samples=30, solver=solver, method=method)
+            except tc.TolcontactError:
+                return
+        assert not +contradictions(program.nominal, method, run)
+        runs.append(run)
+    both = np.isin(runs[0]["status"], [0, 1]) & np.isin(runs[1]["status"], [0, 1])
+    size = max(part.mesh.scale for part in program.nominal.parts)
+    assert np.abs(runs[0]["measured"] - runs[1]["measured"])[both].max(initial=0) < 1e-5 * size
