@@ -3,7 +3,10 @@
 Every block is placed by a fixture of its own, off its place and askew as its locators let it. Where it would sink into the one
 below, contact pushes the two apart; where it hangs over a gap, it stays, since nothing presses it down. Expected: blocks do not
 sink into each other, so the top hardly ever stands lower than nominal; it stands higher on average, and varies much less than
-without contact. One free body per block: change BLOCKS to see what bodies cost. Resolve it with --resolution exact.
+without contact. One free body per block: change BLOCKS to see what bodies cost.
+
+Resolve it with --resolution exact --objective "all points". With "active points" a block that its neighbours hardly touch may
+slide far away, and is then called doubtful.
 
 z up. Lengths in mm. A tolerance is the full width of its zone.
 """

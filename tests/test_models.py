@@ -17,7 +17,7 @@ MODELS = {
     "door": tc.Method(),
     "ra1": tc.Method(),
     "ra2": tc.Method(),
-    "tower": tc.Method(resolution="exact"),
+    "tower": EXACT,
 }
 # Table 1: mean, 6 sigma, variance.
 RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
