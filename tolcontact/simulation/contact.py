@@ -312,7 +312,10 @@ class ContactResolver:
             curved = number >= len(LINEAR)
             step, scaled = self._step.take(task, state, scans, moving, stride=stride, firmness=firmness, newton=curved)
             on = (firmness > 1) | ((step > AT_REST) & ((scaled > NOISE) | (not curved)))
-            state.residual[moving[~on]] = np.maximum(state.residual[moving[~on]], scaled[~on])
+            # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective where
+            # Newton's curvature is stiff.
+            unrest = np.minimum(step, scaled)
+            state.residual[moving[~on]] = np.maximum(state.residual[moving[~on]], unrest[~on])
             if self._method.objective == "seating":
                 lost = on & (self._drift(task, state, moving) > LOST)
                 state.residual[moving[lost]] = np.inf
@@ -327,7 +330,7 @@ class ContactResolver:
             values[stuck] = better[stuck]
         # Without rest there is an answer only where penetration is: where the parts contradict each other.
         in_conflict = (state.slack[moving] > ACCURACY).any(axis=1)
-        state.residual[moving] = np.maximum(state.residual[moving], np.where(in_conflict, 0, scaled[on]))
+        state.residual[moving] = np.maximum(state.residual[moving], np.where(in_conflict, 0, unrest[on]))
 
     def _keep_best(self, best: list[np.ndarray], task: Task, state: State, scans: Sequence[PairScan], rows: np.ndarray) -> None:
         """Put into `best` (poses, relative, multipliers, astray, true penetration of each pair) what is better than it."""

@@ -41,8 +41,8 @@ class State:
 
     poses       (row, part of the group, 12)
     relative    (row, pair of the group, 12): X_RM
-    residual    (row,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution in the norm
-                of the objective
+    residual    (row,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution, or that step
+                in the norm of the objective, if it is smaller
     slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
                 for it, the true penetration at the best poses on the way, which are kept
     astray      (row,) [mm]: how far two-sided locators, where they hold, are from their place at `poses`
