@@ -39,15 +39,11 @@ class Side:
             n, height = self._plane
             near = near[points[near] @ n < height]
         if near.size:
-            feet, normals, over = self.face.project(points[near])
-            offset = feet - points[near]
-            behind = over & ((offset * normals).sum(axis=1) > 0)
-            near, offset = near[behind], offset[behind]
+            depth[near] = self.face.depth(points[near])
+            near = near[depth[near] > 0]
         if near.size and self._is_closed:
             turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[near]))
-            near, offset = near[turns > 0.5], offset[turns > 0.5]
-        if near.size:
-            depth[near] = np.linalg.norm(offset, axis=1)
+            depth[near[turns <= 0.5]] = 0
         return depth
 
     @cached_property

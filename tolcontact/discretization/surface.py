@@ -89,6 +89,16 @@ class Surface:
         over = self._overhang(points, triangle, nearest) <= max(margin, 1e-6 * self.mesh.scale)
         return nearest, self.normals(triangle, nearest), over
 
+    def depth(self, points: np.ndarray) -> np.ndarray:
+        """How far `points` (point, 3) [mm] lie behind the surface (point,) [mm]; 0 in front of it, and beside it."""
+        triangle, nearest = self.nearest(points)
+        offset = nearest - points
+        behind = np.flatnonzero((offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1) > 0)
+        over = self._overhang(points[behind], triangle[behind], nearest[behind]) <= 1e-6 * self.mesh.scale
+        depth = np.zeros(len(points))
+        depth[behind[over]] = np.linalg.norm(offset[behind[over]], axis=1)
+        return depth
+
     def overhang(self, points: np.ndarray) -> np.ndarray:
         """How far `points` (point, 3) [mm] stand beside the surface (point,) [mm]: 0 over it."""
         return self._overhang(points, *self.nearest(points))

@@ -34,7 +34,7 @@ class Block:
     iterations    (n,): linear steps taken, 0 where untouched
     starts        (n,): places the steps were started from, 0 where untouched
     second_answers (n,): QPs that another solver had to answer
-    searched      (n,) bool: contact points were projected again at the corrected pose
+    searched      (n,): 1 where contact points were projected again at the corrected pose
     """
 
     start: int

@@ -118,7 +118,7 @@ def simulate_block(
         iterations=iterations,
         starts=starts,
         second_answers=second_answers,
-        searched=searched,
+        searched=searched.astype(np.int8),
     )
 
 
