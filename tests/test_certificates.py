@@ -11,10 +11,15 @@ from studies.certificates.scenes import scene
 from tests import cases
 from tests.test_contact import R_t, simulate
 from tolcontact import poses as pose
+from tolcontact.discretization import discretize
+from tolcontact.discretization.faces import patch
+from tolcontact.discretization.overlap import overlap_corners
+from tolcontact.discretization.solids import shape
 from tolcontact.errors import ContactWarning, OptionError
 from tolcontact.simulation import CORRECTED, RAW, Status
 from tolcontact.symbolic import plugins, usable_plugins
 from tolcontact.symbolic.plugins import PLUGINS, Plugin
+from tolcontact.symbolic.polishing import polished
 
 SEATED = tc.Method(objective="seating", resolution="exact")
 SOLVERS = ("daqp", "qpoases")
@@ -193,6 +198,53 @@ def test_points_beside_the_rim_of_a_face_are_told():
     summary = tc.summarize(results)
     assert float(summary["surface_penetration"]) < 1e-9
     assert 1 < float(summary["beside"]) < 15
+
+
+def test_polishing_finds_the_solution_from_the_rows_that_carry():
+    """Random QPs with rows twice, their known solutions blurred to five digits: the conditions hold to rounding again."""
+    rng = np.random.default_rng(3)
+    count, size, rows, slacks, equal = 50, 8, 12, 2, 2
+    x = np.concatenate([rng.normal(size=(count, size - slacks)), np.tile([0.0, 0.3], (count, 1))], axis=1)
+    A = rng.normal(size=(count, rows, size))
+    A[:, 1] = A[:, 0]  # two rows that share a load
+    carries = rng.random((count, rows)) < 0.3
+    carries[:, :2], carries[:, -equal:] = True, True
+    lam = np.where(carries, rng.uniform(0.5, 2, (count, rows)), 0) * np.where(np.arange(rows) < rows - equal, 1, -1)
+    lower = np.einsum("kij,kj->ki", A, x) - np.where(carries, 0, rng.uniform(0.5, 1, (count, rows)))
+    bound = np.zeros((count, size))
+    bound[:, -2] = 0.7  # the first slack is held at zero, the second one is open
+    H = np.eye(size) + np.zeros((count, 1, 1))
+    g = -x + np.einsum("kij,ki->kj", A, lam) + bound
+    problem = {"h": H, "g": g, "a": A, "lba": lower}
+    blurred = [values * (1 + 1e-5 * rng.normal(size=values.shape)) for values in (x, -lam, -bound)]
+    y, lam_a, lam_x = polished(problem, blurred, equal, slacks)
+    assert np.abs(y - x).max() < 1e-9
+    assert np.abs(np.einsum("kij,kj->ki", H, y) + g + np.einsum("kij,ki->kj", A, lam_a) + lam_x).max() < 1e-10
+    assert np.abs((np.einsum("kij,kj->ki", A, y) - lower)[carries]).max() < 1e-10
+
+
+def test_flat_faces_have_points_where_their_rims_cross():
+    """A bar across a bar: the corners of the square in which they lie over each other; and a small plate under a large one."""
+    a = tc.Assembly("cross")
+    beam = a.part("beam", tc.Box(100, 10, 10), at=(0, 45, -10), fixed=True)
+    bar = a.part("bar", tc.Box(10, 100, 10), at=(45, 0, 0))
+    foot = a.part("foot", tc.Box(3, 3, 3), at=(80, 48, -13), fixed=True)
+    a.locate(bar, tc.three_two_one(bar.face("-z"), bar.face("-y"), bar.face("-x"), inset=1), tolerance=1)
+    a.locate(beam, tc.three_two_one(beam.face("-z"), beam.face("-y"), beam.face("-x"), inset=1), tolerance=0)
+    a.contact("across", moving=bar.face("-z"), reference=beam.face("+z"))
+    a.contact("told", moving=bar.face("-z"), reference=beam.face("+z"), points=200)
+    a.measure("z", bar.point(0, 0, 0), along="z", tolerance=1)
+    across, said = discretize(a).pairs
+    corners = {(45.0, 45.0, 0.0), (45.0, 55.0, 0.0), (55.0, 45.0, 0.0), (55.0, 55.0, 0.0)}
+    assert corners <= {tuple(p) for p in across.P_m.round(9)}
+    assert not corners <= {tuple(p) for p in said.P_m.round(9)}  # points that were asked for are left as they are
+    below = overlap_corners(_placed(beam, "-z"), _placed(foot, "+z"))
+    assert {tuple(p) for p in below.round(9)} == {(x, y, -10.0) for x in (80.0, 83.0) for y in (48.0, 51.0)}
+
+
+def _placed(part, direction):
+    mesh = shape(part.geometry).mesh
+    return patch(part.face(direction), {part: mesh}).placed(np.eye(3), np.array(part.at))
 
 
 @pytest.mark.parametrize("seed", range(0, 60, 2))
