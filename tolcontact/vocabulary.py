@@ -129,6 +129,7 @@ ROWS = (
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)
+ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not have; nor have they the group `surface`
 
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = Variable(

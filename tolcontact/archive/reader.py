@@ -27,8 +27,9 @@ def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
         tree = xr.open_datatree(source, engine="netcdf4", drop_variables=words.REALIZATION)
     except (OSError, ValueError) as error:
         raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
-    missing = [v.name for v in words.ROWS if v not in words.POSES and v.name not in tree.ds] + [
-        g for g in ("model", "contact", "sample", "surface", "field") if g not in tree.children
+    optional = (*words.POSES, *words.ADDED)
+    missing = [v.name for v in words.ROWS if v not in optional and v.name not in tree.ds] + [
+        g for g in ("model", "contact", "sample", "field") if g not in tree.children
     ]
     if missing:
         tree.close()

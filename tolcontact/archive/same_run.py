@@ -28,15 +28,15 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
     for variable, values in contact_values(program.nominal).items():
         if not _same(there["contact"][variable.name], values):
             raise ArchiveError(f'"{path}": contact points were others (by {there.versions}); write to a new file')
-    room = len(there["surface"].dimensions[words.CHECKED])
-    if room != surfaces:
-        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
     for word, value in settings.items():
         was = getattr(there, word, None)
         if word != "samples" and was != value:
             raise ArchiveError(
                 f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
             )
+    room = len(there["surface"].dimensions[words.CHECKED])
+    if room != surfaces:
+        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
 
 
 def _comparable(declared: str) -> Any:

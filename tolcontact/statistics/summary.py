@@ -122,9 +122,11 @@ def _penetration(rows: xr.Dataset) -> np.ndarray:
 
 
 def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str, str]]]:
-    of = results["surface"].to_dataset()
-    largest = [np.nanmax(of[v.name].values, initial=0.0) for v in (words.SURFACE_PENETRATION, words.BESIDE)]
-    count = int((of[words.CHECKED_REALIZATION.name] != words.UNFINISHED).sum())
+    largest, count = [np.nan, np.nan], 0
+    if "surface" in results.children:  # archives of before have none
+        of = results["surface"].to_dataset()
+        largest = [np.nanmax(of[v.name].values, initial=0.0) for v in (words.SURFACE_PENETRATION, words.BESIDE)]
+        count = int((of[words.CHECKED_REALIZATION.name] != words.UNFINISHED).sum())
     return {
         "surface_penetration": ((), largest[0] if count else np.nan, {"units": "mm"}),
         "beside": ((), largest[1] if count else np.nan, {"units": "mm"}),
