@@ -17,7 +17,7 @@ from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.layout import lay_out
-from tolcontact.discretization.overlap import overlap_corners
+from tolcontact.discretization.overlap import overlap_corners, rim_points
 from tolcontact.discretization.solids import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
@@ -331,6 +331,8 @@ def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndar
     Warns of what they, or the triangles, leave unseen of more than CHORD times `finest`, the smallest tolerance range.
     """
     every = following(own, target, chord=CHORD * finest, within=reach)
+    if is_flat(target) and own.curvature > 0:
+        every = np.concatenate([every, rim_points(own, target, math.sqrt(8 * CHORD * finest / own.curvature), reach)])
     if pair.points is None and pair.spacing is None:
         P_m = np.concatenate([P_m, every])
     errors = {

@@ -1,12 +1,14 @@
-"""Corners of the region in which two flat faces lie over each other: where flat faces touch first, whatever the tilt."""
+"""Where the rim of one face lies under or over the other face: there they touch first, whatever the tilt."""
 
 import numpy as np
 
-from tolcontact.discretization.edges import rim
+from tolcontact.discretization.edges import edges, rim
 from tolcontact.discretization.surface import Surface
 
 MOST = 2000  # edges of a rim; beyond that its corners are everywhere, and points spread evenly meet them
 STRAIGHT = np.radians(1.0)
+INWARD = 1e-5  # of the face's size: points of a rim are taken so far inside of it
+DROPS = 8  # turns after which a point that drops onto a curved face has arrived
 
 
 def overlap_corners(own: Surface, target: Surface) -> np.ndarray:
@@ -45,3 +47,32 @@ def overlap_corners(own: Surface, target: Surface) -> np.ndarray:
     below = corners + height[:, None] * n
     _, _, over = own.project(below)
     return np.asarray(np.concatenate([crossings, below[over]]))
+
+
+def rim_points(own: Surface, target: Surface, step: float, within: float) -> np.ndarray:
+    """Points (point, 3) [mm] of the curved face `own` over the rim of the flat face `target`, some `step` [mm] apart.
+
+    Only where the faces are within `within` [mm] of each other.
+    """
+    faces, vertices = np.asarray(target.mesh.faces), np.asarray(target.mesh.vertices)
+    ends, edge, triangles = edges(faces)
+    outer = np.flatnonzero(triangles[edge] == 1)
+    n = target.corner_normals.reshape(-1, 3).mean(axis=0)
+    n /= np.linalg.norm(n)
+    places = []
+    length = np.linalg.norm(vertices[ends[outer, 1]] - vertices[ends[outer, 0]], axis=1)
+    step = max(step, float(length.sum()) / MOST)
+    for number, size in zip(outer, length, strict=True):
+        a, b = vertices[ends[number]]
+        inward = np.cross(n, b - a) / max(size, 1e-300)
+        inward *= np.sign(inward @ (vertices[faces[number // 3]].mean(axis=0) - a))
+        share = np.linspace(0, 1, max(int(np.ceil(size / step)), 1) + 1)[:, None]
+        places.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
+    start = np.concatenate(places)
+    over = start
+    for _ in range(DROPS):
+        _, feet = own.nearest(over)
+        over = start + ((feet - start) @ n)[:, None] * n
+    arrived = np.linalg.norm(over - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
+    near = np.linalg.norm(over - start, axis=1) <= within
+    return np.asarray(feet[arrived & near])
