@@ -108,7 +108,7 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     """What contact points do not see."""
     checked, depth, beside = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = ADVISED * summary.attrs["smallest_range"]
-    if checked:
+    if math.isfinite(depth):
         yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, between contact points; use more points"

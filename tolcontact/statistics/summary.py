@@ -125,11 +125,12 @@ def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str
     largest, count = [np.nan, np.nan], 0
     if "surface" in results.children:  # archives of before have none
         of = results["surface"].to_dataset()
-        largest = [np.nanmax(of[v.name].values, initial=0.0) for v in (words.SURFACE_PENETRATION, words.BESIDE)]
+        known = [of[v.name].values[~np.isnan(of[v.name].values)] for v in (words.SURFACE_PENETRATION, words.BESIDE)]
+        largest = [float(values.max()) if values.size else np.nan for values in known]
         count = int((of[words.CHECKED_REALIZATION.name] != words.UNFINISHED).sum())
     return {
-        "surface_penetration": ((), largest[0] if count else np.nan, {"units": "mm"}),
-        "beside": ((), largest[1] if count else np.nan, {"units": "mm"}),
+        "surface_penetration": ((), largest[0], {"units": "mm"}),
+        "beside": ((), largest[1], {"units": "mm"}),
         "surfaces_checked": ((), count, {"units": "1"}),
     }
 
