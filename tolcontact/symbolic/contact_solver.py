@@ -11,7 +11,8 @@ from tolcontact.symbolic.polishing import polished
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
-ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
+ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished, and
+NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, where the step is so small that noise would be seen
 
 
 class ContactSolver:
@@ -78,7 +79,8 @@ class ContactSolver:
         outputs = self._finished(inputs, assembled, solution)
         residual = outputs[OUTPUTS.index("residual")]
         residual[failed] = np.inf
-        rough = np.flatnonzero((residual[:, 0] > ROUGH) & np.isfinite(residual[:, 0]))
+        is_rough = residual[:, 0] > np.where(outputs[OUTPUTS.index("step")][:, 0] < NEARLY, FINE, ROUGH)
+        rough = np.flatnonzero(is_rough & np.isfinite(residual[:, 0]))
         if rough.size:
             inputs, assembled = ([array[rough] for array in arrays] for arrays in (inputs, assembled))
             polished = self._polished(assembled, [array[rough] for array in solution])
