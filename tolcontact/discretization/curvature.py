@@ -9,13 +9,14 @@ import numpy as np
 
 from tolcontact.discretization.surface import Surface
 
+CHORD = 5e-4  # of the smallest tolerance range: how far the faces may sink in between points
 HALVINGS = 40
 MOST = 5000  # points that curvature may ask for
 SOUP = 30_000  # triangles at which halving gives up
 ACROSS = 4  # pieces of the smaller face that the first triangles see
 PROBES = 1500  # random displacements by which sets of points are compared
 TOGETHER = 500
-LEAST_STEP = 0.1  # of the precision's unit: the smallest displacement that is tried
+LEAST_STEP = 0.1  # of the smallest tolerance range: the smallest displacement that is tried
 
 
 def following(own: Surface, target: Surface, *, chord: float, within: float) -> np.ndarray:
@@ -58,9 +59,6 @@ def following(own: Surface, target: Surface, *, chord: float, within: float) -> 
         kept = _ever_deepest(_rows(points, feet, normals), within, chord / CHORD)
         points = points[kept[:MOST]]
     return np.asarray(points)
-
-
-CHORD = 5e-4  # of the smallest tolerance range: how far the faces may sink in between points
 
 
 def sampling_error(chosen: np.ndarray, every: np.ndarray, target: Surface, *, unit: float, within: float) -> float:
