@@ -25,8 +25,8 @@ ROOMS = {
 NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "errors", "vocabulary", "method", "poses", "assembly", "discretization", "symbolic", "sampling", "simulation", "statistics",
-    "archive", "running", "comparing", "report", "script", "cli", "__init__",
+    "errors", "printing", "child", "vocabulary", "checksums", "method", "poses", "assembly", "script", "discretization",
+    "symbolic", "sampling", "simulation", "statistics", "archive", "running", "comparing", "report", "cli", "__init__",
 )  # fmt: skip
 
 

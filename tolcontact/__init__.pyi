@@ -4,8 +4,7 @@ from .cli import main
 from .comparing import compare
 from .errors import TolcontactError
 from .method import Method
-from .running import build, run
-from .statistics import summarize
+from .running import build, run, summarize
 
 __all__ = [
     "Assembly",

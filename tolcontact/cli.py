@@ -1,13 +1,18 @@
 """The command line. Results on stdout, progress and errors on stderr.
 
-Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad input, one message, nothing written.
+Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad input, one message, nothing written;
+130 and 143 stopped by Ctrl-C and by a signal to terminate: what is finished is in the archive.
 """
 
+import contextlib
+import functools
 import inspect
 import json
+import os
+import signal
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,20 +21,21 @@ import xarray as xr
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-from tolcontact.archive import open_archive
+from tolcontact.archive import open_archive, taken
 from tolcontact.assembly import Assembly
 from tolcontact.comparing import compare as compare_solvers
-from tolcontact.errors import TolcontactError
+from tolcontact.errors import OptionError, TolcontactError
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
-from tolcontact.report import comparison_text, summary_text
-from tolcontact.running import DEFAULT_SOLVER, SURFACES, build, check_counts, check_writable
+from tolcontact.printing import printable
+from tolcontact.report import comparison_text, grouped, summary_text
+from tolcontact.running import DEFAULT_SOLVER, SURFACES, build, summarize
 from tolcontact.running import run as run_model
 from tolcontact.script import load_model
 from tolcontact.simulation import Status
-from tolcontact.statistics import summarize
 from tolcontact.vocabulary import KEPT
 
 FAILED_SHARE = 0.001
+UNBOUNDED = 10_000  # columns of what is no terminal
 
 app = typer.Typer(
     help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
@@ -45,18 +51,21 @@ def _or(names: tuple[str, ...]) -> str:
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
+Samples = Annotated[int, typer.Option(help="Number of realizations.")]
+Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
+Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
+Resolution = Annotated[str, typer.Option(help=f"One linear step, or as many as it takes: {_or(RESOLUTIONS)}.")]
+Objective = Annotated[str, typer.Option(help=f"What the corrected pose minimizes: {_or(OBJECTIVES)}.")]
 
 
 @app.command()
 def run(
     model: Model,
-    samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
-    solver: Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")] = DEFAULT_SOLVER,
-    resolution: Annotated[
-        str, typer.Option(help=f"One linear step, or as many as it takes: {_or(RESOLUTIONS)}.")
-    ] = "linearized",
-    objective: Annotated[str, typer.Option(help=f"What the corrected pose minimizes: {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
+    samples: Samples = 1000,
+    seed: Seed = 1,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = "linearized",
+    objective: Objective = OBJECTIVES[0],
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
@@ -69,24 +78,51 @@ def run(
 
     Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
     """
-    check_counts(samples=samples, seed=seed, surfaces=surfaces)
-    if out is not None:
-        check_writable(out, overwrite=overwrite, resume=resume)
+    if out is None and (overwrite or resume):
+        raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
     method = Method(resolution=resolution, objective=objective)
-    program = build(load_model(model), solver=solver, method=method)
-    with Progress(
-        TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TimeRemainingColumn(), console=Console(stderr=True), transient=True,
-    ) as bar:  # fmt: skip
-        task = bar.add_task(program.nominal.assembly.name, total=samples)
+    with _bar() as bar, _stopped(out, done := [0, samples]):
+        task = bar.add_task(printable(model.stem), total=samples)
+
+        def show(rows: int) -> None:
+            done[:] = rows, max(samples, rows)
+            bar.update(task, completed=rows, total=done[1])
+
         results = run_model(
-            program, samples=samples, seed=seed, out=out, overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
-            progress=lambda done: bar.update(task, completed=done, total=max(samples, done)),
+            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
+            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, progress=show,
         )  # fmt: skip
     with results:
         _print_summary(results)
     if out is not None:
-        typer.echo(f"\narchive: {out}")
+        typer.echo(f"\narchive: {printable(str(out))}")
+
+
+def _bar() -> Progress:
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    return Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+
+
+@contextlib.contextmanager
+def _stopped(out: Path | None, done: list[int]) -> Iterator[None]:
+    """Say how far a run came that somebody stops; `done` is how far, and of how many."""
+    stopped_by = [signal.SIGINT]
+
+    def terminate(number: int, _: object) -> None:
+        stopped_by[0] = signal.Signals(number)
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, terminate)
+    try:
+        yield
+    except KeyboardInterrupt:
+        go_on = "continue with --resume" if out is not None and out.exists() else "nothing is kept"
+        typer.echo(f"stopped: {grouped(done[0])} of {grouped(done[1])} done; {go_on}", err=True)
+        sys.stderr.flush()
+        # What threads still compute is not waited for: it is not in the archive, and may take minutes.
+        os._exit(128 + stopped_by[0])
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 @app.command()
@@ -99,29 +135,30 @@ def summary(archive: Archive) -> None:
 @app.command()
 def compare(
     model: Model,
-    solvers: Annotated[str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")],
-    samples: Annotated[int, typer.Option(help="Number of realizations.")] = 1000,
-    seed: Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")] = 1,
+    solvers: Annotated[
+        str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")
+    ] = DEFAULT_SOLVER,
+    samples: Samples = 1000,
+    seed: Seed = 1,
     resolution: Annotated[str, typer.Option(help=f"One or more of {_or(RESOLUTIONS)}.")] = "linearized",
     objective: Annotated[str, typer.Option(help=f"One or more of {_or(OBJECTIVES)}.")] = OBJECTIVES[0],
     as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
 ) -> None:
     """Compare solvers, resolutions or objectives on the same draws: agreement, failures, residuals, time."""
-    if out is not None:
-        check_writable(out, overwrite=False, resume=False)
     methods = [Method(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
-    found = compare_solvers(load_model(model), _names(solvers), samples=samples, seed=seed, methods=methods)
-    if out is not None:
-        # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
-        texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
-        found.to_netcdf(out, engine="netcdf4", encoding=texts)
+    with contextlib.nullcontext() if out is None else taken(out) as path:
+        found = compare_solvers(load_model(model), _names(solvers), samples=samples, seed=seed, methods=methods)
+        if path is not None:
+            # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
+            texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
+            found.to_netcdf(path, engine="netcdf4", encoding=texts)
     if as_json:
         # JSON has no NaN: where no realization can be compared a difference is null.
         readable = found.astype(object).where(found.notnull(), None)
         typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
     else:
-        Console(highlight=False, markup=False, width=80).print(comparison_text(found))
+        _console().print(comparison_text(found))
 
 
 def _names(words: str) -> list[str]:
@@ -129,9 +166,14 @@ def _names(words: str) -> list[str]:
 
 
 @app.command()
-def check(model: Model) -> None:
-    """Say what is wrong with a model; run nothing."""
-    program = build(load_model(model))
+def check(
+    model: Model,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = "linearized",
+    objective: Objective = OBJECTIVES[0],
+) -> None:
+    """Say what is wrong with a model, or with running it so; run nothing."""
+    program = build(load_model(model), solver=solver, method=Method(resolution=resolution, objective=objective))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
@@ -154,20 +196,26 @@ def command_line(arguments: list[str] | None = None) -> None:
             warnings.showwarning = _show_warning
             app(arguments)
     except TolcontactError as error:
-        typer.echo(f"error: {error}", err=True)
+        typer.echo(f"error: {printable(str(error))}", err=True)
         sys.exit(2)
     except OSError as error:
-        typer.echo(f"error: the system refused: {error}; an archive that was begun goes on with --resume", err=True)
+        refused = printable(str(error))
+        typer.echo(f"error: the system refused: {refused}; an archive that was begun goes on with --resume", err=True)
         sys.exit(2)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {message}", err=True)
+    typer.echo(f"warning: {printable(str(message))}", err=True)
+
+
+def _console() -> Console:
+    """Standard output; what is no terminal is never cut."""
+    return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
 
 
 def _print_summary(results: xr.DataTree) -> None:
     found = summarize(results)
-    Console(highlight=False, markup=False).print(summary_text(found))
+    _console().print(summary_text(found))
     failed = sum(int(found["by_status"][status]) for status in (Status.NOT_CONVERGED, Status.NOT_ASSEMBLABLE, Status.DOUBTFUL))
     if failed > FAILED_SHARE * found.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)

@@ -10,23 +10,30 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
-from tolcontact.assembly import Assembly
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import Method
-from tolcontact.running import check_counts
+from tolcontact.running import Model, check_counts, declared
 from tolcontact.simulation import CORRECTED, Status, simulate_blocks
 from tolcontact.symbolic import Program, compile_program
 
+STANDARD = Method()
 WARM_UP = 64  # realizations before the clock runs
 SPEAKS = ("resolution", "objective")  # words whose values say what they are
 QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
 def compare(
-    assembly: Assembly, solvers: Sequence[str], *, samples: int = 1000, seed: int = 1, methods: Sequence[Method] = (Method(),)
+    model: Model,
+    solvers: str | Sequence[str],
+    *,
+    samples: int = 1000,
+    seed: int = 1,
+    methods: Method | Sequence[Method] = STANDARD,
 ) -> xr.Dataset:
-    """Simulate the same realizations with each solver and method. Differences are from the first one, in the corrected state.
+    """Simulate the same realizations of a model (see `build`) with each solver and method.
+
+    Differences are from the first one, in the corrected state.
 
     Labels along the dimension `solver` name the solver, and what the methods differ in.
 
@@ -41,10 +48,11 @@ def compare(
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
     check_counts(samples=samples, seed=seed)
+    solvers, methods = [solvers] if isinstance(solvers, str) else solvers, [methods] if isinstance(methods, Method) else methods
     for word, named in {"solvers": solvers, "methods": methods}.items():
         if not named or len(set(named)) < len(named):
             raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
-    nominal = discretize(assembly)
+    nominal = discretize(declared(model))
     contestants = [(solver, method) for method in methods for solver in solvers]
     programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
@@ -62,7 +70,7 @@ def compare(
             words.MEASURE: [measure.name for measure in nominal.measures],
         },
         attrs={
-            "title": f"comparison of solvers on {assembly.name}",
+            "title": f"comparison of solvers on {nominal.assembly.name}",
             "reference_solver": labels[words.SOLVER][0],
             "realizations": samples,
             "seed": seed,

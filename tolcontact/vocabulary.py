@@ -1,9 +1,11 @@
 """Every dimension and variable of an archive: names, units and descriptions, in one place (CF conventions)."""
 
+import unicodedata
 from dataclasses import dataclass, field
 from typing import Any
 
 CONVENTIONS = "CF-1.11"
+FORMAT = 2  # of the archive; archives of format 1, which do not say it, can be read
 STATES = ("raw", "corrected")
 AXES = ("x", "y", "z")
 COMPONENTS = (*AXES, "magnitude")
@@ -12,12 +14,15 @@ REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
 CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
+BLOCK, ROW_VARIABLE = "block", "row_variable"
+BLOCK_ROWS = 4096  # realizations of a block: simulated together, and with a checksum of their own
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
 
 STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable", "doubtful")
 UNFINISHED = -1
+CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once
 ROUNDED = 1e-9  # mm: less penetration than this is rounding
 
 
@@ -131,6 +136,18 @@ ROWS = (
 POSES = (TRANSLATION, ROTATION)
 ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not have; nor have they the group `surface`
 
+DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
+BY_REALIZATION = (*ROWS, DEVIATION)
+ROW_VARIABLE_LABEL = _label(ROW_VARIABLE, "variable of realizations")
+ROW_CHECKSUM = Variable(
+    "row_checksum",
+    (BLOCK, ROW_VARIABLE),
+    "i8",
+    f"CRC-32 of the values of a variable in a block of {BLOCK_ROWS} realizations (the last one may be shorter), little-endian; "
+    "-1: unfinished",
+    "1",
+)
+
 MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
 MEASURE_TOLERANCE = Variable(
     "measure_tolerance",
@@ -161,7 +178,6 @@ LOCATOR_OF_POINT = Variable(
 )
 
 LOCATOR_LABEL = _label(LOCATOR, "locator, as part.locator")
-DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
 TOLERANCE_RANGE = Variable(
     "tolerance_range",
     (LOCATOR,),
@@ -194,7 +210,8 @@ FIELD_INTERVAL = Variable(
     "95 % confidence interval of six standard deviations of the displacement magnitude",
     "mm",
 )
-FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL)
+FIELD_REALIZATIONS = Variable("realizations", (), "i8", "number of realizations in the displacement field", "1")
+FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS)
 CHECKED_REALIZATION = Variable(
     "realization_checked", (CHECKED,), "i8", "number of a realization that was checked; -1: none", "1"
 )
@@ -213,6 +230,14 @@ BESIDE = Variable(
     "how far contact points that touch stand beside the rim of the reference face; NaN where that is not known",
     "mm",
 )
+SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE)
+GROUP_CHECKSUM = Variable(
+    "checksum",
+    (),
+    "i8",
+    "CRC-32 of what this group holds beside what is written once, one after the other; -1: being written",
+    "1",
+)
 SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
 FIELD_SUMS = Variable(
     "sums",
@@ -221,6 +246,17 @@ FIELD_SUMS = Variable(
     "running sums of the displacement field, from which an unfinished run goes on",
     "1",
 )
+SUMS_CHECKSUM = Variable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of the sums of a checkpoint", "1")
+
+
+def group_of(part: str) -> str:
+    """The name of a part's groups: its own, with an underscore behind it where it is a name of the archive.
+
+    xarray hands the coordinates of the root on to all groups, and a group cannot be called like one of them.
+    """
+    name = unicodedata.normalize("NFC", part)  # as the netCDF library stores it
+    return f"{name}_" if name.rstrip("_") in {coordinate.name for coordinate in COORDINATES} else name
+
 
 # What a comparison of solvers holds.
 COMPARED_LABELS = (

@@ -1,6 +1,7 @@
 """The netCDF archive: written block by block with the netCDF4 library, read with xarray."""
 
-from tolcontact.archive.reader import model_of, open_archive
+from tolcontact.archive.reader import model_of, open_archive, opened
+from tolcontact.archive.taking import taken
 from tolcontact.archive.writer import ArchiveWriter
 
-__all__ = ["ArchiveWriter", "model_of", "open_archive"]
+__all__ = ["ArchiveWriter", "model_of", "open_archive", "opened", "taken"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import nothing_checked
-from tolcontact.archive.variables import define, write
+from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.assembly import Mesh
 from tolcontact.assembly.document import to_document
 from tolcontact.discretization import Nominal
@@ -57,6 +57,7 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
     file.setncatts(
         {
             "Conventions": words.CONVENTIONS,
+            "format": np.int64(words.FORMAT),
             "title": f"variation simulation of {nominal.assembly.name}",
             "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
@@ -82,11 +83,16 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
             write(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
+    rows = kept_rows(str(settings["kept"]))
     for variable in words.ROWS:
-        if settings["kept"] != "measures" or variable not in words.POSES:
+        if variable in rows:
             define(file, variable)
+    file.createDimension(words.BLOCK, None)
+    file.createDimension(words.ROW_VARIABLE, len(rows))
+    write(file, words.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
+    define(file, words.ROW_CHECKSUM)
     file.createDimension(words.CHECKPOINT, 2)
-    write(file, words.SUMMED_ROWS, [-1, -1])
+    lay_out(file, words.SUMMED_ROWS, [words.UNFINISHED] * 2)
     file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
     units = [measure.units for measure in nominal.measures]
     if set(units) != {"mm"}:
@@ -96,13 +102,13 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
     write(file, words.MEASURE_UNITS, units)
     _write_model(file.createGroup("model"), nominal, declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
-    _write_sample(file.createGroup("sample"), nominal, deviations=settings["kept"] == "all")
+    _write_sample(file.createGroup("sample"), nominal, deviations=words.DEVIATION in rows)
     checked = file.createGroup("surface")
     checked.createDimension(words.CHECKED, surfaces)
-    for variable, nothing in nothing_checked(surfaces, len(nominal.pairs)).items():
-        write(checked, variable, nothing)
+    _lay_out_together(checked, nothing_checked(surfaces, len(nominal.pairs)))
     for part in nominal.parts:
-        group = file.createGroup(f"field/{part.name}")
+        group = file.createGroup(f"field/{words.group_of(part.name)}")
+        group.setncattr("part", part.name)
         for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
             group.createDimension(name, size)
         sums = FieldMoments(part.vertices).state.size
@@ -111,18 +117,40 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
         write(group, words.COMPONENT_LABEL, words.COMPONENTS)
         write(group, words.FIELD_VERTICES, part.vertices)
         write(group, words.FIELD_FACES, part.faces)
-        for variable in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA):
-            write(group, variable, np.full([len(words.STATES), len(part.vertices), len(words.COMPONENTS)], np.nan))
         write(group, words.BOUND_LABEL, words.BOUNDS)
-        write(group, words.FIELD_INTERVAL, np.full([len(words.STATES), len(part.vertices), len(words.BOUNDS)], np.nan))
-        write(group, words.FIELD_SUMS, np.full([2, len(words.STATES), sums], np.nan))
+        _lay_out_together(group, no_field(len(part.vertices)))
+        lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), sums], np.nan))
+        lay_out(group, words.SUMS_CHECKSUM, [words.UNFINISHED] * 2)
+
+
+def kept_rows(kept: str) -> tuple[Variable, ...]:
+    """What is archived of each realization."""
+    left_out = {"measures": {*words.POSES, words.DEVIATION}, "poses": {words.DEVIATION}, "all": set[Variable]()}
+    return tuple(variable for variable in words.BY_REALIZATION if variable not in left_out[kept])
+
+
+def no_field(vertices: int) -> dict[Variable, Any]:
+    """What the group of a part holds before its field was written."""
+    states = len(words.STATES)
+    return {
+        **{v: np.full([states, vertices, len(words.COMPONENTS)], np.nan) for v in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA)},
+        words.FIELD_INTERVAL: np.full([states, vertices, len(words.BOUNDS)], np.nan),
+        words.FIELD_REALIZATIONS: 0,
+    }
+
+
+def _lay_out_together(group: netCDF4.Group, values: Mapping[Variable, Any]) -> None:
+    for variable, nothing in values.items():
+        lay_out(group, variable, nothing)
+    lay_out(group, words.GROUP_CHECKSUM, words.UNFINISHED)
 
 
 def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
     write(group, words.DECLARATION, document)
     for part in nominal.parts:
         if isinstance(part.part.geometry, Mesh):
-            mesh = group.createGroup(f"mesh/{part.name}")
+            mesh = group.createGroup(f"mesh/{words.group_of(part.name)}")
+            mesh.setncattr("part", part.name)
             mesh.createDimension(words.VERTEX, len(part.mesh.vertices))
             mesh.createDimension(words.FACE, len(part.mesh.faces))
             mesh.createDimension(words.CORNER, 3)

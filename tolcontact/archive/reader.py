@@ -8,32 +8,32 @@ import pandas as pd
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.archive.inspection import inspect
 from tolcontact.assembly import Assembly
 from tolcontact.assembly.document import from_document
 from tolcontact.errors import ArchiveError
 
 
-def open_archive(path: str | Path, *, shown: Path | None = None) -> xr.DataTree:
+def open_archive(path: str | Path) -> xr.DataTree:
     """An archive as a tree of labelled datasets, read on demand.
 
-    Raises ArchiveError where the file is missing, is not netCDF, or was not written by tolcontact; messages speak of
-    `shown` where that is given.
+    Raises ArchiveError where the file is missing, is no archive of tolcontact, or is damaged: all but the realizations is
+    read and compared with its checksums; those of the realizations are looked at by `summarize`.
     """
-    source, path = Path(path), shown or Path(path)
-    if not source.is_file():
+    path = Path(path)
+    if not path.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
+    inspect(path)
+    return opened(path)
+
+
+def opened(path: Path) -> xr.DataTree:
+    """An archive that is known to be whole."""
     try:
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-        tree = xr.open_datatree(source, engine="netcdf4", drop_variables=words.REALIZATION)
-    except (OSError, ValueError) as error:
-        raise ArchiveError(f'"{path}" cannot be read as netCDF: {error}') from error
-    optional = (*words.POSES, *words.ADDED)
-    missing = [v.name for v in words.ROWS if v not in optional and v.name not in tree.ds] + [
-        g for g in ("model", "contact", "sample", "field") if g not in tree.children
-    ]
-    if missing:
-        tree.close()
-        raise ArchiveError(f'"{path}" is not an archive of tolcontact: it has no {", ".join(missing)}')
+        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=words.REALIZATION)
+    except Exception as error:  # whatever a library finds that the inspection did not
+        raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
     numbers = pd.RangeIndex(tree.sizes[words.REALIZATION])
     tree.coords[words.REALIZATION] = (words.REALIZATION, numbers, words.NUMBERS.all_attributes)
     return tree
@@ -45,8 +45,10 @@ def model_of(results: xr.DataTree) -> Assembly:
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():
-            triangles = group.to_dataset()
-            meshes[name] = _Triangles(triangles[words.MESH_VERTICES.name].values, triangles[words.MESH_FACES.name].values)
+            of = group.to_dataset()
+            # Groups of format 1 do not say the part's name: it was their own.
+            triangles = _Triangles(of[words.MESH_VERTICES.name].values, of[words.MESH_FACES.name].values)
+            meshes[str(of.attrs.get("part", name))] = triangles
     return from_document(document, meshes)
 
 

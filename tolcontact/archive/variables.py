@@ -1,23 +1,26 @@
 """Variables of the vocabulary in a netCDF file."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
+from tolcontact.checksums import crc32
 from tolcontact.vocabulary import Variable
 
 ROW_CHUNK = 1000
+BLOCK_CHUNK = 256
 
 
 def define(group: netCDF4.Dataset, variable: Variable) -> None:
     """A variable of numbers, without values yet."""
     options: dict[str, Any] = {}
-    if words.REALIZATION in variable.dims:
+    grows = {words.REALIZATION: ROW_CHUNK, words.BLOCK: BLOCK_CHUNK}
+    if grows.keys() & set(variable.dims):
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        sizes = [len(_dimension(group, d)) for d in variable.dims if d != words.REALIZATION]
-        options["chunksizes"] = [ROW_CHUNK, *(max(size, 1) for size in sizes)]
+        options["chunksizes"] = [grows.get(d) or max(len(_dimension(group, d)), 1) for d in variable.dims]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     attributes = variable.all_attributes
     if "flag_values" in attributes:
@@ -33,13 +36,37 @@ def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
 
 
 def write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
-    """A variable with its values, in a group that has the dimensions."""
+    """A variable with its values, which stay as they are, and their checksum; in a group that has the dimensions."""
     if variable.kind is str:
         _write_text(group, variable, values)
-        return
+    else:
+        lay_out(group, variable, values)
+    group[variable.name].setncattr(words.CHECKSUM, np.int64(crc32(variable, values)))
+
+
+def lay_out(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+    """A variable of numbers whose values will be overwritten."""
     define(group, variable)
     if np.size(values):
         group[variable.name][...] = values
+
+
+def overwrite(file: netCDF4.Dataset, values: Mapping[str, Mapping[Variable, Any]]) -> None:
+    """Overwrite what the checksums of some groups are of; `values` by their paths. A run that is killed meanwhile leaves -1."""
+    for path in values:
+        file[path][words.GROUP_CHECKSUM.name][...] = words.UNFINISHED
+    file.sync()
+    for path, of_group in values.items():
+        for variable, of_all in of_group.items():
+            if np.size(of_all):
+                file[path][variable.name][...] = of_all
+    file.sync()
+    for path, of_group in values.items():
+        found = 0
+        for variable, of_all in of_group.items():
+            found = crc32(variable, of_all, found)
+        file[path][words.GROUP_CHECKSUM.name][...] = found
+    file.sync()
 
 
 def _write_text(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:

@@ -1,54 +1,57 @@
 """An archive is written block by block.
 
-A file that is being extended breaks when its writer is killed at the wrong moment. So everything is laid out first, under
-another name: header, and room for all rows, each with the status "unfinished". Once the file stands under its own name,
-bytes are only overwritten in place, the status of a row after its data; whatever kills the process, the file opens,
-finished rows stay, and `resume` goes on after them. (Nothing waits for the disk: a machine that loses power may lose more.)
+A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
+name: header, and rows with the status "unfinished". Once the file stands under its own name, bytes are only overwritten in
+place, the status of a row after its data; whatever kills the process, the file opens, finished rows stay, and `resume` goes
+on after them. (Nothing waits for the disk: a machine that loses power may lose more.) To stand there soon, a long run begins
+with room for few rows; when these are full, a copy gets room for all, and takes its place.
 """
 
 import contextlib
-import os
 import shutil
+import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import archived_poses, choose, nothing_checked
-from tolcontact.archive.header import now, run_settings, versions, write_header
-from tolcontact.archive.reader import open_archive
+from tolcontact.archive.header import kept_rows, no_field, now, run_settings, versions, write_header
+from tolcontact.archive.inspection import inspect
+from tolcontact.archive.room import check_room, lay_out_rows
 from tolcontact.archive.same_run import check_same_run
-from tolcontact.archive.variables import ROW_CHUNK
+from tolcontact.archive.variables import overwrite
+from tolcontact.checksums import crc32
 from tolcontact.discretization import Nominal, NominalPart, movers
 from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments
 from tolcontact.symbolic import Program
-from tolcontact.vocabulary import Variable
 
-_HDF_ERROR = -101  # of the netCDF library
-ROOM = 50 * ROW_CHUNK  # rows that are laid out at once
+FIRST_ROWS = 12 * words.BLOCK_ROWS  # that there is room for from the beginning
+FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be
 
 
 class ArchiveWriter:
-    """An archive being written. Use it as a context manager.
+    """An archive being written, whose name is taken (see `taken`). Use it as a context manager.
 
     rows      realizations that are in it with all that is known of them; the next block starts there
-    samples   realizations that it has room for
+    samples   realizations that it was begun for
     """
 
     def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str, surfaces: int) -> None:
         """Create the file with everything but its rows. `keep` says what it will hold of each realization, and `surfaces` how
         many will be checked against the surfaces (see `run`).
 
-        Raises ArchiveError where it cannot be written.
+        Raises ArchiveError where it cannot be written, or where there is no room for it.
         """
+        check_room(path, program.nominal, kept_rows(keep), samples)
         with _replacing(path) as part, _opened(part, "w") as file:
             write_header(file, program, run_settings(program, seed, samples, keep), surfaces)
-            _make_room(file, 0, samples)
+            lay_out_rows(file, 0, min(samples, FIRST_ROWS))
         self._go_on(path, program.nominal)
 
     @classmethod
@@ -57,25 +60,23 @@ class ArchiveWriter:
 
         Raises ArchiveError where the file is no archive, or holds another model or another run.
         """
+        inspect(path)
         writer = cls.__new__(cls)
         with _replacing(path) as part:
             # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
             shutil.copyfile(path, part)
-            open_archive(part, shown=path).close()
             with _opened(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, seed, samples, keep), surfaces)
-                length = len(file.dimensions[words.REALIZATION])
-                _make_room(file, length, samples)
-                file.setncattr("samples", np.int64(max(samples, length)))
+                samples, length = max(samples, int(file.samples)), len(file.dimensions[words.REALIZATION])
+                check_room(path, program.nominal, kept_rows(keep), samples - length)
+                lay_out_rows(file, length, samples)
+                file.setncattr("samples", np.int64(samples))
                 rows = max(0, int(file[words.SUMMED_ROWS.name][:].max()))
                 others = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
                 # What follows stands for the rows of before.
-                for variable, nothing in nothing_checked(surfaces, len(program.nominal.pairs)).items():
-                    file["surface"][variable.name][...] = nothing
-                for each in program.nominal.parts:
-                    for variable in words.FIELDS:
-                        file[f"field/{each.name}"][variable.name][...] = np.nan
+                nothing = {_field(part): no_field(len(part.vertices)) for part in program.nominal.parts}
+                overwrite(file, {"surface": nothing_checked(surfaces, len(program.nominal.pairs)), **nothing})
         writer._go_on(path, program.nominal)
         return writer
 
@@ -84,15 +85,32 @@ class ArchiveWriter:
         with _refusals_told(path):
             self._path, self._file = path, _opened(path, "r+")
         self._nominal = nominal
-        self.samples = len(self._file.dimensions[words.REALIZATION])
-        self._moments = [_of_states(nominal, part) for part in nominal.parts]
+        self._rows_kept = [variable for variable in words.BY_REALIZATION if self._stored(variable) is not None]
+        self._fields_written = time.monotonic()
+        self.samples = int(self._file.samples)
+        self._take_up_sums()
+
+    def _take_up_sums(self) -> None:
+        """Go back to the last checkpoint."""
+        self._moments = [_of_states(self._nominal, part) for part in self._nominal.parts]
         summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
         self._slot = int(summed.argmax())
         self.rows = max(0, int(summed[self._slot]))
         if self.rows:
-            for part, both in zip(nominal.parts, self._moments, strict=True):
+            for part, both in zip(self._nominal.parts, self._moments, strict=True):
+                group = self._file[_field(part)]
+                sums = np.ma.getdata(group[words.FIELD_SUMS.name][self._slot])
+                if crc32(words.FIELD_SUMS, sums) != int(group[words.SUMS_CHECKSUM.name][self._slot]):
+                    raise ArchiveError(
+                        f'archive "{self._path}" is damaged: the sums of the field of part "{part.name}" are not what was '
+                        "written; write to a new file"
+                    )
                 for state, moments in enumerate(both):
-                    moments.state = np.asarray(self._file[f"field/{part.name}"][words.FIELD_SUMS.name][self._slot, state])
+                    moments.state = sums[state]
+
+    def _stored(self, variable: words.Variable) -> netCDF4.Variable | None:
+        group = self._file["sample"] if variable is words.DEVIATION else self._file
+        return group.variables.get(variable.name)
 
     def __enter__(self) -> "ArchiveWriter":
         return self
@@ -104,13 +122,23 @@ class ArchiveWriter:
     def append(self, block: Block) -> None:
         """Write the rows of a block, and hand them over to the system."""
         with _refusals_told(self._path):
+            if block.start + len(block) > len(self._file.dimensions[words.REALIZATION]):
+                self._make_room_for_all()
             self._append(block)
+
+    def _make_room_for_all(self) -> None:
+        self._file.close()
+        with _replacing(self._path) as part:
+            shutil.copyfile(self._path, part)
+            with _opened(part, "r+") as file:
+                lay_out_rows(file, len(file.dimensions[words.REALIZATION]), self.samples)
+        self._file = _opened(self._path, "r+")
 
     def _append(self, block: Block) -> None:
         rows = slice(block.start, block.start + len(block))
         R, t = block.poses[..., :9].reshape(*block.poses.shape[:3], 3, 3), block.poses[..., 9:]
         self._add_to_fields(R, t)
-        values = {
+        values: dict[words.Variable, Any] = {
             words.MEASURED: block.measured,
             words.TRANSLATION: t,
             words.ROTATION: R,
@@ -123,12 +151,15 @@ class ArchiveWriter:
             words.STARTS: block.starts,
             words.SECOND_ANSWERS: block.second_answers,
             words.SEARCHED: block.searched,
+            words.DEVIATION: block.deviations,
+            words.STATUS: block.status,
         }
-        if words.DEVIATION.name in self._file["sample"].variables:
-            self._file["sample"][words.DEVIATION.name][rows] = block.deviations
-        for variable, data in values.items():
-            if data.size and variable.name in self._file.variables:
-                self._file[variable.name][rows] = data
+        for variable in self._rows_kept:
+            stored = self._stored(variable)
+            if values[variable].size and variable is not words.STATUS and stored is not None:
+                stored[rows] = values[variable]
+        checksums = [crc32(variable, values[variable]) for variable in self._rows_kept]
+        self._file[words.ROW_CHECKSUM.name][block.start // words.BLOCK_ROWS] = checksums
         self._file.sync()
         self._file[words.STATUS.name][rows] = block.status
         self._file.sync()
@@ -143,23 +174,45 @@ class ArchiveWriter:
         """Write the sums so far, from which a killed run goes on. The last ones stay until these are written."""
         with _refusals_told(self._path):
             self._check_point()
+            if time.monotonic() - self._fields_written > FIELDS_EVERY:
+                self._write_fields()
 
     def _check_point(self) -> None:
         self._slot = 1 - self._slot
-        self._file[words.SUMMED_ROWS.name][self._slot] = -1
+        self._file[words.SUMMED_ROWS.name][self._slot] = words.UNFINISHED
         self._file.sync()
         for part, both in zip(self._nominal.parts, self._moments, strict=True):
-            sums = self._file[f"field/{part.name}"][words.FIELD_SUMS.name]
-            for state, moments in enumerate(both):
-                sums[self._slot, state] = moments.state
+            group, sums = self._file[_field(part)], np.array([moments.state for moments in both])
+            group[words.FIELD_SUMS.name][self._slot] = sums
+            group[words.SUMS_CHECKSUM.name][self._slot] = crc32(words.FIELD_SUMS, sums)
         self._file.sync()
         self._file[words.SUMMED_ROWS.name][self._slot] = self.rows
         self._file.sync()
 
     def write_fields(self) -> None:
-        """Displacement fields of all parts, from the sums over all rows."""
+        """Displacement fields of all parts, from the sums over all rows so far."""
         with _refusals_told(self._path):
             self._write_fields()
+
+    def write_fields_of_checkpoint(self) -> None:
+        """Displacement fields up to the last checkpoint: for a run that is stopped, at whatever instant."""
+        with _refusals_told(self._path):
+            self._take_up_sums()
+            if self.rows:
+                self._write_fields()
+
+    def _write_fields(self) -> None:
+        fields = {
+            _field(part): {
+                words.FIELD_MEAN: [moments.mean() for moments in both],
+                words.FIELD_SIX_SIGMA: [moments.six_sigma() for moments in both],
+                words.FIELD_INTERVAL: [moments.magnitude_bounds() for moments in both],
+                words.FIELD_REALIZATIONS: self.rows,
+            }
+            for part, both in zip(self._nominal.parts, self._moments, strict=True)
+        }
+        overwrite(self._file, fields)
+        self._fields_written = time.monotonic()
 
     def chosen(self, seed: int) -> np.ndarray:
         """Numbers (row,) of the realizations that are to be checked against the surfaces."""
@@ -171,21 +224,18 @@ class ArchiveWriter:
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
         """What the check of some rows found, (row, pair) [mm]."""
+        group = self._file["surface"]
+        values = nothing_checked(len(group.dimensions[words.CHECKED]), len(self._nominal.pairs))
+        found = {words.CHECKED_REALIZATION: rows, words.SURFACE_PENETRATION: penetration, words.BESIDE: beside}
+        for variable, of_rows in found.items():
+            values[variable][: len(rows)] = of_rows
         with _refusals_told(self._path):
-            found = {words.SURFACE_PENETRATION: penetration, words.BESIDE: beside, words.CHECKED_REALIZATION: rows}
-            for variable, values in found.items():
-                if values.size:
-                    self._file["surface"][variable.name][: len(rows)] = values
-            self._file.sync()
+            overwrite(self._file, {"surface": values})
 
-    def _write_fields(self) -> None:
-        for part, both in zip(self._nominal.parts, self._moments, strict=True):
-            group = self._file[f"field/{part.name}"]
-            for state, moments in enumerate(both):
-                group[words.FIELD_MEAN.name][state] = moments.mean()
-                group[words.FIELD_SIX_SIGMA.name][state] = moments.six_sigma()
-                group[words.FIELD_INTERVAL.name][state] = moments.magnitude_bounds()
-        self._file.sync()
+
+def _field(part: NominalPart) -> str:
+    """The path of a part's field."""
+    return f"field/{words.group_of(part.name)}"
 
 
 def _of_states(nominal: Nominal, part: NominalPart) -> list[FieldMoments]:
@@ -197,26 +247,13 @@ def _of_states(nominal: Nominal, part: NominalPart) -> list[FieldMoments]:
 @contextlib.contextmanager
 def _replacing(path: Path) -> Iterator[Path]:
     """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
-    _refuse_while_written(path)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{path.name}.part")
     try:
         with _refusals_told(path):
             yield part
             part.replace(path)
     finally:
         part.unlink(missing_ok=True)
-
-
-def _refuse_while_written(path: Path) -> None:
-    """HDF5 locks a file that somebody writes to; replacing it would take it away from them."""
-    if path.is_file():
-        try:
-            netCDF4.Dataset(path).close()
-        except OSError as error:
-            if error.errno == _HDF_ERROR:
-                raise ArchiveError(
-                    f'archive "{path}" is being written by another run, or damaged; wait, delete it, or write to a new file'
-                ) from error
 
 
 @contextlib.contextmanager
@@ -227,24 +264,6 @@ def _refusals_told(path: Path) -> Iterator[None]:
     except (OSError, RuntimeError) as error:
         reason = getattr(error, "strerror", None) or f"{error} (is the disk full?)"
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
-
-
-def _make_room(file: netCDF4.Dataset, start: int, stop: int) -> None:
-    """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
-    counts = (
-        words.STATUS, words.ACTIVE, words.CARRYING, words.ITERATIONS, words.STARTS, words.SECOND_ANSWERS, words.SEARCHED,
-    )  # fmt: skip
-    room: dict[Variable, float] = dict.fromkeys(counts, words.UNFINISHED)
-    for variable in (*words.ROWS, words.DEVIATION):
-        stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
-        if stored is None or 0 in stored.shape[1:]:
-            continue
-        for first in range(start, stop, ROOM):
-            rows = min(ROOM, stop - first)
-            stored[first : first + rows] = np.full((rows, *stored.shape[1:]), room.get(variable, np.nan))
-    for first in range(start, stop, ROOM):
-        last = min(first + ROOM, stop)
-        file[words.REALIZATION][first:last] = np.arange(first, last)
 
 
 def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:

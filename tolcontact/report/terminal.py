@@ -30,14 +30,23 @@ def summary_text(summary: xr.Dataset) -> Group:
 def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     count = summary.attrs["realizations"]
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
-    yield Text("Estimates with their 95 % confidence intervals; changes from the same realizations.")
+    if summary.attrs["samples"] > count:
+        yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
+    yield Text("Estimates with their 95 % confidence intervals; changes from the same draws.")
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
-    yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
+    fields = int(summary["field_realizations"])
+    of = "" if fields == count else f", of {grouped(fields)} realizations"
+    yield Text(f"\n6 sigma of the displacement magnitude over the surface of each part (mm){of}", style="bold")
     yield _field_table(summary)
     yield Text("\ncontact", style="bold")
     for line in _contact_lines(summary, count):
-        yield Padding(Text(line), (0, 0, 0, 2))
+        yield Padding(Text(line), (0, 0, 0, 2), expand=False)
+
+
+def grouped(count: int) -> str:
+    """A count with its thousands apart: 57 344."""
+    return f"{count:,}".replace(",", " ")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -86,7 +95,7 @@ def _field_table(summary: xr.Dataset) -> Table:
 def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
     by_status = _by_status(summary)
-    yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items())
+    yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
     stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
     if stuck:
         yield f"not assemblable: {percent(summary['not_assemblable'].values)}; their poses of least penetration count above"
@@ -113,7 +122,7 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, between contact points; use more points"
         if beside > limit:
-            yield f"contact points that touch stand up to {beside:.3g} mm beside their reference face, on the plane of its rim"
+            yield f"contact points that touch stand up to {beside:.3g} mm beside their reference face"
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:

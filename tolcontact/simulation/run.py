@@ -15,12 +15,11 @@ from tolcontact.sampling import draw
 from tolcontact.simulation.block import Block, Status
 from tolcontact.simulation.contact import ContactResolver
 from tolcontact.symbolic import ENTRIES, Program
-
-BLOCK = 4096  # as many as sampling draws at once
+from tolcontact.vocabulary import BLOCK_ROWS
 
 
 def simulate_blocks(
-    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK, threads: int | None = None
+    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK_ROWS, threads: int | None = None
 ) -> Iterator[Block]:
     """Realizations `start` to `samples` in blocks, in order. The realization k is the same in any run.
 
@@ -54,7 +53,7 @@ def simulate_blocks(
         while begun:
             yield finish_one()
     finally:
-        pool.shutdown(cancel_futures=True)
+        pool.shutdown(wait=False, cancel_futures=True)  # where all went well none is left; a stopped run does not wait
 
 
 def processors() -> int:

@@ -1,11 +1,13 @@
 """What a run says about each measure, each part and the contact, read from its archive alone, piece by piece."""
 
+from collections import Counter
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
@@ -15,7 +17,7 @@ ESTIMATE = ("estimate", "lower", "upper")
 PERCENTILES = (0.135, 5, 50, 95, 99.865)
 STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
 LEAST = 2
-PIECE = 100_000  # realizations that are read at once
+PIECE = 24 * words.BLOCK_ROWS  # realizations that are read at once
 OUTSIDE = "outside tolerance"
 UNTOUCHED, NOT_ASSEMBLABLE = (words.STATUS_MEANINGS.index(word) for word in ("untouched", "not_assemblable"))
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
@@ -36,12 +38,15 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     surfaces_checked              number of these realizations
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
+    field_realizations                                   number of realizations in the displacement fields
 
-    Raises ArchiveError where fewer than LEAST realizations are finished.
+    The attribute `realizations` is the number of those that are finished, `samples` of those that the run was begun for.
+    Raises ArchiveError where fewer than LEAST realizations are finished, or where some are not what was written.
     """
     done = finished(results)
     if done < LEAST:
         raise ArchiveError(f"{done} realizations are finished, which is too few for statistics; go on with --resume")
+    check_rows(results, done)
     rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
     measures = range(rows.sizes[words.MEASURE])
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
@@ -66,6 +71,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
                 np.array([_field_extremes(results, str(part)) for part in parts]),
                 {"units": "mm"},
             ),
+            "field_realizations": ((), min(_summed(results, str(part)) for part in parts), {"units": "1"}),
         },
         coords={
             words.MEASURE: rows[words.MEASURE].values,
@@ -84,6 +90,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
         attrs={
             "title": results.attrs.get("title", ""),
             "realizations": total,
+            "samples": max(total, int(results.attrs["samples"])),
             **{word: results.attrs[word] for word in ("resolution", "objective", "active_set")},
             "smallest_range": _smallest_range(results, rows),
         },
@@ -106,7 +113,11 @@ def _pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
 
 
 def _statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
-    return (piece[words.STATUS.name].values for piece in _pieces(rows[[words.STATUS.name]]))
+    for piece in _pieces(rows[[words.STATUS.name]]):
+        status = piece[words.STATUS.name].values
+        if status.min(initial=0) < words.UNFINISHED or status.max(initial=0) >= len(words.STATUS_MEANINGS):
+            raise ArchiveError("the archive is damaged: some statuses have no meaning; run the model again")
+        yield status
 
 
 def _sample(rows: xr.Dataset, name: str, state: str, measure: int) -> Sample:
@@ -137,15 +148,16 @@ def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str
 
 def _iterations(rows: xr.Dataset) -> list[float]:
     """Median and largest number of linear steps of the realizations that contact touched: those that took any."""
-    counts = np.zeros(1, dtype=int)
+    counts: Counter[int] = Counter()
     for piece in _pieces(rows[[words.ITERATIONS.name]]):
-        found = np.bincount(piece[words.ITERATIONS.name].values, minlength=len(counts))
-        found[: len(counts)] += counts
-        counts = found
-    counts[0] = 0
-    total = counts.sum()
-    middle = np.searchsorted(np.cumsum(counts), [(total - 1) // 2, total // 2], side="right")
-    return [float(middle.mean()), float(np.flatnonzero(counts)[-1])] if total else [0.0, 0.0]
+        steps, times = np.unique(piece[words.ITERATIONS.name].values, return_counts=True)
+        counts.update(dict(zip(steps.tolist(), times.tolist(), strict=True)))
+    taken = sorted(steps for steps in counts if steps > 0)
+    if not taken:
+        return [0.0, 0.0]
+    below = np.cumsum([counts[steps] for steps in taken])
+    middle = np.searchsorted(below, [(below[-1] - 1) // 2, below[-1] // 2], side="right")
+    return [float(np.mean([taken[k] for k in middle])), float(taken[-1])]
 
 
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
@@ -168,6 +180,35 @@ def finished(results: xr.DataTree) -> int:
     return rows
 
 
+def check_rows(results: xr.DataTree, done: int) -> None:
+    """Raise ArchiveError where blocks among the first `done` realizations are not what was written.
+
+    Archives of format 1 have no checksums; nor are there any of the rows that somebody took from an archive.
+    """
+    stored = results.to_dataset()
+    count = stored.sizes[words.REALIZATION]
+    if words.ROW_CHECKSUM.name not in stored or stored.sizes[words.BLOCK] != -(-count // words.BLOCK_ROWS):
+        return
+    whole = done if done == count else done // words.BLOCK_ROWS * words.BLOCK_ROWS
+    sums = stored[words.ROW_CHECKSUM.name].values
+    names = stored[words.ROW_VARIABLE].values.astype(str).tolist()
+    for variable in words.BY_REALIZATION:
+        if variable.name not in names:
+            continue
+        rows = (results["sample"].to_dataset() if variable is words.DEVIATION else stored)[variable.name]
+        expected = sums[:, names.index(variable.name)]
+        for first in range(0, whole, PIECE):
+            piece = rows[first : min(first + PIECE, whole)].values
+            for start in range(0, len(piece), words.BLOCK_ROWS):
+                block = (first + start) // words.BLOCK_ROWS
+                if crc32(variable, piece[start : start + words.BLOCK_ROWS]) != expected[block]:
+                    last = min((block + 1) * words.BLOCK_ROWS, count) - 1
+                    raise ArchiveError(
+                        f'the archive is damaged: "{variable.name}" of realizations {block * words.BLOCK_ROWS} to {last} is '
+                        "not what was written; run the model again"
+                    )
+
+
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
     tolerance = float(rows[words.MEASURE_TOLERANCE.name][measure])
     nominal = float(rows[words.MEASURE_NOMINAL.name][measure])
@@ -186,12 +227,27 @@ def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
 
 def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
     """6 sigma of |u|, and its interval, where the archived field is least and largest; (state, extreme, bound)."""
-    field = results["field"].children[part].to_dataset()
-    six_sigma = field[words.FIELD_SIX_SIGMA.name].sel({words.COMPONENT: "magnitude"}).values
     found = np.full((len(words.STATES), 2, len(ESTIMATE)), np.nan)
+    if not _summed(results, part):
+        return found
+    field = _field(results, part)
+    six_sigma = field[words.FIELD_SIX_SIGMA.name].sel({words.COMPONENT: "magnitude"}).values
     for state, values in enumerate(six_sigma):
         if np.isfinite(values).all():
             where = [values.argmin(), values.argmax()]
             found[state, :, 0] = values[where]
             found[state, :, 1:] = field[words.FIELD_INTERVAL.name].values[state, where]
     return found
+
+
+def _summed(results: xr.DataTree, part: str) -> int:
+    """How many realizations are in the field of a part; 0 where it is being written."""
+    field = _field(results, part)
+    if words.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
+        return results.to_dataset().sizes[words.REALIZATION]
+    whole = int(field[words.GROUP_CHECKSUM.name]) != words.UNFINISHED
+    return int(field[words.FIELD_REALIZATIONS.name]) if whole else 0
+
+
+def _field(results: xr.DataTree, part: str) -> xr.Dataset:
+    return results["field"].children[words.group_of(part)].to_dataset()

@@ -1,0 +1,268 @@
+"""Whether a file is an archive, and whole, before anything in it is believed.
+
+The netCDF library itself can fail on a damaged file, or never end. So another process looks first (this file, as a script),
+with little memory and little time. It reads everything but the realizations, whose checksums are looked at when they are read.
+"""
+
+import json
+import math
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.checksums import crc32
+from tolcontact.child import ChildDiedError, limit_memory, run_child
+from tolcontact.errors import ArchiveError
+from tolcontact.printing import printable
+from tolcontact.vocabulary import Variable
+
+SECONDS, SECONDS_PER_GB = 20.0, 20.0
+MEMORY = 1 << 30  # beside four times the file's own size
+DEFLATED = 1032  # zlib makes data no smaller than that
+DECLARED = 1 << 26  # bytes of a declared model
+TEXT = 1 << 20  # letters of an attribute
+SIZES = {words.STATE: 2, words.AXIS: 3, words.BODY_AXIS: 3, words.CORNER: 3, words.COMPONENT: 4, words.BOUND: 2}
+GROUPS = ("model", "contact", "sample", "field")
+LABELS = (words.PART, words.PAIR, words.MEASURE, words.ROW_VARIABLE)
+CHANGES_VALUES = (
+    "scale_factor",
+    "add_offset",
+    "missing_value",
+    "_Unsigned",
+    "calendar",
+    "valid_range",
+    "valid_min",
+    "valid_max",
+)
+SAID = ("title", "resolution", "objective", "active_set")  # texts that a summary repeats
+OF_FIELD = (words.FIELD_VERTICES, words.FIELD_FACES, words.FIELD_MEAN, words.FIELD_SIX_SIGMA, words.FIELD_INTERVAL)
+OF_CONTACT = (words.MOVING_PART, words.REFERENCE_PART)
+OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
+ONCE = {  # by group; a mesh has the same names as a field
+    "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS,
+         words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
+    "model": (words.DECLARATION,),
+    "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,
+                words.LOCATOR_OF_POINT),
+    "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
+               words.LOCATOR_DIRECTION),
+    "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
+    "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS, words.FIELD_SUMS,
+              words.SUMS_CHECKSUM, words.GROUP_CHECKSUM),
+}  # fmt: skip
+
+
+class DamagedError(Exception):
+    """What is wrong with a file."""
+
+
+def inspect(path: Path, *, shown: str | Path | None = None) -> None:
+    """Raise ArchiveError where a file is not an archive, is damaged, or claims what it cannot hold; as `shown` where given."""
+    said, gigabytes = shown or path, path.stat().st_size / 1e9
+    try:
+        found = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
+    except ChildDiedError as error:
+        raise ArchiveError(f'"{said}" is damaged, or no archive of tolcontact: {error}') from error
+    if found:
+        raise ArchiveError(f'"{said}" {found}')
+
+
+def _look(path: Path) -> str:
+    """What is wrong with a file; nothing where it is an archive."""
+    try:
+        file = netCDF4.Dataset(path)
+    except (OSError, RuntimeError, ValueError, AttributeError) as error:
+        return f"cannot be read as netCDF: {error}"
+    try:
+        _check_format(file)
+        groups = list(_groups(file))
+        for group in groups:
+            _check_group(group, path.stat().st_size)
+        _check_archive(file)
+        for group in groups:
+            _check_sums(group)
+        _check_declaration(file)
+    except DamagedError as error:
+        return str(error)
+    except Exception as error:  # a damaged file may raise anything in the library that reads it
+        return f"is damaged: {type(error).__name__}: {error}"
+    return ""
+
+
+def _check_format(file: netCDF4.Dataset) -> None:
+    number = file.getncattr("format") if "format" in file.ncattrs() else 1
+    if not isinstance(number, int | np.integer) or number < 1:
+        raise DamagedError(f"is damaged: its format is {number!r}")
+    if number > words.FORMAT:
+        raise DamagedError(
+            f"has format {number}; this version of tolcontact reads formats up to {words.FORMAT}, a newer one does"
+        )
+
+
+def _groups(group: netCDF4.Dataset, depth: int = 0) -> Iterator[netCDF4.Dataset]:
+    if depth > 4:
+        raise DamagedError("is no archive of tolcontact: its groups lie too deep")
+    yield group
+    for child in group.groups.values():
+        yield from _groups(child, depth + 1)
+
+
+def _check_group(group: netCDF4.Dataset, size: int) -> None:
+    for name in (*group.groups, *group.variables, *group.dimensions):
+        _check_text("a name", name)
+    _check_attributes(group)
+    for name, variable in group.variables.items():
+        where = f"{group.path.rstrip('/')}/{name}"
+        if not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
+            raise DamagedError(f"is no archive of tolcontact: {where} holds neither numbers nor text")
+        least = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
+        packed = any((variable.filters() or {}).get(word) for word in ("zlib", "szip", "zstd", "bzip2", "blosc"))
+        if math.prod(variable.shape) * least > size * (DEFLATED if packed else 1):
+            raise DamagedError(f"is damaged: {where} claims {_times(variable.shape)} values, more than the file can hold")
+        _check_attributes(variable)
+
+
+def _times(shape: tuple[int, ...]) -> str:
+    return " x ".join(map(str, shape))
+
+
+def _check_attributes(thing: Any) -> None:
+    for name in thing.ncattrs():
+        _check_text("a name", name)
+        value = thing.getncattr(name)
+        if isinstance(value, str):
+            _check_text(name, value)
+        if name in CHANGES_VALUES:
+            raise DamagedError(f"is no archive of tolcontact: attribute {name} of {thing.name} would change values")
+
+
+def _check_text(name: str, text: str) -> None:
+    if len(text) > TEXT:
+        raise DamagedError(f"is damaged: {name} has {len(text)} letters")
+    if printable(text) != text:
+        raise DamagedError(f"is damaged: {name} holds control characters ({printable(text)[:60]})")
+
+
+def _check_archive(file: netCDF4.Dataset) -> None:
+    optional = (*words.POSES, *words.ADDED)
+    missing = [v.name for v in words.ROWS if v not in optional and v.name not in file.variables]
+    missing += [group for group in GROUPS if group not in file.groups]
+    missing += [word for word in SAID if not isinstance(getattr(file, word, None), str)]
+    if missing:
+        raise DamagedError(f"is not an archive of tolcontact: it has no {', '.join(missing)}")
+    accuracy, samples = getattr(file, "solver_accuracy", None), getattr(file, "samples", None)
+    if not (isinstance(accuracy, float | np.floating) and isinstance(samples, int | np.integer) and 0 <= samples < 2**63):
+        raise DamagedError("is damaged: its attributes solver_accuracy and samples are no numbers")
+    for name, known in ONCE.items():
+        parent = file.groups.get(name) if name else file
+        for group in [] if parent is None else (parent.groups.values() if name == "field" else [parent]):
+            for variable in known:
+                _check_variable(group, variable)
+    for name in LABELS:
+        if name in file.variables:
+            labels = _texts(file[name])
+            if len(set(labels)) < len(labels) or "" in labels:
+                raise DamagedError(f"is damaged: its names of each {name} are not different, or empty")
+    _check_needed(file)
+
+
+def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
+    if variable.name not in group.variables:
+        return
+    stored, where = group[variable.name], f"{group.path.rstrip('/')}/{variable.name}"
+    text = stored.dtype is str or np.dtype(stored.dtype).kind == "S"
+    dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
+    if dims != variable.dims or text != (variable.kind is str):
+        raise DamagedError(f"is damaged: {where} has not the dimensions and the type of an archive")
+    if text or variable is words.NUMBERS:
+        return
+    wrong = [d for d, size in zip(dims, stored.shape, strict=True) if SIZES.get(d, size) != size]
+    if wrong:
+        raise DamagedError(f"is damaged: dimension {wrong[0]} of {where} has a wrong size")
+
+
+def _check_needed(file: netCDF4.Dataset) -> None:
+    """What summaries and models are read from."""
+    for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (words.DECLARATION,))):
+        _need(file[group], needed)
+    _need(file, (words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS))
+    if getattr(file, "format", 1) > 1:
+        _need(file, (words.ROW_CHECKSUM, words.ROW_VARIABLE_LABEL, words.SUMMED_ROWS))
+    if tuple(_texts(file[words.STATE])) != words.STATES:
+        raise DamagedError("is damaged: its states are not raw and corrected")
+    for part in _texts(file[words.PART]):
+        name = words.group_of(part)
+        if name not in file["field"].groups:
+            raise DamagedError(f'is damaged: it has no field of part "{part}"')
+        _need(file["field"][name], OF_FIELD)
+
+
+def _need(group: netCDF4.Dataset, needed: tuple[Variable, ...]) -> None:
+    missing = [variable.name for variable in needed if variable.name not in group.variables]
+    if missing:
+        raise DamagedError(f"is damaged: group {group.path} has no {', '.join(missing)}")
+
+
+def _texts(stored: netCDF4.Variable) -> list[str]:
+    """Texts, one for each entry of the variable's own dimensions."""
+    if stored.dtype is str:
+        found = [str(text) for text in np.ravel(stored[...])]
+    else:
+        stored.set_auto_chartostring(False)
+        letters = np.ma.getdata(stored[...])
+        rows = letters.reshape(math.prod(letters.shape[:-1]), -1)
+        found = [row.tobytes().rstrip(b"\0").decode("utf-8") for row in rows]
+    for text in found:
+        _check_text(stored.name, text)
+    return found
+
+
+def _check_sums(group: netCDF4.Dataset) -> None:
+    """Whether what is written once, or in one go, has the checksum that is stored beside it."""
+    kind = group.path.split("/")[1]
+    known = {v.name: v for v in ONCE["field" if "/mesh/" in group.path else kind]} if kind in ONCE else {}
+    for name, stored in group.variables.items():
+        if words.CHECKSUM in stored.ncattrs() and name in known:
+            values = _declaration(stored) if known[name] is words.DECLARATION else _values(stored, known[name])
+            if crc32(known[name], values) != int(stored.getncattr(words.CHECKSUM)):
+                raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{name} is not what was written")
+    if words.GROUP_CHECKSUM.name in group.variables:
+        said, found = int(group[words.GROUP_CHECKSUM.name][...]), 0
+        for variable in words.SURFACE if kind == "surface" else words.FIELDS:
+            found = crc32(variable, _values(group[variable.name], variable), found)
+        if said not in (words.UNFINISHED, found):
+            raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
+
+
+def _values(stored: netCDF4.Variable, variable: Variable) -> Any:
+    return _texts(stored) if variable.kind is str else np.ma.getdata(stored[...])
+
+
+def _declaration(stored: netCDF4.Variable) -> str:
+    if math.prod(stored.shape) > DECLARED:
+        raise DamagedError(f"is damaged: its declared model has {math.prod(stored.shape)} bytes")
+    if stored.dtype is str:
+        return str(stored[...])
+    stored.set_auto_chartostring(False)
+    return bytes(np.ma.getdata(stored[...]).tobytes().rstrip(b"\0")).decode("utf-8")
+
+
+def _check_declaration(file: netCDF4.Dataset) -> None:
+    try:
+        declared = json.loads(_declaration(file["model"][words.DECLARATION.name]))
+    except (ValueError, RecursionError) as error:
+        raise DamagedError(f"is damaged: its declared model is no JSON ({error})") from error
+    if not isinstance(declared, dict):
+        raise DamagedError("is damaged: its declared model is no JSON object")
+
+
+if __name__ == "__main__":
+    _file = Path(sys.argv[1])
+    limit_memory(MEMORY + 4 * _file.stat().st_size)
+    sys.stdout.write(_look(_file))

@@ -1,0 +1,67 @@
+"""Room for the rows of an archive: on the disk, and in the file."""
+
+import shutil
+from collections.abc import Sequence
+from math import prod
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.archive.variables import ROW_CHUNK
+from tolcontact.discretization import Nominal
+from tolcontact.errors import ArchiveError
+from tolcontact.vocabulary import Variable
+
+AT_ONCE = 50 * ROW_CHUNK  # rows that are laid out at once
+
+
+def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: int) -> None:
+    """Raise ArchiveError where the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
+    needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
+    if needed > free:
+        less = "; or keep less of each realization (measures)" if words.ROTATION in rows else ""
+        raise ArchiveError(
+            f'archive "{path}" needs {_size(needed)} for {samples} realizations, but its disk has {_size(free)} free; '
+            f"ask for fewer, or write to another disk{less}"
+        )
+
+
+def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
+    """How many bytes a realization takes."""
+    sizes = {
+        words.REALIZATION: 1,
+        words.STATE: len(words.STATES),
+        words.PART: len(nominal.parts),
+        words.PAIR: len(nominal.pairs),
+        words.MEASURE: len(nominal.measures),
+        words.LOCATOR: len(nominal.locator_labels),
+        words.AXIS: 3,
+        words.BODY_AXIS: 3,
+    }
+    return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (words.NUMBERS, *rows))
+
+
+def _size(count: float) -> str:
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"
+
+
+def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
+    """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
+    for first in range(start, stop, AT_ONCE):
+        some = slice(first, min(first + AT_ONCE, stop))
+        for variable in words.BY_REALIZATION:
+            stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
+            if stored is not None and 0 not in stored.shape[1:]:
+                nothing = np.nan if np.dtype(variable.kind).kind == "f" else words.UNFINISHED
+                stored[some] = np.full((some.stop - some.start, *stored.shape[1:]), nothing)
+        file[words.REALIZATION][some] = np.arange(some.start, some.stop)
+    sums = file[words.ROW_CHECKSUM.name]
+    blocks = slice(len(sums), -(-stop // words.BLOCK_ROWS))
+    if blocks.stop > blocks.start:
+        sums[blocks] = np.full((blocks.stop - blocks.start, sums.shape[1]), words.UNFINISHED)
