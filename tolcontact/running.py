@@ -6,7 +6,7 @@ from pathlib import Path
 
 import xarray as xr
 
-from tolcontact.archive import ArchiveWriter, open_archive, opened, taken
+from tolcontact.archive import ArchiveWriter, check_rows, open_archive, opened, taken
 from tolcontact.assembly import Assembly
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
@@ -117,14 +117,18 @@ def _simulate(program: Program, writer: ArchiveWriter, seed: int, progress: Prog
 
 
 def summarize(results: xr.DataTree | str | Path) -> xr.Dataset:
-    """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize)."""
+    """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize).
+
+    Raises ArchiveError where realizations are not what was written, or fewer than two are finished.
+    """
     if isinstance(results, str | Path):
         with open_archive(results) as tree:
-            return statistics_of(tree)
+            return summarize(tree)
     if not isinstance(results, xr.DataTree):
         raise OptionError(
             f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
         )
+    check_rows(results)
     return statistics_of(results)
 
 

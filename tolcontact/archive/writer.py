@@ -21,7 +21,9 @@ from tolcontact import vocabulary as words
 from tolcontact.archive.checked import archived_poses, choose, nothing_checked
 from tolcontact.archive.header import kept_rows, no_field, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
+from tolcontact.archive.reader import opened
 from tolcontact.archive.room import check_room, lay_out_rows
+from tolcontact.archive.rows import check_rows
 from tolcontact.archive.same_run import check_same_run
 from tolcontact.archive.variables import overwrite
 from tolcontact.checksums import crc32
@@ -65,6 +67,8 @@ class ArchiveWriter:
         with _replacing(path) as part:
             # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
             shutil.copyfile(path, part)
+            with opened(part) as results:
+                check_rows(results)
             with _opened(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, seed, samples, keep), surfaces)
                 samples, length = max(samples, int(file.samples)), len(file.dimensions[words.REALIZATION])

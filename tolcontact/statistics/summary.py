@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
-from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
@@ -41,12 +40,11 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     field_realizations                                   number of realizations in the displacement fields
 
     The attribute `realizations` is the number of those that are finished, `samples` of those that the run was begun for.
-    Raises ArchiveError where fewer than LEAST realizations are finished, or where some are not what was written.
+    Raises ArchiveError where fewer than LEAST realizations are finished.
     """
     done = finished(results)
     if done < LEAST:
         raise ArchiveError(f"{done} realizations are finished, which is too few for statistics; go on with --resume")
-    check_rows(results, done)
     rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
     measures = range(rows.sizes[words.MEASURE])
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
@@ -178,35 +176,6 @@ def finished(results: xr.DataTree) -> int:
             return rows + int(unfinished[0])
         rows += len(piece)
     return rows
-
-
-def check_rows(results: xr.DataTree, done: int) -> None:
-    """Raise ArchiveError where blocks among the first `done` realizations are not what was written.
-
-    Archives of format 1 have no checksums; nor are there any of the rows that somebody took from an archive.
-    """
-    stored = results.to_dataset()
-    count = stored.sizes[words.REALIZATION]
-    if words.ROW_CHECKSUM.name not in stored or stored.sizes[words.BLOCK] != -(-count // words.BLOCK_ROWS):
-        return
-    whole = done if done == count else done // words.BLOCK_ROWS * words.BLOCK_ROWS
-    sums = stored[words.ROW_CHECKSUM.name].values
-    names = stored[words.ROW_VARIABLE].values.astype(str).tolist()
-    for variable in words.BY_REALIZATION:
-        if variable.name not in names:
-            continue
-        rows = (results["sample"].to_dataset() if variable is words.DEVIATION else stored)[variable.name]
-        expected = sums[:, names.index(variable.name)]
-        for first in range(0, whole, PIECE):
-            piece = rows[first : min(first + PIECE, whole)].values
-            for start in range(0, len(piece), words.BLOCK_ROWS):
-                block = (first + start) // words.BLOCK_ROWS
-                if crc32(variable, piece[start : start + words.BLOCK_ROWS]) != expected[block]:
-                    last = min((block + 1) * words.BLOCK_ROWS, count) - 1
-                    raise ArchiveError(
-                        f'the archive is damaged: "{variable.name}" of realizations {block * words.BLOCK_ROWS} to {last} is '
-                        "not what was written; run the model again"
-                    )
 
 
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
