@@ -132,11 +132,13 @@ class ArchiveWriter:
 
     def _make_room_for_all(self) -> None:
         self._file.close()
-        with _replacing(self._path) as part:
-            shutil.copyfile(self._path, part)
-            with _opened(part, "r+") as file:
-                lay_out_rows(file, len(file.dimensions[words.REALIZATION]), self.samples)
-        self._file = _opened(self._path, "r+")
+        try:
+            with _replacing(self._path) as part:
+                shutil.copyfile(self._path, part)
+                with _opened(part, "r+") as file:
+                    lay_out_rows(file, len(file.dimensions[words.REALIZATION]), self.samples)
+        finally:  # a run may be stopped here, and still writes its fields
+            self._file = _opened(self._path, "r+")
 
     def _append(self, block: Block) -> None:
         rows = slice(block.start, block.start + len(block))
