@@ -106,11 +106,15 @@ def _check_format(file: netCDF4.Dataset) -> None:
 
 
 def _groups(group: netCDF4.Dataset, depth: int = 0) -> Iterator[netCDF4.Dataset]:
-    if depth > 4:
-        raise DamagedError("is no archive of tolcontact: its groups lie too deep")
+    if depth > 4 or len(group.groups) > 2 * len(_top(group).dimensions.get(words.PART, ())) + 64:
+        raise DamagedError("is no archive of tolcontact: its groups lie too deep, or are too many")
     yield group
     for child in group.groups.values():
         yield from _groups(child, depth + 1)
+
+
+def _top(group: netCDF4.Dataset) -> netCDF4.Dataset:
+    return group if group.parent is None else _top(group.parent)
 
 
 def _check_group(group: netCDF4.Dataset, size: int) -> None:
@@ -194,6 +198,9 @@ def _check_needed(file: netCDF4.Dataset) -> None:
     _need(file, (words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS))
     if getattr(file, "format", 1) > 1:
         _need(file, (words.ROW_CHECKSUM, words.ROW_VARIABLE_LABEL, words.SUMMED_ROWS))
+        summed = np.ma.getdata(file[words.SUMMED_ROWS.name][...])
+        if (summed < words.UNFINISHED).any() or (summed > len(file.dimensions[words.REALIZATION])).any():
+            raise DamagedError("is damaged: its checkpoints are of more realizations than it holds")
     if tuple(_texts(file[words.STATE])) != words.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
     for part in _texts(file[words.PART]):

@@ -41,7 +41,10 @@ def opened(path: Path) -> xr.DataTree:
 
 def model_of(results: xr.DataTree) -> Assembly:
     """The declared assembly, rebuilt from an archive."""
-    document = json.loads(str(results["model"][words.DECLARATION.name].values))
+    try:
+        document = json.loads(str(results["model"][words.DECLARATION.name].values))
+    except (ValueError, RecursionError) as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():

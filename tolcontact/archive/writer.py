@@ -71,6 +71,7 @@ class ArchiveWriter:
                 check_rows(results)
             with _opened(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, seed, samples, keep), surfaces)
+                _sums(file, path, program.nominal)
                 samples, length = max(samples, int(file.samples)), len(file.dimensions[words.REALIZATION])
                 check_room(path, program.nominal, kept_rows(keep), samples - length)
                 lay_out_rows(file, length, samples)
@@ -97,20 +98,10 @@ class ArchiveWriter:
     def _take_up_sums(self) -> None:
         """Go back to the last checkpoint."""
         self._moments = [_of_states(self._nominal, part) for part in self._nominal.parts]
-        summed = np.asarray(self._file[words.SUMMED_ROWS.name][:])
-        self._slot = int(summed.argmax())
-        self.rows = max(0, int(summed[self._slot]))
-        if self.rows:
-            for part, both in zip(self._nominal.parts, self._moments, strict=True):
-                group = self._file[_field(part)]
-                sums = np.ma.getdata(group[words.FIELD_SUMS.name][self._slot])
-                if crc32(words.FIELD_SUMS, sums) != int(group[words.SUMS_CHECKSUM.name][self._slot]):
-                    raise ArchiveError(
-                        f'archive "{self._path}" is damaged: the sums of the field of part "{part.name}" are not what was '
-                        "written; write to a new file"
-                    )
-                for state, moments in enumerate(both):
-                    moments.state = sums[state]
+        self.rows, self._slot, sums = _sums(self._file, self._path, self._nominal)
+        for of_part, both in zip(sums, self._moments, strict=False):
+            for state, moments in enumerate(both):
+                moments.state = of_part[state]
 
     def _stored(self, variable: words.Variable) -> netCDF4.Variable | None:
         group = self._file["sample"] if variable is words.DEVIATION else self._file
@@ -237,6 +228,22 @@ class ArchiveWriter:
             values[variable][: len(rows)] = of_rows
         with _refusals_told(self._path):
             overwrite(self._file, {"surface": values})
+
+
+def _sums(file: netCDF4.Dataset, path: Path, nominal: Nominal) -> tuple[int, int, list[np.ndarray]]:
+    """Rows of the last checkpoint, its place, and its sums (state, number) of each part; none where nothing is summed up."""
+    summed = np.ma.getdata(file[words.SUMMED_ROWS.name][:])
+    slot = int(summed.argmax())
+    rows, found = max(0, int(summed[slot])), []
+    for part in nominal.parts if rows else ():
+        group = file[_field(part)]
+        found.append(np.ma.getdata(group[words.FIELD_SUMS.name][slot]))
+        if crc32(words.FIELD_SUMS, found[-1]) != int(group[words.SUMS_CHECKSUM.name][slot]):
+            raise ArchiveError(
+                f'archive "{path}" is damaged: the sums of the field of part "{part.name}" are not what was written; write to a '
+                "new file"
+            )
+    return rows, slot, found
 
 
 def _field(part: NominalPart) -> str:
