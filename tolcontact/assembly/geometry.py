@@ -50,7 +50,9 @@ class Mesh:
             yield f'"{self.source}" is a STEP file, which says its units itself; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
-            if not path.is_file():
+            if path.is_dir():
+                yield f'"{path}" is a folder; give the path of an STL, OBJ, PLY, GLB or STEP file in it'
+            elif not path.is_file():
                 yield f'mesh file "{path}" does not exist; give the path of an STL, OBJ, PLY, GLB or STEP file'
         elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"

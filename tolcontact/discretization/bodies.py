@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
 from tolcontact.discretization.edges import edges
 from tolcontact.discretization.step_text import Solid
@@ -23,9 +22,10 @@ class Body:
     name: str
     lower: np.ndarray | None = None
     upper: np.ndarray | None = None
+    is_open: bool = False
 
     def __str__(self) -> str:
-        called = f'"{self.name}"' if self.name else "without a name"
+        called = ("open, " if self.is_open else "") + (f'"{self.name}"' if self.name else "without a name")
         if self.lower is None or self.upper is None:
             return called
         size = " x ".join(f"{length:.4g}" for length in self.upper - self.lower)
@@ -45,13 +45,8 @@ class Triangles:
     faces: np.ndarray
     piece: np.ndarray
     brep: np.ndarray
-    names: Sequence[str]
-    coloured: Sequence[bool]
-
-    def of(self, chosen: np.ndarray) -> "Triangles":
-        """Those at some indices or by a mask."""
-        rows = (array[chosen] for array in (self.corners, self.faces, self.piece, self.brep))
-        return Triangles(*rows, self.names, self.coloured)
+    names: np.ndarray
+    coloured: np.ndarray
 
 
 def bodies(triangles: Triangles, solids: Sequence[Solid]) -> list[Body]:
@@ -65,10 +60,11 @@ def bodies(triangles: Triangles, solids: Sequence[Solid]) -> list[Body]:
             first = np.cumsum([0, *(solid.faces for solid in solids)])
             label = np.searchsorted(first, triangles.brep, side="right") - 1
             return [_body(triangles, solid.name, np.flatnonzero(label == k)) for k, solid in enumerate(solids)]
-    found = []
+    found: list[Body] = []
     for k in pieces:
-        own = np.flatnonzero(triangles.piece == k)
-        found.extend(_body(triangles, triangles.names[k], own[part]) for part in _closing(triangles.of(own)))
+        found.extend(
+            _body(triangles, triangles.names[k], *run) for run in _runs(triangles, np.flatnonzero(triangles.piece == k))
+        )
     if len(pieces) == 1 and len(found) < len(solids):
         return [Body(solid.name) for solid in solids]
     return found
@@ -80,16 +76,19 @@ def listed(found: Sequence[Body]) -> str:
     return shown + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
 
 
-def _body(triangles: Triangles, name: str, chosen: np.ndarray) -> Body:
+def _body(triangles: Triangles, name: str, chosen: np.ndarray, is_open: bool = False) -> Body:
     if not len(chosen):
         return Body(name)
     corners = triangles.corners[chosen].reshape(-1, 3)
-    return Body(name, corners.min(axis=0), corners.max(axis=0))
+    return Body(name, corners.min(axis=0), corners.max(axis=0), is_open)
 
 
-def _closing(triangles: Triangles) -> list[np.ndarray]:
-    """The triangles' indices, body by body, of one piece: each closed one with its cavities, then what hangs together."""
-    order = np.argsort(triangles.brep, kind="stable")
+def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]]:
+    """The bodies in the piece that consists of its `own` triangles, by their indices, without cavities. Is the body open?
+
+    Sheets that do not close are one body together: surfaces of a part need not be sewn.
+    """
+    order = own[np.argsort(triangles.brep[own], kind="stable")]
     brep = triangles.brep[order]
     ends_at = np.flatnonzero(_open_edges(triangles.faces[order], brep) == 0)
     runs = np.searchsorted(ends_at, brep, side="left")
@@ -97,7 +96,7 @@ def _closing(triangles: Triangles) -> list[np.ndarray]:
     rest = order[runs == len(ends_at)]
     outer = [run for run in closed if _volume(triangles.corners[run]) >= 0]
     outer.extend(run for run in closed if _volume(triangles.corners[run]) < 0 and not _within(triangles, run, outer))
-    return [*outer, *(rest[part] for part in _connected(triangles.faces[rest]))]
+    return [*((run, False) for run in outer), *([(rest, True)] if len(rest) else [])]
 
 
 def _open_edges(faces: np.ndarray, brep: np.ndarray) -> np.ndarray:
@@ -125,14 +124,3 @@ def _within(triangles: Triangles, run: np.ndarray, others: Sequence[np.ndarray])
     own = triangles.corners[run].reshape(-1, 3)
     boxes = [triangles.corners[other].reshape(-1, 3) for other in others]
     return any((box.min(axis=0) <= own.min(axis=0)).all() and (box.max(axis=0) >= own.max(axis=0)).all() for box in boxes)
-
-
-def _connected(faces: np.ndarray) -> list[np.ndarray]:
-    """Indices of the triangles that hang together by their edges, one array for each lot."""
-    if not len(faces):
-        return []
-    _, edge, _ = edges(faces)
-    face = np.repeat(np.arange(len(faces)), 3)
-    count = len(faces)
-    label = trimesh.graph.connected_component_labels(np.c_[face, count + edge], node_count=count + int(edge.max()) + 1)
-    return [np.flatnonzero(label[:count] == k) for k in np.unique(label[:count])]

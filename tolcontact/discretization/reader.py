@@ -45,9 +45,7 @@ def load(request: Request) -> list[dict[str, np.ndarray] | GeometryFault]:
     return done
 
 
-def _by_one_process(
-    request: Request, files: Sequence[tuple[Path, str]]
-) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
+def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
     """What one process makes of the first of `files`, up to the one that it fails at."""
     allowed = [SECONDS + SECONDS_PER_MB * path.stat().st_size / 1e6 for path, _ in files]
     jobs = {

@@ -9,7 +9,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.assembly import Box, Mesh
-from tolcontact.assembly.geometry import STEP, UNITS
+from tolcontact.assembly.geometry import UNITS
 from tolcontact.discretization import reader, screening
 from tolcontact.discretization.bodies import Triangles, bodies, listed
 from tolcontact.discretization.edges import rim

@@ -50,7 +50,8 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     neighbours = np.asarray(mesh.face_adjacency)
     body = trimesh.graph.connected_component_labels(neighbours, node_count=len(mesh.faces))
     count = int(body.max()) + 1
-    is_open = np.bincount(body, (triangles[edge] == 1).reshape(-1, 3).any(axis=1), count) > 0
+    is_open = np.zeros(count, dtype=bool)
+    is_open[body[~_is_matched(body, edge, sense)]] = True
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
     # A body whose normals point inward is a cavity where another one is around it, else a mistake.
@@ -63,6 +64,15 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
                 f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
+
+
+def _is_matched(body: np.ndarray, edge: np.ndarray, sense: np.ndarray) -> np.ndarray:
+    """Whether each triangle's own body (face,) runs along all three of its edges (3 face,) as often one way as the other.
+
+    Where bodies touch along an edge, more than two triangles have it, and a part of one body alone may not close there.
+    """
+    _, pair = np.unique(np.repeat(body, 3) * (int(edge.max()) + 1) + edge, return_inverse=True)
+    return np.asarray((np.bincount(pair, sense)[pair] == 0).reshape(-1, 3).all(axis=1))
 
 
 def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bool:

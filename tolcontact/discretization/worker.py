@@ -33,7 +33,7 @@ class Refused(Exception):
     """What is wrong with a file, as the rest of a sentence that begins with its name."""
 
 
-class OwnFolder(trimesh.resolvers.Resolver):
+class OwnFolder(trimesh.resolvers.Resolver):  # type: ignore[misc]
     """The files beside a glTF file: it may name no others."""
 
     def __init__(self, folder: Path) -> None:
@@ -126,9 +126,10 @@ class Glb:
             node = nodes[index]
             transform = above @ np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T
             name = node.get("name", "")
-            name = parent if name.startswith("=>[") else name  # the kernel's own label of a nameless shape
             if "mesh" in node:
-                found.append((name, transform, self.tree["meshes"][node["mesh"]]))
+                mesh = self.tree["meshes"][node["mesh"]]
+                own = parent if name.startswith("=>[") else mesh.get("name", "")  # the kernel's label of a nameless shape
+                found.append((own, transform, mesh))
             waiting.extend((k, transform, name) for k in reversed(node.get("children", [])))
         return found
 
@@ -187,9 +188,9 @@ def limit(memory: int, seconds: int) -> None:
     if resource is not None:
         for what, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds), (resource.RLIMIT_CORE, 0)):
             _, hard = resource.getrlimit(what)
-            most = most if hard == resource.RLIM_INFINITY else min(most, hard)
+            own = most if hard == resource.RLIM_INFINITY else min(most, hard)
             with contextlib.suppress(OSError, ValueError):  # where the system knows no such limit
-                resource.setrlimit(what, (most, most))
+                resource.setrlimit(what, (own, own))
 
 
 def work(folder: Path) -> None:
@@ -216,7 +217,7 @@ def work(folder: Path) -> None:
 def save(folder: Path, k: int, arrays: Arrays) -> None:
     """Leave what was read; it appears at once, when it is whole."""
     with (folder / "part").open("wb") as file:
-        np.savez(file, **arrays)
+        np.savez(file, **arrays)  # type: ignore[arg-type]
     (folder / "part").replace(folder / f"{k}.npz")
 
 
