@@ -73,9 +73,9 @@ def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iter
                 yield from [GeometryFault(f'"{path}": the reader of files cannot be started ({error})') for path, _ in files]
                 return
         try:
+            _awaited(process, START, folder / "ready")
             for k, (path, _) in enumerate(files):
-                seconds = allowed[k] + (START if k == 0 else 0)
-                if not _awaited(process, folder, k, seconds):
+                if not _awaited(process, allowed[k], folder / f"{k}.npz", folder / f"{k}.txt"):
                     yield GeometryFault(f'"{path}" {_end(process, folder, allowed[k])}')
                     return
                 yield _left(path, folder, k)
@@ -84,12 +84,12 @@ def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iter
             process.wait()
 
 
-def _awaited(process: subprocess.Popen, folder: Path, k: int, seconds: float) -> bool:
-    """Whether the process leaves something of its file k within some `seconds`."""
+def _awaited(process: subprocess.Popen, seconds: float, *left: Path) -> bool:
+    """Whether the process leaves one of some files within some `seconds`."""
     end = time.monotonic() + seconds
     while True:
         ended = process.poll() is not None  # asked first: what it left before it ended counts
-        if any((folder / f"{k}{suffix}").exists() for suffix in (".npz", ".txt")):
+        if any(path.exists() for path in left):
             return True
         if ended or time.monotonic() > end:
             return False

@@ -18,6 +18,7 @@ from tolcontact.discretization.step_text import StepText
 
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
+FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
 BREP = "brep_index"  # the B-rep face of each triangle
 
 
@@ -64,7 +65,8 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
 def read(geometry: Mesh, contents: Contents) -> Shape:
     """The triangles of a mesh geometry. `contents` hold that of its file, if it has one.
 
-    Raises GeometryFault where the file cannot be read or is too large, holds several bodies, or where its units are unknown.
+    Raises GeometryFault where the file cannot be read, is too large or holds several bodies, where coordinates are no
+    numbers or far off, or where its units are unknown.
     """
     source = geometry.source
     if not isinstance(source, str | Path):
@@ -73,9 +75,10 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     if isinstance(content, GeometryFault):
         raise content
     if content.text is not None:
-        return Shape(_from_step(Path(source), content.arrays, content.text))
+        return Shape(_from_step(geometry, content.arrays, content.text))
     own = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
     own.apply_scale(_scale(geometry, str(content.arrays["units"]) or None))
+    _check_numbers(own, geometry)
     return Shape(_merged(own, content.arrays["piece"]), unsure=not geometry.units)
 
 
@@ -87,6 +90,7 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     if len(own.faces) > MAX_TRIANGLES:
         raise GeometryFault(screening.too_many(geometry, len(own.faces), MAX_TRIANGLES))
     own.apply_scale(_scale(geometry, getattr(source, "units", None)))
+    _check_numbers(own, geometry)
     own.merge_vertices(merge_tex=True, merge_norm=True)
     return own
 
@@ -102,6 +106,17 @@ def _scale(geometry: Mesh, own: str | None) -> float:
         raise GeometryFault(
             f'{geometry} says that it counts in "{said}", which is no known unit; say tc.Mesh(..., units="mm")'
         ) from error
+
+
+def _check_numbers(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
+    if not np.isfinite(mesh.vertices).all():
+        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers; export it again")
+    far = float(np.abs(mesh.vertices).max(initial=0))
+    if far > FAR:
+        raise GeometryFault(
+            f"{geometry} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or counts in other "
+            "units: export it again, or give units"
+        )
 
 
 def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
@@ -126,15 +141,15 @@ def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.concatenate(vertices), faces, process=False)
 
 
-def _from_step(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> trimesh.Trimesh:
+def _from_step(geometry: Mesh, arrays: Mapping[str, np.ndarray], text: StepText) -> trimesh.Trimesh:
     """The one body of a STEP file. Its B-rep faces are the mesh's face attribute BREP."""
+    path = Path(geometry.source)
     if not len(arrays["faces"]):
         elsewhere = f" (it refers to {', '.join(text.documents[:5])})" if text.documents else ""
         raise GeometryFault(f'"{path}" holds no surfaces{elsewhere}; export the part itself as a solid')
-    if not np.isfinite(arrays["vertices"]).all():
-        raise GeometryFault(f'"{path}" holds vertices that are not finite numbers; export it again')
     mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
     mesh.apply_scale(UNITS["m"])
+    _check_numbers(mesh, geometry)
     # It has passed through single precision. Rounding to what that resolves brings round lengths back, and flat faces.
     resolved = UNITS["m"] * float(np.spacing(np.float32(np.abs(mesh.vertices).max(initial=0) / UNITS["m"])))
     power = 10.0 ** math.floor(math.log10(resolved))

@@ -134,12 +134,16 @@ def _check_stl(path: Path, head: bytes, size: int) -> None:
 def _check_ply(path: Path, head: bytes, size: int) -> None:
     if b"end_header" not in head:
         raise GeometryFault(f'"{path}" is no PLY file, or cut off: its header does not end; export it again')
-    for element, count in _PLY_ELEMENT.findall(head):
-        if int(count) > size:
-            raise GeometryFault(
-                f'"{path}" is cut off or damaged: it announces {int(count)} of its element "{element.decode()}", and has '
-                f"{size} bytes; export it again"
-            )
+    rows = sum(int(count) for _, count in _PLY_ELEMENT.findall(head))
+    if rows > size:  # each takes a byte at least
+        raise GeometryFault(
+            f'"{path}" is cut off or damaged: it announces {rows} vertices, faces and the like, and has {size} bytes; '
+            "export it again"
+        )
+    if b"format ascii" in head:
+        found = sum(1 for line in path.read_bytes().partition(b"end_header")[2].splitlines() if line.strip())
+        if found < rows:
+            raise GeometryFault(f'"{path}" is cut off: it announces {rows} lines of numbers, and has {found}; export it again')
 
 
 def _check_step(path: Path) -> StepText:

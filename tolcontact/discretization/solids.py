@@ -10,13 +10,12 @@ from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.reading import Contents, Shape, read, read_files
 
 FIELD_STATIONS = 12
-FAR = 1e9  # [mm] no coordinate of a part is as large; far above, squares and cubes are no numbers any more
 
 
 def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
     """The closed or open triangle surface of a geometry. `contents`: of the files of a model, if they were read together.
 
-    Raises GeometryFault where a mesh cannot be read, is empty, is not finite, or has no outside.
+    Raises GeometryFault where a mesh cannot be read, is empty, or has no outside.
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
@@ -24,13 +23,6 @@ def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
     mesh = found.mesh
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
-    if not np.isfinite(mesh.vertices).all():
-        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers")
-    if np.abs(mesh.vertices).max() > FAR:
-        raise GeometryFault(
-            f"{geometry} reaches as far as {np.abs(mesh.vertices).max():.3g} mm, beyond the limit of {FAR:.0e} mm; it is "
-            "damaged, or in other units; export it again"
-        )
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _check_outward(mesh, geometry)

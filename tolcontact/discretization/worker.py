@@ -1,10 +1,12 @@
 """The program of the process that reads shape files for `reader`: what they make it do stays there.
 
-`python -P worker.py FOLDER` works through the list in FOLDER/jobs.json. Of job k it leaves FOLDER/k.npz with what it read,
-or FOLDER/k.txt with what is wrong. It imports nothing of tolcontact, so that it starts quickly.
+`python -P worker.py FOLDER` leaves FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. Of job
+k it leaves FOLDER/k.npz with what it read, or FOLDER/k.txt with what is wrong. It imports nothing of tolcontact, so that it
+starts quickly.
 """
 
 import contextlib
+import io
 import json
 import os
 import struct
@@ -59,12 +61,19 @@ class OwnFolder(trimesh.resolvers.Resolver):  # type: ignore[misc]
 
 def read_mesh(path: Path, kind: str) -> Arrays:
     """All pieces of a mesh file in their places, in the file's own units."""
+    content = path.read_bytes()
+    beside = None
+    if kind == "gltf":
+        beside = OwnFolder(path.parent)
+        check_json(content)
+    if kind == "obj" or (kind == "stl" and len(content) != 84 + 50 * int.from_bytes(content[80:84], "little")):
+        content = plain(content)
     try:
-        with path.open("rb") as file:
-            beside = OwnFolder(path.parent) if kind == "gltf" else None
-            scene = trimesh.load_scene(file, file_type=kind, resolver=beside, process=False)
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=beside, process=False)
     except (Refused, MemoryError):
         raise
+    except UnicodeDecodeError as error:
+        raise Refused("is damaged: where it should hold words, it holds none; export it again") from error
     except Exception as error:  # trimesh's readers raise whatever their format's parser raises
         raise Refused(
             f"cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB"
@@ -76,6 +85,23 @@ def read_mesh(path: Path, kind: str) -> Arrays:
         if isinstance(geometry, trimesh.Trimesh):
             found.append((trimesh.transform_points(geometry.vertices, transform), np.asarray(geometry.faces)))
     return {**joined(found), "units": np.array(scene.units or "")}
+
+
+def check_json(content: bytes) -> None:
+    """Refuse what is no glTF: trimesh would look for another file then."""
+    try:
+        json.loads(content)
+    except (ValueError, RecursionError) as error:
+        raise Refused("is no glTF file: it is no JSON; export it again, as one file (GLB) at best") from error
+
+
+def plain(content: bytes) -> bytes:
+    """A text in UTF-8. Names in other alphabets, which do not matter here, may get lost; numbers do not."""
+    try:
+        content.decode()
+    except UnicodeDecodeError:
+        return content.decode("ascii", errors="replace").encode()
+    return content
 
 
 def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
@@ -197,6 +223,7 @@ def work(folder: Path) -> None:
     """Read what the list in `folder` names."""
     jobs = json.loads((folder / "jobs.json").read_text())
     limit(jobs["memory"], jobs["seconds"])
+    (folder / "ready").touch()
     for k, job in enumerate(jobs["files"]):
         path = Path(job["path"])
         try:
