@@ -3,7 +3,14 @@
 import itertools
 from collections.abc import Sequence
 
-FACES = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))  # corners of a block, seen from outside
+FACES = (
+    (0, 3, 2, 1),
+    (4, 5, 6, 7),
+    (0, 1, 5, 4),
+    (1, 2, 6, 5),
+    (2, 3, 7, 6),
+    (3, 0, 4, 7),
+)  # corners of a block, seen from outside
 HEADER = """ISO-10303-21;
 HEADER;
 FILE_DESCRIPTION((''),'2;1');

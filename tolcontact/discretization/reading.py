@@ -145,8 +145,7 @@ def _from_step(geometry: Mesh, arrays: Mapping[str, np.ndarray], text: StepText)
     """The one body of a STEP file. Its B-rep faces are the mesh's face attribute BREP."""
     path = Path(geometry.source)
     if not len(arrays["faces"]):
-        elsewhere = f" (it refers to {', '.join(text.documents[:5])})" if text.documents else ""
-        raise GeometryFault(f'"{path}" holds no surfaces{elsewhere}; export the part itself as a solid')
+        raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
     mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
     mesh.apply_scale(UNITS["m"])
     _check_numbers(mesh, geometry)

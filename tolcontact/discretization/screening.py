@@ -149,9 +149,10 @@ def _check_ply(path: Path, head: bytes, size: int) -> None:
 def _check_step(path: Path) -> StepText:
     content = path.read_bytes()
     said = step_text(content)
-    if said.files:
+    elsewhere = said.files or (() if b"_SHELL" in content else said.documents)
+    if elsewhere:
         raise GeometryFault(
-            f'"{path}" leaves shapes to other files ({_listed(said.files)}), which are not read; give the file of the part '
+            f'"{path}" leaves shapes to other files ({_listed(elsewhere)}), which are not read; give the file of the part '
             "itself, or export it as one file without external references"
         )
     if b"END-ISO-10303-21" not in content:

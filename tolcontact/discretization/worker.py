@@ -29,6 +29,7 @@ except ImportError:  # an extra: only STEP files need it
 Arrays = dict[str, np.ndarray]
 COMPONENTS = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}  # of glTF's accessors
 WIDTHS = {"SCALAR": 1, "VEC3": 3}
+GUESSERS = ("charset_normalizer", "chardet")  # by which trimesh would guess the alphabet of what is no text
 
 
 class Refused(Exception):
@@ -72,9 +73,9 @@ def read_mesh(path: Path, kind: str) -> Arrays:
         scene = trimesh.load_scene(io.BytesIO(content), file_type=kind, resolver=beside, process=False)
     except (Refused, MemoryError):
         raise
-    except UnicodeDecodeError as error:
-        raise Refused("is damaged: where it should hold words, it holds none; export it again") from error
     except Exception as error:  # trimesh's readers raise whatever their format's parser raises
+        if isinstance(error, UnicodeDecodeError) or getattr(error, "name", "") in GUESSERS:
+            raise Refused("is damaged: where it should hold words, it holds none; export it again") from error
         raise Refused(
             f"cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB"
         ) from error
@@ -234,7 +235,9 @@ def work(folder: Path) -> None:
             count = len(arrays["faces"])
             save(folder, k, arrays if count <= jobs["most"] else {"count": np.array(count)})
         except MemoryError:
-            say(folder, k, f"takes more than {jobs['memory'] / 2**30:g} GiB of memory to read; it is damaged, or far too fine")
+            say(
+                folder, k, f"takes more than {jobs['memory'] / 2**30:.3g} GiB of memory to read; it is damaged, or far too fine"
+            )
         except Refused as refused:
             say(folder, k, str(refused))
         except Exception as error:  # whatever a file of a stranger brings about is said of that file
