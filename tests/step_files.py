@@ -1,6 +1,7 @@
 """Texts of STEP files of blocks, written by hand."""
 
 import itertools
+import re
 from collections.abc import Sequence
 
 FACES = (
@@ -87,6 +88,18 @@ class Step:
         square = [(x, y, z), (x + size, y, z), (x + size, y + size, z), (x, y + size, z)]
         shell = self.shell(square, "OPEN_SHELL", [(0, 1, 2, 3)])
         return self.add(f"SHELL_BASED_SURFACE_MODEL('',(#{shell}))")
+
+    def paint(self, shell, red):
+        """Give the first face of a shell a colour of its own."""
+        face = int(re.search(r"\(#(\d+)", self.lines[shell - 1])[1])
+        colour = self.add(f"COLOUR_RGB('',{red},0.,0.)")
+        fill = self.add(f"FILL_AREA_STYLE_COLOUR('',#{colour})")
+        area = self.add(f"FILL_AREA_STYLE('',(#{fill}))")
+        side = self.add(f"SURFACE_SIDE_STYLE('',(#{self.add(f'SURFACE_STYLE_FILL_AREA(#{area})')}))")
+        use = self.add(f"SURFACE_STYLE_USAGE(.BOTH.,#{side})")
+        style = self.add(f"PRESENTATION_STYLE_ASSIGNMENT((#{use}))")
+        styled = self.add(f"STYLED_ITEM('color',(#{style}),#{face})")
+        self.add(f"MECHANICAL_DESIGN_GEOMETRIC_PRESENTATION_REPRESENTATION('',(#{styled}),#{self.context})")
 
     def product(self, name, items: Sequence[int] = ()):
         """A product whose shape has some items. Returns its definition and its representation."""

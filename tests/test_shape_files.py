@@ -18,6 +18,7 @@ import trimesh
 import tolcontact as tc
 from tests.step_files import Step, corners
 from tolcontact.discretization import discretize
+from tolcontact.discretization.faces import patch
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.solids import shape
 
@@ -177,8 +178,8 @@ def children(pid):
 
 SEVERAL = {
     "solids apart": (
-        step(("solid", (0, 0, 0), (10, 20, 30), "left"), ("solid", (50, 0, 0), (51, 1, 1), "right")),
-        ['1. "left", 10 x 20 x 30 mm at (5, 10, 15)', '2. "right", 1 x 1 x 1 mm at (50.5, 0.5, 0.5)'],
+        step(("solid", (0, 0, 0), (10, 20, 30), r"Geh\X2\00E4\X0\use"), ("solid", (50, 0, 0), (51, 1, 1), "right")),
+        ['1. "Gehäuse", 10 x 20 x 30 mm at (5, 10, 15)', '2. "right", 1 x 1 x 1 mm at (50.5, 0.5, 0.5)'],
     ),
     "solids that touch": (
         step(("solid", (0, 0, 0), (10, 10, 10), "left"), ("solid", (10, 0, 0), (20, 10, 10), "right")),
@@ -390,6 +391,18 @@ def test_colours_do_not_part_a_body(tmp_path):
     scene.export(tmp_path / "coloured.glb")
     mesh = shape(tc.Mesh(tmp_path / "coloured.glb", units="mm")).mesh
     assert mesh.is_watertight and len(mesh.vertices) == 8
+
+
+def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
+    made = Step()
+    shell = made.shell(corners((0, 0, 0), (10, 20, 30)))
+    made.product("painted", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
+    made.paint(shell, red=1.0)
+    (tmp_path / "painted.step").write_text(str(made))
+    part = tc.Assembly("painted").part("block", tc.Mesh(tmp_path / "painted.step"))
+    meshes = {part: shape(part.geometry).mesh}
+    for at, area in (((5, 10, 0), 200), ((5, 10, 30), 200), ((0, 10, 15), 600), ((5, 0, 15), 300)):
+        assert patch(part.face(tc.Brep(at)), meshes).mesh.area == pytest.approx(area)
 
 
 def test_nothing_is_printed_and_nothing_left_behind(tmp_path, capfd, monkeypatch):

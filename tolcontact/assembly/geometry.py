@@ -37,7 +37,7 @@ class Mesh:
     `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
     file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
     2 um and what single precision leaves of their coordinates, and keep their boundary representation for `tc.Brep`;
-    that needs the extra `tolcontact[step]`.
+    that needs the extra `tolcontact[step]`. A STEP file holds one body.
     """
 
     source: Any

@@ -163,7 +163,7 @@ def _from_step(geometry: Mesh, arrays: Mapping[str, np.ndarray], text: StepText)
     found = bodies(Triangles(mesh.triangles, mesh.faces, piece, brep, arrays["names"], arrays["coloured"]), text.solids)
     if len(found) > 1:
         raise GeometryFault(
-            f'"{path}" holds {len(found)} bodies, and a part is one; export each as a file of its own: {listed(found)}'
+            f'"{path}" holds {len(found)} bodies, but a part is one body; export each as a file of its own: {listed(found)}'
         )
     gaps = len(rim(mesh.faces)) if text.solids else 0
     if gaps:

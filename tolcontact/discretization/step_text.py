@@ -15,7 +15,7 @@ _ENTITY = re.compile(
 )
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _LINK = re.compile(rb"<([^<>]*)>")
-_WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\")
+_WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
 
@@ -81,7 +81,11 @@ def _count(references: list[int], shells: Mapping[int, list[int]], oriented: Map
 
 def _decoded(string: bytes) -> str:
     text = string.decode("utf-8", errors="replace").replace("''", "'")
-    return _WIDE.sub(lambda wide: bytes.fromhex(wide[1]).decode("utf-16-be", errors="replace"), text)
+    return _WIDE.sub(_wide, text)
+
+
+def _wide(found: re.Match[str]) -> str:
+    return bytes.fromhex(found[2]).decode("latin-1") if found[2] else bytes.fromhex(found[1]).decode("utf-16-be", "replace")
 
 
 def _suffix(name: str) -> str:

@@ -211,9 +211,15 @@ def joined(found: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:
 
 
 def limit(memory: int, seconds: int) -> None:
-    """Hold this process to some `memory` [byte] and, should nobody end it, processor `seconds`; leave no core dumps."""
+    """Hold this process to some `memory` [byte], and its files, too; and to processor `seconds`, should nobody end it."""
     if resource is not None:
-        for what, most in ((resource.RLIMIT_AS, memory), (resource.RLIMIT_CPU, seconds), (resource.RLIMIT_CORE, 0)):
+        limits = {
+            resource.RLIMIT_AS: memory,
+            resource.RLIMIT_FSIZE: memory,
+            resource.RLIMIT_CPU: seconds,
+            resource.RLIMIT_CORE: 0,
+        }
+        for what, most in limits.items():
             _, hard = resource.getrlimit(what)
             own = most if hard == resource.RLIM_INFINITY else min(most, hard)
             with contextlib.suppress(OSError, ValueError):  # where the system knows no such limit
