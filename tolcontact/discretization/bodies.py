@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.discretization.edges import edges
+from tolcontact.discretization.fault import shown
 from tolcontact.discretization.step_text import Solid
 
 SHOWN = 12  # bodies that a message lists
@@ -25,7 +26,7 @@ class Body:
     is_open: bool = False
 
     def __str__(self) -> str:
-        called = ("open, " if self.is_open else "") + (f'"{self.name}"' if self.name else "without a name")
+        called = ("open, " if self.is_open else "") + (f'"{shown(self.name, 60)}"' if self.name else "without a name")
         if self.lower is None or self.upper is None:
             return called
         size = " x ".join(f"{length:.4g}" for length in self.upper - self.lower)
@@ -72,8 +73,8 @@ def bodies(triangles: Triangles, solids: Sequence[Solid]) -> list[Body]:
 
 def listed(found: Sequence[Body]) -> str:
     """Some bodies with their numbers, names, sizes and places."""
-    shown = "; ".join(f"{number}. {body}" for number, body in enumerate(found[:SHOWN], start=1))
-    return shown + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
+    first = "; ".join(f"{number}. {body}" for number, body in enumerate(found[:SHOWN], start=1))
+    return first + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
 
 
 def _body(triangles: Triangles, name: str, chosen: np.ndarray, is_open: bool = False) -> Body:
