@@ -20,7 +20,7 @@ ROOMS = {
     "typer": ("cli.py",),
     "trimesh": ("discretization/",),
     "igl": ("discretization/",),
-    "cascadio": ("discretization/reading.py",),
+    "cascadio": ("discretization/worker.py",),
 }
 NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
 # From the top of the flow to its end; a room imports from rooms that stand before it.

@@ -37,7 +37,7 @@ class Mesh:
     `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
     file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
     2 um and what single precision leaves of their coordinates, and keep their boundary representation for `tc.Brep`;
-    that needs the extra `tolcontact[step]`.
+    that needs the extra `tolcontact[step]`. A STEP file holds one body.
     """
 
     source: Any
@@ -50,7 +50,9 @@ class Mesh:
             yield f'"{self.source}" is a STEP file, which says its units itself; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
-            if not path.is_file():
+            if path.is_dir():
+                yield f'"{path}" is a folder; give the path of an STL, OBJ, PLY, GLB or STEP file in it'
+            elif not path.is_file():
                 yield f'mesh file "{path}" does not exist; give the path of an STL, OBJ, PLY, GLB or STEP file'
         elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"

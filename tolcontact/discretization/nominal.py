@@ -18,6 +18,7 @@ from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.layout import lay_out
 from tolcontact.discretization.overlap import overlap_corners, rim_points
+from tolcontact.discretization.reading import read_files
 from tolcontact.discretization.solids import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
@@ -140,11 +141,9 @@ def discretize(assembly: Assembly) -> Nominal:
     """
     faults = list(assembly.faults())
     clean = not faults
-    attempts = {
-        part: _attempt(faults, _where("part", part), shape, part.geometry)
-        for part in assembly.parts
-        if not any(part.geometry.faults())
-    }
+    clear = [part for part in assembly.parts if not any(part.geometry.faults())]
+    contents = read_files(part.geometry for part in clear)
+    attempts = {part: _attempt(faults, _where("part", part), shape, part.geometry, contents) for part in clear}
     shapes = {part: found for part, found in attempts.items() if found is not None}
     meshes = {part: found.mesh for part, found in shapes.items()}
     parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]

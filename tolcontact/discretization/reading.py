@@ -1,31 +1,25 @@
-"""Files of shapes to triangle meshes in mm."""
+"""Sources of shapes to triangle meshes in mm."""
 
-import contextlib
 import math
-import os
-import re
-import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import trimesh
 
-from tolcontact.assembly import Mesh
-from tolcontact.assembly.geometry import STEP, UNITS
+from tolcontact.assembly import Box, Mesh
+from tolcontact.assembly.geometry import UNITS
+from tolcontact.discretization import reader, screening
+from tolcontact.discretization.bodies import Triangles, bodies, listed
+from tolcontact.discretization.edges import rim
 from tolcontact.discretization.fault import GeometryFault
-
-try:
-    import cascadio
-except ImportError:  # an extra: only STEP files need it
-    cascadio = None
+from tolcontact.discretization.step_text import StepText
 
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
-BREP = "brep_index"  # cascadio's word: the B-rep face of each triangle
-_MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
+FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
+BREP = "brep_index"  # the B-rep face of each triangle
 
 
 @dataclass(frozen=True)
@@ -36,136 +30,147 @@ class Shape:
     unsure: bool = False
 
 
-def read(geometry: Mesh) -> Shape:
-    """The triangles of a mesh geometry.
+@dataclass(frozen=True)
+class Content:
+    """What a file holds, as `worker` reads it, and what its text says if it is a STEP file."""
 
-    Raises GeometryFault where the file cannot be read or is too large, or where its units are unknown.
+    arrays: Mapping[str, np.ndarray]
+    text: StepText | None
+
+
+Contents = Mapping[Path, Content | GeometryFault]
+
+
+def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
+    """The contents of all files that some geometries name, or what is wrong with them. Each file is read once."""
+    sources = [geometry.source for geometry in geometries if isinstance(geometry, Mesh)]
+    found: dict[Path, Content | GeometryFault] = {}
+    texts: dict[Path, StepText | None] = {}
+    for path in dict.fromkeys(Path(source) for source in sources if isinstance(source, str | Path)):
+        try:
+            texts[path] = screening.screen(path, MAX_TRIANGLES)
+        except GeometryFault as fault:
+            found[path] = fault
+    request = reader.Request(tuple((path, screening.kind(path)) for path in texts), STEP_CHORD, STEP_ANGLE, MAX_TRIANGLES)
+    for path, read_in in zip(texts, reader.load(request), strict=True):
+        if isinstance(read_in, GeometryFault):
+            found[path] = read_in
+        elif "count" in read_in:
+            found[path] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
+        else:
+            found[path] = Content(read_in, texts[path])
+    return found
+
+
+def read(geometry: Mesh, contents: Contents) -> Shape:
+    """The triangles of a mesh geometry. `contents` hold that of its file, if it has one.
+
+    Raises GeometryFault where the file cannot be read, is too large or holds several bodies, where coordinates are no
+    numbers or far off, or where its units are unknown.
     """
     source = geometry.source
-    if isinstance(source, str | Path):
-        path = Path(source)
-        loaded = _read_step(path) if path.suffix.lower() in STEP else _read_mesh(path)
-    else:
-        loaded = trimesh.Trimesh(source.vertices, source.faces, process=False)
-        if len(loaded.faces) and not 0 <= loaded.faces.min() <= loaded.faces.max() < len(loaded.vertices):
-            raise GeometryFault(
-                f"{geometry}: its triangles name vertices that it does not have ({len(loaded.vertices)} in all)"
-            )
-    if len(loaded.faces) > MAX_TRIANGLES:
-        raise GeometryFault(_too_many(geometry, len(loaded.faces)))
-    said = geometry.units or getattr(loaded if isinstance(source, str | Path) else source, "units", None)
-    if said is not None:
-        loaded.apply_scale(UNITS.get(said) or _factor(geometry, said))
-    # The vertices of neighbouring triangles are one: rims, smooth normals and bodies are read from what they share.
-    loaded.merge_vertices(merge_tex=True, merge_norm=True)
-    stated = geometry.units or not isinstance(source, str | Path) or Path(source).suffix.lower() in STEP
-    return Shape(loaded, unsure=not stated)
+    if not isinstance(source, str | Path):
+        return Shape(_in_memory(geometry))
+    content = contents[Path(source)]
+    if isinstance(content, GeometryFault):
+        raise content
+    if content.text is not None:
+        return Shape(_from_step(geometry, content.arrays, content.text))
+    own = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
+    own.apply_scale(_scale(geometry, str(content.arrays["units"]) or None))
+    _check_numbers(own, geometry)
+    return Shape(_merged(own, content.arrays["piece"]), unsure=not geometry.units)
 
 
-def _factor(geometry: Mesh, said: str) -> float:
+def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
+    source = geometry.source
+    own = trimesh.Trimesh(source.vertices, source.faces, process=False)
+    if len(own.faces) and not 0 <= own.faces.min() <= own.faces.max() < len(own.vertices):
+        raise GeometryFault(f"{geometry}: its triangles name vertices that it does not have ({len(own.vertices)} in all)")
+    if len(own.faces) > MAX_TRIANGLES:
+        raise GeometryFault(screening.too_many(geometry, len(own.faces), MAX_TRIANGLES))
+    own.apply_scale(_scale(geometry, getattr(source, "units", None)))
+    _check_numbers(own, geometry)
+    own.merge_vertices(merge_tex=True, merge_norm=True)
+    return own
+
+
+def _scale(geometry: Mesh, own: str | None) -> float:
+    """How many mm the unit of a geometry has, whose source says that it is its `own`."""
+    said = geometry.units or own
+    if said is None:
+        return 1.0
     try:
-        return float(trimesh.units.unit_conversion(said, "mm"))
+        return UNITS.get(said) or float(trimesh.units.unit_conversion(said, "mm"))
     except ValueError as error:
         raise GeometryFault(
             f'{geometry} says that it counts in "{said}", which is no known unit; say tc.Mesh(..., units="mm")'
         ) from error
 
 
-def _read_mesh(path: Path) -> trimesh.Trimesh:
-    if path.suffix.lower() not in _MESHES:
-        raise GeometryFault(f'"{path}": unknown kind of file; expected one of {", ".join((*_MESHES, *STEP))}')
-    count = _announced(path)
-    if count > MAX_TRIANGLES:
-        raise GeometryFault(_too_many(path, count))
-    try:
-        loaded = trimesh.load_mesh(path, process=False)
-    except Exception as error:  # trimesh's readers raise whatever their format's parser raises
+def _check_numbers(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
+    if not np.isfinite(mesh.vertices).all():
+        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers; export it again")
+    far = float(np.abs(mesh.vertices).max(initial=0))
+    if far > FAR:
         raise GeometryFault(
-            f'"{path}" cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB'
-        ) from error
-    return _one(loaded)
+            f"{geometry} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or counts in other "
+            "units: export it again, or give units"
+        )
 
 
-def _announced(path: Path) -> int:
-    """How many triangles a file says that it holds, as far as that can be told without reading it all into memory."""
-    with path.open("rb") as file:
-        head = file.read(10_000)
-        if path.suffix.lower() == ".stl" and path.stat().st_size == 84 + 50 * int.from_bytes(head[80:84], "little"):
-            return int.from_bytes(head[80:84], "little")
-        if path.suffix.lower() == ".ply":
-            said = re.search(rb"^element face (\d+)", head, re.MULTILINE)
-            return int(said[1]) if said else 0
-        file.seek(0)
-        mark = {".stl": b"facet", ".obj": b"\nf "}.get(path.suffix.lower())
-        if mark is None:
-            return 0
-        found = sum(chunk.count(mark) for chunk in iter(lambda: file.read(1 << 24), b""))
-    return found // 2 if mark == b"facet" else found  # "facet" also ends each one: "endfacet"
+def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
+    """A mesh in which the vertices of neighbouring triangles are one: rims, smooth normals and bodies are read from them.
+
+    A piece (face,) that is closed by itself is a body, and keeps its vertices where it touches others; open ones may be
+    parts of one body.
+    """
+    group = np.zeros(len(own.faces), dtype=np.int64)
+    for k in range(1, int(piece.max(initial=0)) + 1):
+        faces = own.faces[piece == k]
+        alone = trimesh.Trimesh(own.vertices, faces, process=False)
+        alone.merge_vertices(merge_tex=True, merge_norm=True)
+        group[piece == k] = k if len(faces) and not len(rim(alone.faces)) else 0
+    vertices, faces, count = [np.zeros((0, 3))], np.array(own.faces), 0
+    for k in np.unique(group):
+        body = trimesh.Trimesh(own.vertices, own.faces[group == k], process=False)
+        body.merge_vertices(merge_tex=True, merge_norm=True)
+        faces[group == k] = body.faces + count
+        vertices.append(body.vertices)
+        count += len(body.vertices)
+    return trimesh.Trimesh(np.concatenate(vertices), faces, process=False)
 
 
-def _read_step(path: Path) -> trimesh.Trimesh:
-    if cascadio is None:
-        raise GeometryFault(f'"{path}": STEP files need the package cascadio; install it with: pip install "tolcontact[step]"')
-    with tempfile.TemporaryDirectory() as folder:
-        converted = Path(folder) / "converted.glb"
-        with _silence():
-            failed = cascadio.step_to_glb(
-                str(path), str(converted), tol_linear=STEP_CHORD, tol_angular=STEP_ANGLE, include_brep=True
-            )
-        if failed or not converted.is_file():
-            raise GeometryFault(f'"{path}" cannot be read as STEP: it is cut off, or not STEP at all; export it again')
-        mesh = _one(trimesh.load_scene(converted))
+def _from_step(geometry: Mesh, arrays: Mapping[str, np.ndarray], text: StepText) -> trimesh.Trimesh:
+    """The one body of a STEP file. Its B-rep faces are the mesh's face attribute BREP."""
+    path = Path(geometry.source)
+    if not len(arrays["faces"]):
+        raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
+    mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
     mesh.apply_scale(UNITS["m"])
-    mesh.units = "mm"
+    _check_numbers(mesh, geometry)
     # It has passed through single precision. Rounding to what that resolves brings round lengths back, and flat faces.
     resolved = UNITS["m"] * float(np.spacing(np.float32(np.abs(mesh.vertices).max(initial=0) / UNITS["m"])))
     power = 10.0 ** math.floor(math.log10(resolved))
     step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolved)
     mesh.vertices = np.round(np.round(mesh.vertices / step) * step, 12)
+    mesh.merge_vertices(merge_tex=True, merge_norm=True)
+    # Of edges shorter than that step, triangles with two corners in one place are left. They are none.
+    whole = (mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)
+    piece, brep = arrays["piece"][whole], arrays["brep"][whole]
+    if not whole.all():
+        mesh.update_faces(whole)
+    found = bodies(Triangles(mesh.triangles, mesh.faces, piece, brep, arrays["names"], arrays["coloured"]), text.solids)
+    if len(found) > 1:
+        raise GeometryFault(
+            f'"{path}" holds {len(found)} bodies, but a part is one body; export each as a file of its own: {listed(found)}'
+        )
+    gaps = len(rim(mesh.faces)) if text.solids else 0
+    if gaps:
+        raise GeometryFault(
+            f'"{path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
+            f"{len(np.unique(brep))} of {text.solids[0].faces} faces could be read); repair it in CAD, or export it again"
+        )
+    mesh.units = "mm"
+    mesh.face_attributes[BREP] = brep
     return mesh
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Swallow what a compiled library prints; what is wrong is said by what it returns."""
-    kept = os.dup(1), os.dup(2)
-    with Path(os.devnull).open("wb") as nowhere:
-        try:
-            for stream in (1, 2):
-                os.dup2(nowhere.fileno(), stream)
-            yield
-        finally:
-            for stream, own in zip((1, 2), kept, strict=True):
-                os.dup2(own, stream)
-                os.close(own)
-
-
-def _one(loaded: Any) -> trimesh.Trimesh:
-    """All bodies of a scene in their places as one mesh, its B-rep faces numbered through."""
-    if isinstance(loaded, trimesh.Trimesh):
-        return loaded
-    vertices, faces, breps = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=int)], [np.zeros(0, dtype=int)]
-    corners = numbers = 0
-    for node in loaded.graph.nodes_geometry:
-        transform, name = loaded.graph[node]
-        body = loaded.geometry[name]
-        if not isinstance(body, trimesh.Trimesh):
-            continue
-        brep = np.asarray(body.face_attributes.get(BREP, np.zeros(len(body.faces))), dtype=int).ravel()
-        vertices.append(trimesh.transform_points(body.vertices, transform))
-        faces.append(body.faces + corners)
-        breps.append(brep + numbers)
-        corners += len(body.vertices)
-        numbers += int(brep.max(initial=-1)) + 1
-    mesh = trimesh.Trimesh(np.concatenate(vertices), np.concatenate(faces), process=False)
-    mesh.units = loaded.units
-    if any(BREP in getattr(body, "face_attributes", {}) for body in loaded.geometry.values()):
-        mesh.face_attributes[BREP] = np.concatenate(breps)
-    return mesh
-
-
-def _too_many(what: object, count: int) -> str:
-    return (
-        f'"{what}" holds {count} triangles, more than the limit of {MAX_TRIANGLES}; contact points need no finer mesh than '
-        "their spacing, so simplify it"
-    )

@@ -7,24 +7,22 @@ import trimesh
 from tolcontact.assembly import Box, Mesh
 from tolcontact.discretization.edges import edges
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.reading import Shape, read
+from tolcontact.discretization.reading import Contents, Shape, read, read_files
 
 FIELD_STATIONS = 12
 
 
-def shape(geometry: Box | Mesh) -> Shape:
-    """The closed or open triangle surface of a geometry.
+def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
+    """The closed or open triangle surface of a geometry. `contents`: of the files of a model, if they were read together.
 
-    Raises GeometryFault where a mesh cannot be read, is empty, is not finite, or has no outside.
+    Raises GeometryFault where a mesh cannot be read, is empty, or has no outside.
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
-    found = read(geometry)
+    found = read(geometry, read_files([geometry]) if contents is None else contents)
     mesh = found.mesh
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
-    if not np.isfinite(mesh.vertices).all():
-        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _check_outward(mesh, geometry)
@@ -44,7 +42,8 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     neighbours = np.asarray(mesh.face_adjacency)
     body = trimesh.graph.connected_component_labels(neighbours, node_count=len(mesh.faces))
     count = int(body.max()) + 1
-    is_open = np.bincount(body, (triangles[edge] == 1).reshape(-1, 3).any(axis=1), count) > 0
+    is_open = np.zeros(count, dtype=bool)
+    is_open[body[~_is_matched(body, edge, sense)]] = True
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
     # A body whose normals point inward is a cavity where another one is around it, else a mistake.
@@ -57,6 +56,15 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
                 f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
+
+
+def _is_matched(body: np.ndarray, edge: np.ndarray, sense: np.ndarray) -> np.ndarray:
+    """Whether each triangle's own body (face,) runs along all three of its edges (3 face,) as often one way as the other.
+
+    Where bodies touch along an edge, more than two triangles have it, and a part of one body alone may not close there.
+    """
+    _, pair = np.unique(np.repeat(body, 3) * (int(edge.max()) + 1) + edge, return_inverse=True)
+    return np.asarray((np.bincount(pair, sense)[pair] == 0).reshape(-1, 3).all(axis=1))
 
 
 def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bool:

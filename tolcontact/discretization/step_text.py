@@ -1,0 +1,92 @@
+"""What the text of a STEP file (ISO 10303-21) says of its solids, and of files that it refers to."""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import PurePosixPath, PureWindowsPath
+
+# Up to a semicolon that stands in no string and no comment. Possessive: no text makes it go back.
+_RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
+_COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
+_INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
+_ENTITY = re.compile(
+    rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL"
+    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT)\s*\("
+)
+_STRING = re.compile(rb"'((?:[^']|'')*+)'")
+_LINK = re.compile(rb"<([^<>]*)>")
+_WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
+SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A solid with its `name`, and how many B-rep faces its shells have, those of its cavities, too."""
+
+    name: str
+    faces: int
+
+
+@dataclass(frozen=True)
+class StepText:
+    """Solids in the file's order, the names of `files` that hold shapes that it refers to, and of other `documents`."""
+
+    solids: tuple[Solid, ...]
+    files: tuple[str, ...]
+    documents: tuple[str, ...]
+
+
+def step_text(content: bytes) -> StepText:
+    """What a STEP file's `content` says; of damaged ones, what can still be told."""
+    solids: list[tuple[str, list[int]]] = []
+    shells: dict[int, list[int]] = {}
+    oriented: dict[int, list[int]] = {}
+    named: list[str] = []
+    for number, entity, record in _entities(content):
+        strings = [_decoded(string) for string in _STRING.findall(record)]
+        references = [int(reference) for reference in re.findall(rb"#(\d+)", _STRING.sub(b"", record))]
+        if entity == b"CLOSED_SHELL":
+            shells[number] = references
+        elif entity == b"ORIENTED_CLOSED_SHELL":
+            oriented[number] = references
+        elif entity in (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT"):
+            named.extend(strings[:1])
+        else:
+            solids.append((strings[0] if strings else "", references))
+    links = re.search(rb"\bREFERENCE\s*;(.*?)\bENDSEC\s*;", content, re.DOTALL)
+    named.extend(_decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
+    named = [name for name in dict.fromkeys(named) if name.strip()]
+    files = tuple(name for name in named if _suffix(name) in SHAPES)
+    return StepText(
+        tuple(Solid(name, _count(references, shells, oriented)) for name, references in solids),
+        files,
+        tuple(name for name in named if name not in files),
+    )
+
+
+def _entities(content: bytes) -> Iterator[tuple[int, bytes, bytes]]:
+    """Number, entity and record of each instance of an entity that matters here."""
+    for found in _RECORD.finditer(content):
+        entity = _ENTITY.search(found[0])
+        instance = _INSTANCE.match(_COMMENT.sub(b"", found[0])) if entity else None
+        outside = _ENTITY.search(_STRING.sub(b"", instance[2])) if instance else None
+        if instance and outside:
+            yield int(instance[1]), outside[1], instance[2]
+
+
+def _count(references: list[int], shells: Mapping[int, list[int]], oriented: Mapping[int, list[int]]) -> int:
+    own = [inner for reference in references for inner in oriented.get(reference, [reference])]
+    return sum(len(shells.get(shell, ())) for shell in own)
+
+
+def _decoded(string: bytes) -> str:
+    text = string.decode("utf-8", errors="replace").replace("''", "'")
+    return _WIDE.sub(_wide, text)
+
+
+def _wide(found: re.Match[str]) -> str:
+    return bytes.fromhex(found[2]).decode("latin-1") if found[2] else bytes.fromhex(found[1]).decode("utf-16-be", "replace")
+
+
+def _suffix(name: str) -> str:
+    return PurePosixPath(PureWindowsPath(name).name).suffix.lower()
