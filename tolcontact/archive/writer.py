@@ -240,8 +240,8 @@ def _sums(file: netCDF4.Dataset, path: Path, nominal: Nominal) -> tuple[int, int
         found.append(np.ma.getdata(group[words.FIELD_SUMS.name][slot]))
         if crc32(words.FIELD_SUMS, found[-1]) != int(group[words.SUMS_CHECKSUM.name][slot]):
             raise ArchiveError(
-                f'archive "{path}" is damaged: the sums of the field of part "{part.name}" are not what was written; write to a '
-                "new file"
+                f'archive "{path}" is damaged: the sums of the field of part "{part.name}" are not what was written; write to '
+                "a new file"
             )
     return rows, slot, found
 
