@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.method import Method
-from tolcontact.symbolic.batch import Batch, quiet
+from tolcontact.symbolic.batch import Batch
 from tolcontact.symbolic.contact_program import ContactProgram, contact_program
 from tolcontact.symbolic.contact_solver import ContactSolver
 from tolcontact.symbolic.gap import gap_matrix
@@ -18,6 +18,7 @@ from tolcontact.symbolic.measure import measured
 from tolcontact.symbolic.placement import raw_poses
 from tolcontact.symbolic.plugins import Plugin, plugin
 from tolcontact.symbolic.pose import ENTRIES, poses_of, relative
+from tolcontact.symbolic.quiet import MAKING, quiet
 from tolcontact.symbolic.tape import Tape, record
 
 
@@ -59,8 +60,9 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or where the objective
     is seating for forces that are missing or move nothing.
     """
-    with quiet():
-        chosen = plugin(solver)
+    with MAKING:  # which also calls users' functions, that may print
+        with quiet():
+            chosen = plugin(solver)
         d = ca.SX.sym("deviations", len(nominal.locator_labels))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
