@@ -100,8 +100,9 @@ def test_several_processes_may_begin_at_once(installed):
     assert call(installed) == (1, 0)
 
 
-AS_NOBODY = "setpriv --reuid 65534 --regid 65534 --clear-groups --bounding-set=-all,+dac_read_search".split()
-AS_NOBODY += "--inh-caps=-all,+dac_read_search --ambient-caps=-all,+dac_read_search".split()  # they may read everything
+READ = "-all,+dac_read_search"  # everything may be read
+AS_NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+AS_NOBODY += [f"--bounding-set={READ}", f"--inh-caps={READ}", f"--ambient-caps={READ}"]
 
 
 @pytest.fixture

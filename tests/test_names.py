@@ -5,9 +5,24 @@ import pytest
 import tolcontact as tc
 from tolcontact.errors import ArchiveError, ModelError, TolcontactError
 
-STEERING = ["\x00", "\x07", "\t", "\n", "\x1b[31m", "\x7f", "\x85", "\x9b", "\u2028", "\u2029", "\u202a", "\u202e", "\u2066", "\u2069",
-            "\ud800", "\udce9"]  # fmt: skip
-FINE = ["part", "axis", "realization", "Grundplatte oben", "Größe Ø 5", "部品", "деталь", "क्षेत्र", "a 👨‍👩‍👧 family", "a.b", "1st [red]", "שלום"]
+STEERING = [
+    "\x00", "\x07", "\t", "\n", "\x1b[31m", "\x7f", "\x85", "\x9b", "\u2028", "\u2029", "\u202a", "\u202e", "\u2066",
+    "\u2069", "\ud800", "\udce9",
+]  # fmt: skip
+FINE = [
+    "part",
+    "axis",
+    "realization",
+    "Grundplatte oben",
+    "Größe Ø 5",
+    "部品",
+    "деталь",
+    "क्षेत्र",
+    "a 👨‍👩‍👧 family",
+    "a.b",
+    "1st [red]",
+    "שלום",
+]
 
 
 def model(name="fine", **names) -> tc.Assembly:
@@ -24,7 +39,14 @@ def model(name="fine", **names) -> tc.Assembly:
     return a
 
 
-KINDS = {"name": "assembly", "part": "part", "locator": "locator", "pair": "contact pair", "measure": "measure", "force": "force"}
+KINDS = {
+    "name": "assembly",
+    "part": "part",
+    "locator": "locator",
+    "pair": "contact pair",
+    "measure": "measure",
+    "force": "force",
+}
 
 
 @pytest.mark.parametrize("word", [*KINDS, "units"])

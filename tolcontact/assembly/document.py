@@ -21,9 +21,7 @@ T = TypeVar("T")
 MOST = 2**31  # of triangles, or points
 
 
-def to_document(
-    assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]
-) -> Document:
+def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> Document:
     """The document of an assembly.
 
     `triangles` gives the indices of a face that is more than a direction, `tapes` the steps of the users' own expressions.

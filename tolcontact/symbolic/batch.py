@@ -151,7 +151,7 @@ class _Buffered:
             buffer[:count] = array
             buffer[count:] = array[-1:]
         try:
-            # A first evaluation makes what the Function needs. Of later ones plugins may still tell, whatever their options say.
+            # A first evaluation makes what the Function needs. Plugins may print in any.
             with MAKING if self.is_new else contextlib.nullcontext(), quiet():
                 self._evaluate()
         except RuntimeError:  # CasADi's only exception: bounds that are no numbers
