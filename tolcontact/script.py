@@ -1,5 +1,6 @@
 """Model scripts: a Python file with a function `assembly()` that returns the declared Assembly."""
 
+import contextlib
 import importlib.util
 import sys
 import traceback
@@ -7,6 +8,8 @@ from pathlib import Path
 
 from tolcontact.assembly import Assembly
 from tolcontact.errors import ScriptError, TolcontactError
+
+_PACKAGE = Path(__file__).resolve().parent
 
 
 def load_model(path: Path) -> Assembly:
@@ -41,7 +44,8 @@ def load_model(path: Path) -> Assembly:
         said = error.msg if isinstance(error, SyntaxError) else error
         raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {type(error).__name__}: {said}') from error
     finally:
-        sys.path.remove(folder)
+        with contextlib.suppress(ValueError):  # a script may do anything to it
+            sys.path.remove(folder)
     if not isinstance(declared, Assembly):
         raise ScriptError(f'assembly() of "{path}" returned a {type(declared).__name__}; expected a tolcontact.Assembly')
     return declared
@@ -49,9 +53,8 @@ def load_model(path: Path) -> Assembly:
 
 def _where(error: Exception, path: Path) -> str:
     """The line of the script, and of the module from its folder, in which an error arose."""
-    lines = [
-        (Path(frame.filename).absolute(), frame.lineno) for frame in traceback.extract_tb(error.__traceback__) if frame.lineno
-    ]
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [(Path(f.filename).absolute(), f.lineno) for f in frames if Path(f.filename).is_file()]
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
         lines.append((Path(error.filename).absolute(), error.lineno))
     in_script = [line for file, line in lines if file == path.absolute()]
@@ -60,4 +63,7 @@ def _where(error: Exception, path: Path) -> str:
 
 
 def _is_beside(file: Path, path: Path) -> bool:
-    return file.is_relative_to(path.parent.resolve()) and "site-packages" not in file.parts
+    """Whether a file is a module of the script's own, not this package or another one that is installed below its folder."""
+    return (
+        file.is_relative_to(path.parent.resolve()) and not file.is_relative_to(_PACKAGE) and "site-packages" not in file.parts
+    )

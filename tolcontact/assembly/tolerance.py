@@ -74,8 +74,8 @@ def tolerance(value: Any) -> Tolerance:
 def scipy_distribution(name: str) -> Any | None:
     """The continuous distribution that scipy.stats has under that name; None where it has none."""
     stats = importlib.import_module("scipy.stats")
-    found = getattr(stats, name, None)
-    return found if isinstance(found, stats.rv_continuous) and found.name == name else None
+    known = isinstance(getattr(stats, name, None), stats.rv_continuous) and getattr(stats, name).name == name
+    return getattr(stats, name) if known else None
 
 
 def _not_archivable(frozen: Any) -> str:

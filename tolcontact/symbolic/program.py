@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from tolcontact.assembly.tape import Tape
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.method import Method
@@ -19,7 +20,7 @@ from tolcontact.symbolic.placement import raw_poses
 from tolcontact.symbolic.plugins import Plugin, plugin
 from tolcontact.symbolic.pose import ENTRIES, poses_of, relative
 from tolcontact.symbolic.quiet import MAKING, quiet
-from tolcontact.symbolic.tape import Tape, record
+from tolcontact.symbolic.tape import record
 
 
 @dataclass(frozen=True, eq=False)
