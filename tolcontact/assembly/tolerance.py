@@ -74,18 +74,19 @@ def tolerance(value: Any) -> Tolerance:
 def scipy_distribution(name: str) -> Any | None:
     """The continuous distribution that scipy.stats has under that name; None where it has none."""
     stats = importlib.import_module("scipy.stats")
-    known = isinstance(getattr(stats, name, None), stats.rv_continuous) and getattr(stats, name).name == name
-    return getattr(stats, name) if known else None
+    found = getattr(stats, name, None)
+    return found if isinstance(found, stats.rv_continuous) and found.name == name else None
 
 
 def _not_archivable(frozen: Any) -> str:
     """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty where it can."""
-    if type(frozen.dist) is not type(scipy_distribution(str(frozen.dist.name))):
+    name, known = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
+    if known is None or type(frozen.dist) is not type(known):
         return (
-            f'distribution "{frozen.dist.name}" is a {type(frozen.dist).__name__}, which an archive cannot hold; expected a '
+            f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot hold; expected a '
             "continuous distribution that scipy.stats has under that name"
         )
     for parameter in (*frozen.args, *frozen.kwds.values()):
         if not is_length(parameter):
-            return f"a parameter of scipy.stats.{frozen.dist.name} is {parameter}; expected finite numbers [mm]"
+            return f"a parameter of scipy.stats.{name} is {parameter}; expected finite numbers [mm]"
     return ""
