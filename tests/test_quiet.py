@@ -73,3 +73,26 @@ def test_it_runs_without_streams():
     code = "import sys; sys.stdout = sys.stderr = None; import tolcontact as tc; from tests import cases; "
     code += "tc.run(cases.ra1(points=9), samples=20)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+PRINTING = """
+import threading
+from tolcontact.symbolic.quiet import quiet
+done = threading.Event()
+def muffle():
+    while not done.is_set():
+        with quiet():
+            pass
+workers = [threading.Thread(target=muffle) for _ in range(2)]
+for worker in workers:
+    worker.start()
+for k in range(20_000):
+    print(k, flush=True)
+done.set()
+"""
+
+
+def test_printing_goes_on_while_other_threads_come_and_go():
+    done = subprocess.run([sys.executable, "-c", PRINTING], check=False, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.split() == [str(k) for k in range(20_000)]

@@ -7,6 +7,7 @@ is in `quiet`, by ones that let through what the other threads write.
 import contextlib
 import sys
 import threading
+from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
@@ -30,6 +31,18 @@ class _Muffled:
         return getattr(self.stream, name)
 
 
+# Those of the last streams: `print` of another thread does not keep the one alive that it writes to.
+_kept: deque[_Muffled] = deque(maxlen=16)
+
+
+def _muffled(stream: Any) -> _Muffled:
+    for one in _kept:
+        if one.stream is stream:
+            return one
+    _kept.append(_Muffled(stream))
+    return _kept[-1]
+
+
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
     """Swallow what plugins print in this thread; other threads print on."""
@@ -39,7 +52,7 @@ def quiet() -> Iterator[None]:
         for name in ("stdout", "stderr"):
             stream = getattr(sys, name)
             if stream is not None and not isinstance(stream, _Muffled):
-                setattr(sys, name, _Muffled(stream))
+                setattr(sys, name, _muffled(stream))
     _THREAD.depth = getattr(_THREAD, "depth", 0) + 1
     try:
         yield
