@@ -14,7 +14,7 @@ ROOMS = {
     "matplotlib": ("report/",),
     "plotly": ("report/",),
     "pyvista": ("report/",),
-    "numba": ("simulation/kernel.py",),
+    "numba": ("simulation/compiled.py",),
     "llvmlite": ("symbolic/native.py",),
     "netCDF4": ("archive/",),
     "typer": ("cli.py",),

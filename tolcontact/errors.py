@@ -3,11 +3,24 @@
 A message says what was expected, what was got (naming the part, locator, pair, option or file) and what to do.
 """
 
+import re
 from collections.abc import Sequence
+
+# Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
+# surrogate pairs (bytes of a file name that are no text): they steer a terminal, or cannot be written to it.
+STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def shown(text: str) -> str:
+    """A text as it may be printed: characters that would steer a terminal as escapes."""
+    return STEERING.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 class TolcontactError(Exception):
     """Base of all errors that a user can cause and mend."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(shown(message))
 
 
 class ModelError(TolcontactError):

@@ -1,7 +1,6 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
 import math
-import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
 
@@ -10,13 +9,13 @@ from tolcontact.assembly.force import Force
 from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
 from tolcontact.assembly.measure import Measure
+from tolcontact.assembly.names import key_faults, text_faults
 from tolcontact.assembly.part import Face, Part, Point
 from tolcontact.assembly.tolerance import tolerance as _tolerance
 from tolcontact.assembly.words import direction, script_line
 from tolcontact.assembly.words import vector as _vector
 
 CONSTANT = 1e-3
-_NAME = re.compile(r"\w(?:[^/\x00-\x1f\x7f]*[^/\s\x00-\x1f\x7f])?")
 
 
 class Assembly:
@@ -165,16 +164,9 @@ class Assembly:
         if not self._measures:
             yield "it measures nothing; declare at least one measure with assembly.measure(...)"
         kinds = {"part": self._parts, "contact pair": self._pairs, "measure": self._measures, "force": self._forces}
+        yield from text_faults("assembly", [self.name])
         for kind, things in kinds.items():
-            names = [thing.name for thing in things]  # type: ignore[attr-defined]
-            for name in dict.fromkeys(names):
-                if not (isinstance(name, str) and _NAME.fullmatch(name)):
-                    yield (
-                        f"{kind} {name!r}: a name must be a text that starts with a letter, digit or underscore, holds "
-                        'no "/" or control character, and does not end in a space (the archive uses it)'
-                    )
-                if names.count(name) > 1:
-                    yield f'{kind} "{name}" is declared {names.count(name)} times; names must differ'
+            yield from key_faults(kind, [thing.name for thing in things])  # type: ignore[attr-defined]
         for part in self._parts:
             yield from _named("part", part, part.faults())
             yield from _named("part", part, self._location_faults(part))

@@ -1,25 +1,27 @@
 """An assembly as a plain document (dicts, lists, numbers, texts), and back: what an archive keeps of a model."""
 
-import importlib  # scipy.stats takes longer to import than all the rest: only where it is needed
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from tolcontact.assembly.assembly import Assembly
-from tolcontact.assembly.contact import ContactPair
+from tolcontact.assembly.contact import VERTICES, ContactPair
 from tolcontact.assembly.force import Force
 from tolcontact.assembly.geometry import Box, Mesh
 from tolcontact.assembly.locator import Location, Locator, ThreeTwoOne
 from tolcontact.assembly.measure import Measure
 from tolcontact.assembly.part import Face, Part, Point
+from tolcontact.assembly.said import Said
 from tolcontact.assembly.selection import Facing, Inside, Triangles
-from tolcontact.assembly.tolerance import Tolerance
+from tolcontact.assembly.tape import Tape, tape_of
+from tolcontact.assembly.tolerance import SHAPES, Tolerance, scipy_distribution
+from tolcontact.assembly.words import DIRECTIONS
 
 Document = dict[str, Any]
+T = TypeVar("T")
+MOST = 2**31  # of triangles, or points
 
 
-def to_document(
-    assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, tuple[tuple[Any, ...], ...]]
-) -> Document:
+def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> Document:
     """The document of an assembly.
 
     `triangles` gives the indices of a face that is more than a direction, `tapes` the steps of the users' own expressions.
@@ -51,11 +53,12 @@ def to_document(
                 "on": location.on.name if location.on else None,
                 "tolerance": _tolerance(location.tolerance),
                 "scheme": (
-                    {"three_two_one": [face(f) for f in location.scheme.faces], "inset": location.scheme.inset}
+                    {"three_two_one": [face(f) for f in location.scheme.faces], "inset": float(location.scheme.inset)}
                     if isinstance(location.scheme, ThreeTwoOne)
                     else [
                         {
-                            **_plain(locator, "name", "point", "direction", "one_sided", "stiffness"),
+                            **_plain(locator, "name", "point", "direction", "one_sided"),
+                            "stiffness": float(locator.stiffness),
                             "tolerance": _tolerance(locator.tolerance),
                         }
                         for locator in location.scheme
@@ -78,63 +81,100 @@ def to_document(
     }
 
 
-def from_document(document: Document, meshes: Mapping[str, Any]) -> Assembly:
-    """The assembly of a document; `meshes` holds a mesh (anything with vertices and faces) for each mesh part."""
+def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
+    """The assembly of a document; `meshes` holds a mesh (anything with vertices and faces) for each mesh part.
+
+    Raises ArchiveError for a document that `to_document` cannot have made. Nothing in it is run.
+    """
+    whole = Said(document)
     parts: dict[str, Part] = {}
 
-    def face(said: Document) -> Face:
-        chosen = Facing(said["direction"]) if "direction" in said else Triangles(tuple(said["triangles"]))
-        return Face(parts[said["part"]], (chosen, *(Inside(*corners) for corners in said["inside"])))
+    def known(said: Said) -> Part:
+        if said.text() not in parts:
+            raise said.wrong("the name of a part")
+        return parts[said.text()]
 
-    def point(said: Document) -> Point:
-        return Point(parts[said["part"]], tuple(said["position"]))
-
-    def location(said: Document) -> Location:
-        scheme: ThreeTwoOne | tuple[Locator, ...]
-        if isinstance(said["scheme"], dict):
-            primary, secondary, tertiary = map(face, said["scheme"]["three_two_one"])
-            scheme = ThreeTwoOne(primary, secondary, tertiary, said["scheme"]["inset"])
+    def face(said: Said) -> Face:
+        if "direction" in said:
+            chosen: Facing | Triangles = Facing(said["direction"].one_of(DIRECTIONS))
         else:
-            scheme = tuple(
-                Locator(
-                    one["name"],
-                    one["point"],
-                    one["direction"],
-                    _tolerance_of(one["tolerance"]),
-                    one_sided=one["one_sided"],
-                    stiffness=one["stiffness"],
-                )
-                for one in said["scheme"]
-            )
-        on = None if said["on"] is None else parts[said["on"]]
-        return Location(parts[said["part"]], scheme, _tolerance_of(said["tolerance"]), on, said["declared_at"])
+            chosen = Triangles(tuple(index.index(MOST) for index in said["triangles"]))
+        boxes = [[corner.vector() for corner in box.items(2)] for box in said["inside"]]
+        return Face(known(said["part"]), (chosen, *(Inside(lower, upper) for lower, upper in boxes)))
 
-    def pair(said: Document) -> ContactPair:
-        rest = [said[word] for word in ("points", "spacing", "within", "declared_at")]
-        return ContactPair(said["name"], face(said["moving"]), face(said["reference"]), *rest)
+    def point(said: Said) -> Point:
+        return Point(known(said["part"]), said["position"].vector())
 
-    def measure(said: Document) -> Measure:
-        of = point(said["of"]) if "of" in said else tuple(tuple(row) for row in said["tape"])
+    def locator(said: Said) -> Locator:
+        return Locator(
+            said["name"].text(),
+            said["point"].vector(),
+            said["direction"].vector(),
+            _optional(said["tolerance"], _tolerance_of),
+            one_sided=said["one_sided"].boolean(),
+            stiffness=said["stiffness"].number(),
+        )
+
+    def location(said: Said) -> Location:
+        scheme: ThreeTwoOne | tuple[Locator, ...]
+        if "three_two_one" in said["scheme"]:
+            primary, secondary, tertiary = map(face, said["scheme"]["three_two_one"].items(3))
+            scheme = ThreeTwoOne(primary, secondary, tertiary, said["scheme"]["inset"].number())
+        else:
+            scheme = tuple(map(locator, said["scheme"]))
+        common, on = _optional(said["tolerance"], _tolerance_of), _optional(said["on"], known)
+        return Location(known(said["part"]), scheme, common, on, said["declared_at"].text())
+
+    def pair(said: Said) -> ContactPair:
+        points = said["points"].one_of([VERTICES]) if said["points"].is_text else _optional(said["points"], _count)
+        spacing, within = (_optional(said[word], Said.number) for word in ("spacing", "within"))
+        sides = face(said["moving"]), face(said["reference"])
+        return ContactPair(said["name"].text(), *sides, points, spacing, within, said["declared_at"].text())
+
+    def measure(said: Said) -> Measure:
+        of = point(said["of"]) if "of" in said else tape_of(said["tape"], len(parts))
         to = point(said["to"]) if "to" in said else None
-        along = None if said["along"] is None else tuple(said["along"])
-        rest = [said[word] for word in ("tolerance", "units", "declared_at")]
-        return Measure(said["name"], of, to, along, *rest)
+        along, tolerance = _optional(said["along"], Said.vector), _optional(said["tolerance"], Said.number)
+        return Measure(said["name"].text(), of, to, along, tolerance, said["units"].text(), said["declared_at"].text())
 
-    def force(said: Document) -> Force:
-        return Force(said["name"], point(said["at"]), tuple(said["vector"]), said["declared_at"])
+    def force(said: Said) -> Force:
+        return Force(said["name"].text(), point(said["at"]), said["vector"].vector(), said["declared_at"].text())
 
-    for said in document["parts"]:
-        geometry = Box(*said["geometry"]["box"]) if "box" in said["geometry"] else Mesh(meshes[said["name"]])
-        rest = [said[word] for word in ("fixed", "declared_at")]
-        parts[said["name"]] = Part(said["name"], geometry, tuple(said["at"]), tuple(said["rotation"]), *rest)
-    return Assembly(
-        document["name"],
+    def part(said: Said) -> Part:
+        name = said["name"].text()
+        if "box" in said["geometry"]:
+            geometry: Box | Mesh = Box(*said["geometry"]["box"].vector())
+        elif name in meshes:
+            geometry = Mesh(meshes[name])
+        else:
+            raise said["name"].wrong("a part with a mesh, or with a box")
+        place, fixed = (said["at"].vector(), said["rotation"].vector()), _optional(said["fixed"], Said.boolean)
+        return Part(name, geometry, *place, fixed, said["declared_at"].text())
+
+    for said in whole["parts"]:
+        new = part(said)
+        if new.name in parts:
+            raise said["name"].wrong("a name that no other part has")
+        parts[new.name] = new
+    assembly = Assembly(
+        whole["name"].text(),
         parts.values(),
-        map(location, document["locations"]),
-        map(pair, document["pairs"]),
-        map(measure, document["measures"]),
-        map(force, document["forces"]),
+        map(location, whole["locations"]),
+        map(pair, whole["pairs"]),
+        map(measure, whole["measures"]),
+        map(force, whole["forces"]),
     )
+    for fault in assembly.faults():  # a model that has any is not archived
+        raise whole.refused(fault)
+    return assembly
+
+
+def _optional(said: Said, read: Callable[[Said], T]) -> T | None:
+    return None if said.is_none else read(said)
+
+
+def _count(said: Said) -> int:
+    return said.index(MOST)
 
 
 def _plain(thing: Any, *words: str) -> Document:
@@ -162,11 +202,19 @@ def _tolerance(tolerance: Tolerance | None) -> Document | None:
     }
 
 
-def _tolerance_of(said: Document | None) -> Tolerance | None:
-    if said is None:
-        return None
-    if "scipy" in said:
+def _tolerance_of(said: Said) -> Tolerance:
+    if "scipy" not in said:
+        return Tolerance(said["range"].number(), said["distribution"].one_of(SHAPES))
+    name, keywords = said["scipy"].text(), said["kwds"].pairs()
+    distribution = scipy_distribution(name)
+    if distribution is None:
+        raise said["scipy"].wrong("a continuous distribution of scipy.stats")
+    try:
         return Tolerance(
-            distribution=getattr(importlib.import_module("scipy.stats"), said["scipy"])(*said["args"], **said["kwds"])
+            distribution=distribution(
+                *(argument.number() for argument in said["args"]),
+                **{word: value.number() for word, value in keywords.items()},
+            )
         )
-    return Tolerance(said["range"], said["distribution"])
+    except (TypeError, ValueError) as error:  # parameters that it does not have
+        raise said.refused(f"scipy.stats.{name}: {error}") from error

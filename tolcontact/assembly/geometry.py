@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from tolcontact.assembly.words import is_length
+from tolcontact.errors import shown
 
 
 @dataclass(frozen=True)
@@ -59,5 +60,5 @@ class Mesh:
 
     def __str__(self) -> str:
         if isinstance(self.source, str | Path):
-            return f"mesh {Path(self.source).name}"
+            return shown(f"mesh {Path(self.source).name}")
         return f"mesh of {len(getattr(self.source, 'faces', ()))} triangles"

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from tolcontact.assembly.names import repetitions, text_faults
 from tolcontact.assembly.part import Face, Part
 from tolcontact.assembly.tolerance import Tolerance
 from tolcontact.assembly.tolerance import tolerance as _tolerance
@@ -123,8 +124,8 @@ class Location:
                 yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
                 if locator.tolerance is None and self.tolerance is None:
                     yield f'locator "{locator.name}" has no tolerance; give it one, or the locate call'
-            for name in sorted({name for name in names if names.count(name) > 1}):
-                yield f'locator "{name}" is declared {names.count(name)} times; names must differ'
+            yield from text_faults("locator", names)
+            yield from repetitions("locator", names)
             two_sided = sum(locator.one_sided is False for locator in self.scheme)
             if len(self.scheme) < 6 or two_sided > 6:
                 yield (

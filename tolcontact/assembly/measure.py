@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from tolcontact.assembly.names import is_line
 from tolcontact.assembly.part import Point
 from tolcontact.assembly.words import Vector, is_finite
 
@@ -45,8 +46,11 @@ class Measure:
             yield f"it measures a {type(self.of).__name__}; expected part.point(x, y, z) or a function of the poses"
         elif self.along is not None or self.to is not None:
             yield "an expression says what it measures by itself; leave out to and along"
-        if not (isinstance(self.units, str) and self.units):
-            yield f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number'
+        if not (self.units and is_line(self.units)):
+            yield (
+                f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number, '
+                "without any control character"
+            )
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
         if self.tolerance is not None and not (

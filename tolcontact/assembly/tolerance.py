@@ -1,9 +1,12 @@
 """How much a locator varies: a tolerance range and the distribution that fills it."""
 
+import importlib  # scipy.stats takes longer to import than all the rest: only where it is needed
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
+
+from tolcontact.assembly.words import is_length
 
 SHAPES = ("normal", "uniform", "triangular", "truncated normal")
 
@@ -41,6 +44,8 @@ class Tolerance:
                 f"distribution is a {type(self.distribution).__name__}; expected one of {', '.join(SHAPES)}, "
                 "or a frozen continuous distribution such as scipy.stats.norm(0, 0.1)"
             )
+        elif fault := _not_archivable(self.distribution):
+            yield fault
         elif self.range is not None:
             yield "a range is given beside a scipy.stats distribution, which has its own width; leave the range out"
         elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
@@ -64,3 +69,24 @@ def tolerance(value: Any) -> Tolerance:
     if hasattr(value, "ppf"):
         return Tolerance(distribution=value)
     return Tolerance(range=value)
+
+
+def scipy_distribution(name: str) -> Any | None:
+    """The continuous distribution that scipy.stats has under that name; None where it has none."""
+    stats = importlib.import_module("scipy.stats")
+    found = getattr(stats, name, None)
+    return found if isinstance(found, stats.rv_continuous) and found.name == name else None
+
+
+def _not_archivable(frozen: Any) -> str:
+    """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty where it can."""
+    name, known = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
+    if known is None or type(frozen.dist) is not type(known):
+        return (
+            f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot hold; expected a '
+            "continuous distribution that scipy.stats has under that name"
+        )
+    for parameter in (*frozen.args, *frozen.kwds.values()):
+        if not is_length(parameter):
+            return f"a parameter of scipy.stats.{name} is {parameter}; expected finite numbers [mm]"
+    return ""

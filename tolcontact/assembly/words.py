@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from tolcontact.errors import shown
+
 Vector = tuple[float, float, float]
 
 _PACKAGE = str(Path(__file__).resolve().parents[1])
@@ -54,6 +56,6 @@ def script_line() -> str:
     while frame is not None:
         name = frame.f_code.co_filename
         if not name.startswith((_PACKAGE, "<")):
-            return f"{Path(name).name}:{frame.f_lineno}"
+            return shown(f"{Path(name).name}:{frame.f_lineno}")
         frame = frame.f_back  # type: ignore[assignment]
     return ""

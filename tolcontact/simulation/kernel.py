@@ -6,15 +6,20 @@ Gaps are summed up in the order of `PairScan.gaps`, so that both give the same t
 another order than NumPy's, and agree to rounding.
 """
 
+import functools
+
 import numpy as np
-from numba import njit
+
+from tolcontact.simulation.compiled import compiled
+
+inlined = functools.partial(compiled, inline=True)
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
 LANES, CHUNK = 8, 256
 ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen terms are rounded by less
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
     """Coefficients of the gaps by the coordinates, [X_RM, 1] @ basis, into of (r,)."""
     for c in range(of.size):
@@ -24,7 +29,7 @@ def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
             of[c] += X[entry] * basis[entry, c]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _bounds(boxes, beyond, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
     """Of some boxes the gap in their middle, and how far gaps can be from that, into middle and reach (count,).
 
@@ -43,7 +48,7 @@ def _bounds(boxes, beyond, first, count, of, middle, reach):  # type: ignore[no-
             reach[box] += size * halves[box]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: ignore[no-untyped-def]
     """Gaps [mm] of the points `first` to `first + count`, into gaps (LEAF,)."""
     for j in range(count):
@@ -58,7 +63,7 @@ def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: i
             gaps[j] -= deviations[locators[first + j]]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[no-untyped-def]
     """Add to moments (m,) the columns of `table` (m, point) that count: counts (LEAF,), 1 or 0.
 
@@ -80,7 +85,7 @@ def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[n
         moments[moment] += total
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
     """For each realization the number of points below `activity` (n,), and their moments (n, side * 10).
 
@@ -129,7 +134,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
         active[k] = number
 
 
-@njit(cache=True, nogil=True, error_model="numpy", inline="always")
+@inlined
 def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
     """The deepest point of some leaves, if it is below `lowest` or as low and before `where`; its gap and number."""
     _, coordinates, locators, leaves, _, leaf_boxes, _, beyond = points
@@ -153,7 +158,7 @@ def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, whe
     return lowest, where
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def deepest(points, clusters, relative, deviations, may_carry, below, numbers, gaps_there):  # type: ignore[no-untyped-def]
     """For each realization the deepest point of each cluster (n, cluster), and its gap, if that is less than `below`.
 
@@ -187,7 +192,7 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled
 def add_magnitudes(A, points, shift, powers):  # type: ignore[no-untyped-def]
     """Add to powers (4, point) the first to fourth power of |u| - shift, realization after realization.
 

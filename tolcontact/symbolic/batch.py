@@ -1,7 +1,6 @@
 """Functions evaluated for many realizations at once."""
 
 import contextlib
-import io
 import math
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,19 +9,11 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.symbolic.native import Native, UnknownInstructionError
+from tolcontact.symbolic.quiet import MAKING, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
 ENOUGH = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
 LARGEST = 300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
-
-_STREAMS = threading.RLock()
-
-
-@contextlib.contextmanager
-def quiet() -> Iterator[None]:
-    """Swallow what plugins print to Python's streams, banners that no option turns off; one thread at a time."""
-    with _STREAMS, contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        yield
 
 
 class Batch:
@@ -160,7 +151,8 @@ class _Buffered:
             buffer[:count] = array
             buffer[count:] = array[-1:]
         try:
-            with quiet() if self.is_new else contextlib.nullcontext():
+            # A first evaluation makes what the Function needs. Plugins may print in any.
+            with MAKING if self.is_new else contextlib.nullcontext(), quiet():
                 self._evaluate()
         except RuntimeError:  # CasADi's only exception: bounds that are no numbers
             return False

@@ -4,10 +4,11 @@ import copy
 
 import numpy as np
 
-from tolcontact.symbolic.batch import Batch, Expressions, Mapped, flat, quiet
+from tolcontact.symbolic.batch import Batch, Expressions, Mapped, flat
 from tolcontact.symbolic.contact_program import INPUTS, OUTPUTS, ContactProgram
 from tolcontact.symbolic.plugins import ACCURACY, PLUGINS, Plugin
 from tolcontact.symbolic.polishing import polished
+from tolcontact.symbolic.quiet import MAKING, quiet
 
 ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
@@ -116,8 +117,7 @@ class _PluginSolver:
 
     def __init__(self, program: ContactProgram, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
-        # Whatever the thread: quiet() has one lock, so that CasADi's objects are made one after the other.
-        with quiet():
+        with MAKING, quiet():
             qp = program.qp(plugin)
         self._inputs = [ASSEMBLED[name] for name in qp.name_in() if name in ASSEMBLED]
         self._results = [qp.name_out().index(name) for name in ("x", "lam_a", "lam_x")]
@@ -126,7 +126,7 @@ class _PluginSolver:
         bounds = {"lbx": at_least, "ubx": np.full(at_least.shape, np.inf)}
         # The other inputs are zero, and starting points that no plugin is told to use.
         given = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in ASSEMBLED}
-        with quiet():
+        with MAKING, quiet():
             self._solve = Mapped(qp, given)
 
     def __call__(self, assembled: list[np.ndarray], before: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from tolcontact.assembly.tape import Tape
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.method import Method
-from tolcontact.symbolic.batch import Batch, quiet
+from tolcontact.symbolic.batch import Batch
 from tolcontact.symbolic.contact_program import ContactProgram, contact_program
 from tolcontact.symbolic.contact_solver import ContactSolver
 from tolcontact.symbolic.gap import gap_matrix
@@ -18,7 +19,8 @@ from tolcontact.symbolic.measure import measured
 from tolcontact.symbolic.placement import raw_poses
 from tolcontact.symbolic.plugins import Plugin, plugin
 from tolcontact.symbolic.pose import ENTRIES, poses_of, relative
-from tolcontact.symbolic.tape import Tape, record
+from tolcontact.symbolic.quiet import MAKING, quiet
+from tolcontact.symbolic.tape import record
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +61,9 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or where the objective
     is seating for forces that are missing or move nothing.
     """
-    with quiet():
-        chosen = plugin(solver)
+    with MAKING:  # which also calls users' functions, that may print
+        with quiet():
+            chosen = plugin(solver)
         d = ca.SX.sym("deviations", len(nominal.locator_labels))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))

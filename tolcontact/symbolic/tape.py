@@ -1,17 +1,12 @@
-"""A user's expression as a list of elementary steps, so that an archive can hold it without any code.
-
-A tape is a tuple of rows (operation, operands...): "input" with an index into the pose entries of all parts, "const" with a
-number, or the name of a CasADi operation with the positions of earlier rows. The last row is the value.
-"""
+"""Users' expressions onto tapes and back: see tolcontact.assembly.tape."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
 
+from tolcontact.assembly.tape import BINARY, LONGEST, UNARY, Tape
 from tolcontact.symbolic.pose import ENTRIES, Pose
-
-Tape = tuple[tuple[Any, ...], ...]
 
 _UNARY: dict[str, Callable[[Any], Any]] = {
     "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
@@ -26,15 +21,17 @@ _BINARY: dict[str, Callable[[Any, Any], Any]] = {
     "or": ca.logic_or, "fmod": ca.fmod, "remainder": ca.remainder, "copysign": ca.copysign, "atan2": ca.atan2,
     "fmin": ca.fmin, "fmax": ca.fmax, "hypot": ca.hypot, "if_else_zero": lambda a, b: ca.if_else(a, b, 0),
 }  # fmt: skip
-_NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*_UNARY, *_BINARY)}
+_NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
 
 
 def record(expression: ca.SX, poses: ca.SX) -> Tape:
     """The steps of a scalar expression of the pose entries `poses` (12 * part, 1).
 
-    Raises ValueError for an operation that has no place on a tape.
+    Raises ValueError for an operation that has no place on a tape, or for too many of them.
     """
     function = ca.Function("expression", [poses], [expression])
+    if function.n_instructions() > LONGEST:
+        raise ValueError(f"an expression of {function.n_instructions()} steps cannot be archived; {LONGEST} can")
     rows: list[tuple[Any, ...]] = []
     at: dict[int, int] = {}  # work register -> row
     for k in range(function.n_instructions()):

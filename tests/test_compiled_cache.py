@@ -1,0 +1,132 @@
+"""Compiled functions are kept on disk where that is possible, and work where it is not."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import tolcontact
+
+SCRIPT = """
+import numpy as np
+from tolcontact.simulation import kernel
+powers = np.zeros((4, 3))
+kernel.add_magnitudes(np.ones((2, 3, 4)), np.ones((3, 3)), np.zeros(3), powers)
+assert np.allclose(powers[1], 96), powers
+found = kernel.add_magnitudes.stats
+print(sum(found.cache_hits.values()), sum(found.cache_misses.values()))
+"""
+
+
+@pytest.fixture(scope="module")
+def warm(tmp_path_factory):
+    """A copy of the package of its own, whose compiled functions are in its cache."""
+    copy = tmp_path_factory.mktemp("warm") / "site"
+    shutil.copytree(Path(tolcontact.__file__).parent, copy / "tolcontact", ignore=shutil.ignore_patterns("__pycache__"))
+    assert call(copy) == (0, 1)
+    return copy
+
+
+@pytest.fixture
+def installed(warm, tmp_path):
+    return shutil.copytree(warm, tmp_path / "site")
+
+
+def call(site, *options, **environment):
+    """Hits and misses of the cache in a process of its own that imports the package from `site`."""
+    begun = start(site, *options, **environment)
+    return finish(begun)
+
+
+def start(site, *options, **environment):
+    known = {**os.environ, "PYTHONPATH": str(site), "NUMBA_CACHE_DIR": "", **environment}
+    command = [sys.executable, *options, "-c", SCRIPT]
+    return subprocess.Popen(command, env=known, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=site)
+
+
+def finish(begun):
+    out, err = begun.communicate(timeout=120)
+    assert begun.returncode == 0, err
+    hits, misses = out.split()
+    return int(hits), int(misses)
+
+
+def cached(site, kind):
+    (file,) = (site / "tolcontact/simulation/__pycache__").glob(f"kernel.add_magnitudes-*.{kind}")
+    return file
+
+
+def test_a_second_process_finds_it_compiled(installed):
+    assert call(installed) == (1, 0)
+    assert call(installed, "-O") == (1, 0)
+
+
+@pytest.mark.parametrize("kind", ["nbi", "nbc"])
+@pytest.mark.parametrize("left", ["nothing", "half", "all but a byte", "zeros", "garbage", "another pickle"])
+def test_a_damaged_file_is_replaced(kind, left, installed):
+    file = cached(installed, kind)
+    whole = file.read_bytes()
+    file.write_bytes({
+        "nothing": b"", "half": whole[: len(whole) // 2], "all but a byte": whole[:-1], "zeros": bytes(len(whole)),
+        "garbage": b"\x80\x05garbage" * 50, "another pickle": b"\x80\x04K\x05.",
+    }[left])  # fmt: skip
+    assert call(installed) == (0, 1)
+    assert call(installed) == (1, 0)
+
+
+def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(installed, tmp_path):
+    """A folder where files should be stands for what even root cannot write to."""
+    for kind in ("nbi", "nbc"):
+        file = cached(installed, kind)
+        file.unlink()
+        file.mkdir()
+        assert call(installed) == (0, 1)
+        file.rmdir()
+
+
+def test_without_a_place_to_write_it_compiles_anew(installed):
+    shutil.rmtree(installed / "tolcontact/simulation/__pycache__")
+    (installed / "tolcontact/simulation/__pycache__").write_text("in the way")
+    assert call(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
+
+
+def test_several_processes_may_begin_at_once(installed):
+    shutil.rmtree(installed / "tolcontact/simulation/__pycache__")
+    begun = [start(installed) for _ in range(4)]
+    assert all(sum(finish(one)) == 1 for one in begun)
+    assert call(installed) == (1, 0)
+
+
+READ = "-all,+dac_read_search"  # everything may be read
+AS_NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+AS_NOBODY += [f"--bounding-set={READ}", f"--inh-caps={READ}", f"--ambient-caps={READ}"]
+
+
+@pytest.fixture
+def nobody():
+    """The command that makes one run as a user who can write nowhere."""
+    done = shutil.which("setpriv") and subprocess.run([*AS_NOBODY, sys.executable, "-c", ""], check=False, capture_output=True)
+    if not done or done.returncode:
+        pytest.skip("only root may become another user")
+    return AS_NOBODY
+
+
+@pytest.mark.parametrize("home", ["writable", "not writable", "missing"])
+def test_another_user_may_use_it(home, installed, nobody, tmp_path):
+    """Who can read the package, but not write to it."""
+    folder = tmp_path / "home"
+    if home != "missing":
+        folder.mkdir()
+        folder.chmod(0o777 if home == "writable" else 0o755)
+    known = {**os.environ, "PYTHONPATH": str(installed), "HOME": str(folder)}
+    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        known.pop(name, None)
+    found = []
+    for _ in range(2):
+        command = [*nobody, sys.executable, "-c", SCRIPT]
+        begun = subprocess.Popen(command, env=known, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=installed)
+        found.append(finish(begun))
+    assert found == [(0, 1), (1, 0) if home == "writable" else (0, 1)]

@@ -1,0 +1,98 @@
+"""Solvers print nothing, whatever becomes of their problems, and what users print is not lost."""
+
+import io
+import subprocess
+import sys
+import threading
+from contextlib import redirect_stdout
+
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tolcontact.symbolic import usable_plugins
+from tolcontact.symbolic.quiet import quiet
+
+
+@pytest.mark.parametrize("solver", usable_plugins())
+@pytest.mark.parametrize("case", ["block on six", "parked"])
+def test_solvers_print_nothing(solver, case, capfd):
+    a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
+    method = tc.Method(resolution="exact", objective="seating")
+    tc.run(a, samples=300 if solver == "qpoases" else 20, seed=1, solver=solver, method=method, surfaces=0)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_what_other_threads_print_is_not_lost(capsys):
+    entered, printed = threading.Event(), threading.Event()
+
+    def muffled():
+        with quiet():
+            print("a plugin's banner")
+            entered.set()
+            printed.wait(10)
+            print("a plugin's error", file=sys.stderr)
+
+    worker = threading.Thread(target=muffled)
+    worker.start()
+    entered.wait(10)
+    print("a user's line")
+    printed.set()
+    worker.join()
+    print("the end")
+    assert capsys.readouterr() == ("a user's line\nthe end\n", "")
+
+
+def test_streams_that_are_replaced_meanwhile_are_left_in_order():
+    before, text = sys.stdout, io.StringIO()
+    with quiet():
+        with redirect_stdout(text), quiet():
+            print("muffled")
+        print("and this")
+    assert sys.stdout is before and not text.getvalue()
+    with redirect_stdout(text):
+        with quiet():
+            pass
+        print("heard")
+    assert sys.stdout is before and text.getvalue() == "heard\n"
+
+
+def test_what_a_users_measure_prints_is_not_lost(capsys):
+    a = cases.ra1(points=9)
+
+    def tilt(poses):
+        print("called")
+        return poses.rotation(a.parts[1])[2, 0]
+
+    a.measure("tilt", tilt, units="rad")
+    tc.build(a)
+    assert capsys.readouterr().out == "called\n"
+
+
+def test_it_runs_without_streams():
+    code = "import sys; sys.stdout = sys.stderr = None; import tolcontact as tc; from tests import cases; "
+    code += "tc.run(cases.ra1(points=9), samples=20)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+PRINTING = """
+import threading
+from tolcontact.symbolic.quiet import quiet
+done = threading.Event()
+def muffle():
+    while not done.is_set():
+        with quiet():
+            pass
+workers = [threading.Thread(target=muffle) for _ in range(2)]
+for worker in workers:
+    worker.start()
+for k in range(20_000):
+    print(k, flush=True)
+done.set()
+"""
+
+
+def test_printing_goes_on_while_other_threads_come_and_go():
+    done = subprocess.run([sys.executable, "-c", PRINTING], check=False, capture_output=True, text=True)
+    assert done.returncode == 0
+    assert done.stdout.split() == [str(k) for k in range(20_000)]

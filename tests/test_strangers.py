@@ -1,0 +1,215 @@
+"""Declared models that came from a stranger's archive: rebuilt as they were, or refused with one message."""
+
+import copy
+import json
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+import tolcontact as tc
+from tolcontact.archive.header import declaration
+from tolcontact.assembly import tape
+from tolcontact.assembly.document import from_document
+from tolcontact.errors import ArchiveError, ModelError
+from tolcontact.symbolic import tape as symbolic_tape
+
+DAMAGED = "^the declared model in the archive is damaged: "
+
+
+def with_everything() -> tc.Assembly:
+    a = tc.Assembly("everything")
+    base = a.part("base", tc.Box(100, 50, 10))
+    top = a.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    a.locate(base, tc.three_two_one(base.face("-z"), base.face("-y"), base.face("-x"), inset=5), tolerance=10)
+    places = {"A1": ((5, 5, 0), "z"), "A2": ((45, 5, 0), "z"), "A3": ((25, 20, 0), "z"), "B1": ((5, 0, 5), "y")}
+    places |= {"B2": ((45, 0, 5), "y"), "C": ((0, 10, 5), "x")}
+    six = [tc.Locator(name, *place) for name, place in places.items()]
+    a.locate(top, six, tolerance=stats.beta(2, b=3, loc=-0.5, scale=1), on=base)
+    upper = base.face("+z", tc.Inside((0, 0, 9), (90, 50, 11)))
+    a.contact("interface", moving=top.face(range(12)), reference=upper, points="vertices", within=2)
+    a.measure("height", top.point(50, 0, 10), along="z", tolerance=1)
+    a.measure("gap", base.point(0, 0, 10), to=top.point(0, 0, 0), along=(0, 0.6, 0.8))
+    a.measure("tilt", lambda poses: poses.rotation(top)[2, 0] * 2 + 1, units="rad")
+    a.force("push", at=top.point(0, 0, 0), vector=(1, 0, -2))
+    return a
+
+
+@pytest.fixture(scope="module")
+def document():
+    return json.loads(declaration(tc.build(with_everything(), solver="daqp")))
+
+
+def places(value, path=()):
+    """The paths of all values of a document."""
+    yield path
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, item in items:
+        yield from places(item, (*path, key))
+
+
+def changed(document, path, value):
+    if not path:
+        return value
+    document = copy.deepcopy(document)
+    *way, last = path
+    holder = document
+    for key in way:
+        holder = holder[key]
+    if value is Ellipsis:
+        del holder[last]
+    else:
+        holder[last] = value
+    return document
+
+
+def test_a_document_is_rebuilt_as_it_was(document):
+    rebuilt = from_document(document, {})
+    again = json.loads(declaration(tc.build(rebuilt, solver="daqp")))
+    assert again == document
+
+
+def nested(depth):
+    value = []
+    for _ in range(depth):
+        value = [value]
+    return value
+
+
+STRANGE = [
+    ..., None, True, -1, 0, 10**400, 1e308, math.nan, math.inf, "", "x", "base", "\udce9", "a" * 10**6, [], {}, [1], [None] * 3,
+    [math.nan] * 3, {"a": 1}, {"scipy": "test", "args": [], "kwds": {}}, nested(100_000),
+]  # fmt: skip
+
+
+def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(document):
+    accepted = 0
+    for path in places(document):
+        for value in STRANGE:
+            if value is Ellipsis and not path:
+                continue
+            try:
+                from_document(changed(document, path, value), {})
+                accepted += 1  # some values say another model
+            except ArchiveError as error:
+                message = str(error)
+                assert message.startswith(DAMAGED[1:]) and len(message) < 500 and message.isprintable()
+    assert accepted
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@given(data=st.data())
+def test_two_strange_values_end_in_one_error_too(document, data):
+    values = st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+        lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=5), inner, max_size=4),
+    )
+    for _ in range(2):
+        path = data.draw(st.sampled_from(list(places(document))))
+        document = changed(document, path, data.draw(values))
+    try:
+        from_document(document, {})
+    except ArchiveError as error:
+        assert str(error).startswith(DAMAGED[1:])
+
+
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"scipy": "test", "args": [], "kwds": {}},
+        {"scipy": "poisson", "args": [3], "kwds": {}},
+        {"scipy": "rv_histogram", "args": [[1, 2]], "kwds": {}},
+        {"scipy": "gaussian_kde", "args": [[1, 2]], "kwds": {}},
+        {"scipy": "_distn_infrastructure", "args": [], "kwds": {}},
+        {"scipy": "norm.fit", "args": [], "kwds": {}},
+        {"scipy": "norm", "args": [0, math.nan], "kwds": {}},
+        {"scipy": "norm", "args": [[0, 1], 1], "kwds": {}},
+        {"scipy": "norm", "args": [0, 1], "kwds": {"moments": 3}},
+        {"scipy": "norm", "args": [0, 1, 2, 3], "kwds": {}},
+        {"scipy": "norm", "args": [0, 1], "kwds": {"scale": 2}},
+        {"scipy": "norm", "args": [0], "kwds": {"scale": "1"}},
+        {"scipy": "norm", "args": [0, -1], "kwds": {}},
+        {"scipy": 3, "args": [], "kwds": {}},
+        {"scipy": "beta", "args": [], "kwds": {}},
+    ],
+    ids=str,
+)
+def test_only_continuous_distributions_of_scipy_are_made(said, document, monkeypatch):
+    monkeypatch.setattr(stats, "test", lambda *_, **__: pytest.fail("it was run"))
+    with pytest.raises(ArchiveError, match=DAMAGED):
+        from_document(changed(document, ("locations", 1, "tolerance"), said), {})
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [],
+        [["input"]],
+        [["input", 24]],
+        [["input", -1]],
+        [["input", 0.0]],
+        [["input", True]],
+        [["const", "1"]],
+        [["const", 1, 2]],
+        [["const", 1.0], ["add", 0, 1]],
+        [["const", 1.0], ["sin", -1]],
+        [["const", 1.0], ["add", 0]],
+        [["const", 1.0], ["system", 0]],
+        [["const", 1.0], [["add"], 0, 0]],
+        [["const", 1.0], []],
+        [["const", 1.0], "add"],
+        {"const": 1.0},
+    ],
+    ids=str,
+)
+def test_a_damaged_tape_is_refused(rows, document):
+    with pytest.raises(ArchiveError, match=r"damaged: measures\[2\].tape"):
+        from_document(changed(document, ("measures", 2, "tape"), rows), {})
+
+
+def test_a_tape_may_not_be_endless(document, monkeypatch):
+    monkeypatch.setattr(tape, "LONGEST", 1000)
+    rows = [["input", 0], *(["twice", k] for k in range(1000))]
+    with pytest.raises(ArchiveError, match="more than 1000 steps"):
+        from_document(changed(document, ("measures", 2, "tape"), rows), {})
+    monkeypatch.setattr(symbolic_tape, "LONGEST", 3)
+    with pytest.raises(ValueError, match="cannot be archived"):
+        tc.build(with_everything(), solver="daqp")
+
+
+def test_every_operation_of_a_tape_can_be_replayed():
+    assert set(symbolic_tape._UNARY) == set(tape.UNARY) and set(symbolic_tape._BINARY) == set(tape.BINARY)
+
+
+class Own(stats.rv_continuous):
+    def _pdf(self, x):
+        return 1.0 + 0.0 * x
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        Own(a=0, b=1, name="own")(),
+        Own(a=0, b=1, name="norm")(),
+        stats.rv_histogram(np.histogram([1.0, 2.0, 2.0, 3.0])).freeze(),
+        stats.norm([0, 1], 1),
+        stats.uniform(0, scale=np.array([1.0])),
+    ],
+    ids=["own", "own with a known name", "histogram", "several at once", "array"],
+)
+def test_a_distribution_that_no_archive_can_hold_is_a_fault(own):
+    a = with_everything()
+    a.locate(a.part("extra", tc.Box(1, 1, 1)), [], tolerance=own)
+    with pytest.raises(ModelError, match=r"which an archive cannot hold|expected finite numbers"):
+        tc.build(a)
+
+
+def test_all_of_scipys_continuous_distributions_are_rebuilt():
+    for name in ("norm", "beta", "expon", "t", "truncnorm", "weibull_min", "triang"):
+        distribution = getattr(stats, name)
+        a = with_everything()
+        a.locate(a.part("extra", tc.Box(1, 1, 1)), [], tolerance=distribution(*[0.5] * distribution.numargs, scale=0.1))
+        assert not [fault for fault in a.faults() if "archive" in fault], name

@@ -1,0 +1,42 @@
+"""What a declared thing may be called."""
+
+import re
+import unicodedata
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from tolcontact.errors import STEERING
+
+_KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
+
+
+def text_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
+    """What is wrong with names that are only shown."""
+    for name in dict.fromkeys(names):
+        if not is_line(name):
+            yield f"{kind} {name!r}: a name must be a text that holds no control character (the archive uses it)"
+
+
+def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
+    """What is wrong with names by which the archive keeps things apart."""
+    for name in dict.fromkeys(names):
+        if not (is_line(name) and _KEY.fullmatch(name)):
+            yield (
+                f"{kind} {name!r}: a name must be a text that starts with a letter, digit or underscore, holds "
+                'no "/" or control character, and does not end in a space (the archive uses it)'
+            )
+    yield from repetitions(kind, names)
+
+
+def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:
+    """Names that are given more than once. The same letters are the same name, however they are composed."""
+    composed = Counter(unicodedata.normalize("NFC", name) for name in names if isinstance(name, str))
+    for name, count in composed.items():
+        if count > 1:
+            yield f'{kind} "{name}" is declared {count} times; names must differ'
+
+
+def is_line(text: Any) -> bool:
+    """Whether it is a text of one line that can be printed without steering a terminal."""
+    return isinstance(text, str) and not (STEERING.search(text) or "\t" in text or "\n" in text)

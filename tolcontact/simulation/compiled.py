@@ -1,0 +1,34 @@
+"""Functions compiled by Numba and kept on disk between runs, where that can be done: a cache only saves time.
+
+Compiled functions lie in the package's own `__pycache__`, else in the user's cache folder. Numba alone refuses to import
+where neither can be written, and to go on once a file there has been cut off.
+"""
+
+import contextlib
+from collections.abc import Callable
+from typing import Any
+
+from numba import njit
+from numba.core.caching import FunctionCache
+
+
+def compiled(function: Callable[..., Any], *, inline: bool = False) -> Any:
+    """The function, compiled when it is first called; `inline`, it becomes part of those that call it."""
+    dispatcher = njit(nogil=True, error_model="numpy", inline="always" if inline else "never")(function)
+    with contextlib.suppress(RuntimeError):  # there is no folder to write to
+        dispatcher._cache = _Cache(function)  # what njit(cache=True) does, with Numba's own class
+    return dispatcher
+
+
+class _Cache(FunctionCache):  # type: ignore[misc]
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        try:
+            return super().load_overload(sig, target_context)
+        except Exception:  # unpickling a damaged file may raise anything
+            with contextlib.suppress(OSError):
+                self.flush()  # else the damaged index would be read again, to be added to
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with contextlib.suppress(OSError):  # the disk is full, or the folder was writable once
+            super().save_overload(sig, data)
