@@ -8,6 +8,7 @@ from tolcontact.discretization.edges import rim
 
 CANDIDATES_PER_SPACING = 2.0
 CROWD = 50  # candidates for each point, from which on some are left out
+BLOCK = 512  # candidates
 CORNER_ANGLE = np.radians(30.0)
 
 
@@ -31,14 +32,23 @@ def spread(surface: trimesh.Trimesh, count: int | None, spacing: float | None) -
         chosen = [candidates[np.argmax(((candidates - centre) ** 2).sum(axis=1))]]
     distance2 = np.min([((candidates - point) ** 2).sum(axis=1) for point in chosen], axis=0)
     tree = cKDTree(candidates)
+    # Of many candidates the farthest is looked for among the farthest of each block: few blocks change with a point.
+    blocks = np.full((-(-len(candidates) // BLOCK), BLOCK), -1.0)
+    distances = blocks.reshape(-1)[: len(candidates)]
+    distances[:] = distance2
+    largest = blocks.max(axis=1)
     while True:
-        farthest = int(np.argmax(distance2))
-        if (len(chosen) == count) if spacing is None else (distance2[farthest] <= spacing**2):
+        block = int(np.argmax(largest))
+        farthest = BLOCK * block + int(np.argmax(blocks[block]))
+        if (len(chosen) == count) if spacing is None else (distances[farthest] <= spacing**2):
             return np.array(chosen)
         chosen.append(candidates[farthest])
         # No candidate is farther than this one from those chosen, so that it changes nothing beyond that distance.
-        near = tree.query_ball_point(candidates[farthest], np.sqrt(distance2[farthest]) * (1 + 1e-9), return_sorted=False)
-        distance2[near] = np.minimum(distance2[near], ((candidates[near] - candidates[farthest]) ** 2).sum(axis=1))
+        near = tree.query_ball_point(candidates[farthest], np.sqrt(distances[farthest]) * (1 + 1e-9), return_sorted=False)
+        near = np.asarray(near)
+        distances[near] = np.minimum(distances[near], ((candidates[near] - candidates[farthest]) ** 2).sum(axis=1))
+        changed = np.flatnonzero(np.bincount(near // BLOCK, minlength=len(blocks)))
+        largest[changed] = blocks[changed].max(axis=1)
 
 
 def _thinned(points: np.ndarray, faces: np.ndarray, cell: float) -> np.ndarray:
