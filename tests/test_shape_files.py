@@ -155,8 +155,9 @@ def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())
     code = ALONE.replace("2.0", "50.0")
     process = subprocess.Popen(
-        [sys.executable, "-c", code, "endless.step"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    )
+        [sys.executable, "-c", code, "endless.step"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )  # fmt: skip
     try:
         end = time.monotonic() + 40
         while not (readers := children(process.pid)) and time.monotonic() < end:

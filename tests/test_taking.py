@@ -36,6 +36,7 @@ def start(model, *options):
     return subprocess.Popen(
         [*COMMAND, "run", model, "--solver", "daqp", *map(str, options)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=model.parent,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background begin without
     )  # fmt: skip
 
 

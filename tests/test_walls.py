@@ -25,8 +25,9 @@ ROOMS = {
 NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")}
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "errors", "printing", "child", "vocabulary", "checksums", "method", "poses", "assembly", "script", "discretization",
-    "symbolic", "sampling", "simulation", "statistics", "archive", "running", "comparing", "report", "cli", "__init__",
+    "errors", "child", "vocabulary", "checksums", "method", "poses", "assembly", "script", "discretization",
+    "symbolic", "sampling", "simulation", "statistics", "archive", "forecasting", "running", "comparing", "report", "cli",
+    "__init__",
 )  # fmt: skip
 
 

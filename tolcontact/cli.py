@@ -7,7 +7,9 @@ Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad
 import contextlib
 import functools
 import inspect
+import io
 import json
+import logging
 import os
 import signal
 import sys
@@ -24,9 +26,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from tolcontact.archive import open_archive, taken
 from tolcontact.assembly import Assembly
 from tolcontact.comparing import compare as compare_solvers
-from tolcontact.errors import OptionError, TolcontactError
+from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
-from tolcontact.printing import printable
 from tolcontact.report import comparison_text, grouped, summary_text
 from tolcontact.running import DEFAULT_SOLVER, SURFACES, build, summarize
 from tolcontact.running import run as run_model
@@ -82,11 +83,12 @@ def run(
         raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
     method = Method(resolution=resolution, objective=objective)
     with _bar() as bar, _stopped(out, done := [0, samples]):
-        task = bar.add_task(printable(model.stem), total=samples)
+        task = bar.add_task(shown(model.stem), total=samples)
+        _show_log(bar.console, lambda words: bar.update(task, description=words))
 
         def show(rows: int) -> None:
             done[:] = rows, max(samples, rows)
-            bar.update(task, completed=rows, total=done[1])
+            bar.update(task, completed=rows, total=done[1], description=shown(model.stem))
 
         results = run_model(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
@@ -95,12 +97,28 @@ def run(
     with results:
         _print_summary(results)
     if out is not None:
-        typer.echo(f"\narchive: {printable(str(out))}")
+        typer.echo(f"\narchive: {shown(str(out))}")
 
 
 def _bar() -> Progress:
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     return Progress(*columns, TimeRemainingColumn(), console=Console(stderr=True), transient=True)
+
+
+def _show_log(console: Console, show: Callable[[str], None]) -> None:
+    """Show what the package is at, and print what it announces."""
+
+    class Shown(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            words = shown(record.getMessage())
+            if record.levelno >= logging.WARNING:
+                console.print(words, markup=False, highlight=False, soft_wrap=True)
+            else:
+                show(words)
+
+    log = logging.getLogger("tolcontact")
+    log.handlers, log.propagate = [Shown()], False
+    log.setLevel(logging.INFO)
 
 
 @contextlib.contextmanager
@@ -191,21 +209,24 @@ def main(assembly: Callable[[], Assembly]) -> None:
 
 def command_line(arguments: list[str] | None = None) -> None:
     """The console script: `app`, with errors as one message and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that knows few letters is no reason to stop
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
             app(arguments)
     except TolcontactError as error:
-        typer.echo(f"error: {printable(str(error))}", err=True)
+        typer.echo(f"error: {error}", err=True)
         sys.exit(2)
     except OSError as error:
-        refused = printable(str(error))
+        refused = shown(str(error))
         typer.echo(f"error: the system refused: {refused}; an archive that was begun goes on with --resume", err=True)
         sys.exit(2)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {printable(str(message))}", err=True)
+    typer.echo(f"warning: {shown(str(message))}", err=True)
 
 
 def _console() -> Console:

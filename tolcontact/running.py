@@ -10,13 +10,14 @@ from tolcontact.archive import ArchiveWriter, check_rows, open_archive, opened, 
 from tolcontact.assembly import Assembly
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
+from tolcontact.forecasting import announce
 from tolcontact.method import Method
 from tolcontact.script import load_model
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.symbolic import Program, compile_program
-from tolcontact.vocabulary import BLOCK_ROWS, KEPT
+from tolcontact.vocabulary import KEPT
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
@@ -82,6 +83,7 @@ def run(
         program = model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
         start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
         with start(path, program, seed=seed, samples=samples, keep=keep, surfaces=surfaces) as writer:
+            announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
             _simulate(program, writer, seed, progress)
 
     if out is None:
@@ -102,7 +104,7 @@ def _simulate(program: Program, writer: ArchiveWriter, seed: int, progress: Prog
     try:
         for done in simulate_blocks(program, samples=writer.samples, seed=seed, start=writer.rows):
             writer.append(done)
-            if len(done) == BLOCK_ROWS:
+            if len(done) == writer.block_rows:
                 writer.check_point()
             if progress:
                 progress(writer.rows)

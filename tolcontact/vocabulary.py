@@ -15,7 +15,7 @@ AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
 CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
 BLOCK, ROW_VARIABLE = "block", "row_variable"
-BLOCK_ROWS = 4096  # realizations of a block: simulated together, and with a checksum of their own
+BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
@@ -143,7 +143,7 @@ ROW_CHECKSUM = Variable(
     "row_checksum",
     (BLOCK, ROW_VARIABLE),
     "i8",
-    f"CRC-32 of the values of a variable in a block of {BLOCK_ROWS} realizations (the last one may be shorter), little-endian; "
+    "CRC-32 of the values of a variable in a block of `block_rows` realizations (the last one may be shorter), little-endian; "
     "-1: unfinished",
     "1",
 )

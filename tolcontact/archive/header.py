@@ -16,6 +16,7 @@ from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.assembly import Mesh
 from tolcontact.assembly.document import to_document
 from tolcontact.discretization import Nominal
+from tolcontact.simulation.run import block_rows
 from tolcontact.statistics import FieldMoments
 from tolcontact.symbolic import ACCURACY, Program
 from tolcontact.vocabulary import Variable
@@ -45,6 +46,7 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
         "seed": np.int64(seed),
         "samples": np.int64(samples),
         "kept": keep,
+        "block_rows": np.int64(block_rows(program)),
     }
 
 

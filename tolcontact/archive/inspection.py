@@ -18,8 +18,7 @@ import numpy as np
 from tolcontact import vocabulary as words
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_memory, run_child
-from tolcontact.errors import ArchiveError
-from tolcontact.printing import printable
+from tolcontact.errors import ArchiveError, shown
 from tolcontact.vocabulary import Variable
 
 SECONDS, SECONDS_PER_GB = 20.0, 20.0
@@ -29,22 +28,15 @@ DECLARED = 1 << 26  # bytes of a declared model
 TEXT = 1 << 20  # letters of an attribute
 SIZES = {words.STATE: 2, words.AXIS: 3, words.BODY_AXIS: 3, words.CORNER: 3, words.COMPONENT: 4, words.BOUND: 2}
 GROUPS = ("model", "contact", "sample", "field")
+ADDED = ("surface",)  # groups that archives of format 1 may not have
 LABELS = (words.PART, words.PAIR, words.MEASURE, words.ROW_VARIABLE)
-CHANGES_VALUES = (
-    "scale_factor",
-    "add_offset",
-    "missing_value",
-    "_Unsigned",
-    "calendar",
-    "valid_range",
-    "valid_min",
-    "valid_max",
-)
-SAID = ("title", "resolution", "objective", "active_set")  # texts that a summary repeats
+CHANGES_VALUES = ("scale_factor", "add_offset", "missing_value", "_Unsigned", "calendar")  # when xarray reads them
+SAID = ("title", "history", "versions", "resolution", "objective", "active_set")  # texts that a summary repeats
 OF_FIELD = (words.FIELD_VERTICES, words.FIELD_FACES, words.FIELD_MEAN, words.FIELD_SIX_SIGMA, words.FIELD_INTERVAL)
 OF_CONTACT = (words.MOVING_PART, words.REFERENCE_PART)
 OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
-ONCE = {  # by group; a mesh has the same names as a field
+OF_MESH = (words.MESH_VERTICES, words.MESH_FACES)
+ONCE = {  # by group
     "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS,
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
     "model": (words.DECLARATION,),
@@ -58,19 +50,28 @@ ONCE = {  # by group; a mesh has the same names as a field
 }  # fmt: skip
 
 
+def check_name(path: Path) -> None:
+    """Raise ArchiveError where the netCDF library could not take a file's name."""
+    try:
+        os.fsencode(path).decode(sys.getfilesystemencoding())
+    except UnicodeError as error:
+        raise ArchiveError(f'"{path}": its name is no text, and netCDF cannot take it; rename the file') from error
+
+
 class DamagedError(Exception):
     """What is wrong with a file."""
 
 
-def inspect(path: Path, *, shown: str | Path | None = None) -> None:
-    """Raise ArchiveError where a file is not an archive, is damaged, or claims what it cannot hold; as `shown` where given."""
-    said, gigabytes = shown or path, path.stat().st_size / 1e9
+def inspect(path: Path) -> None:
+    """Raise ArchiveError where a file is not an archive, is damaged, or claims what it cannot hold."""
+    check_name(path)
+    gigabytes = path.stat().st_size / 1e9
     try:
         found = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
     except ChildDiedError as error:
-        raise ArchiveError(f'"{said}" is damaged, or no archive of tolcontact: {error}') from error
+        raise ArchiveError(f'"{path}" is damaged, or no archive of tolcontact: {error}') from error
     if found:
-        raise ArchiveError(f'"{said}" {found}')
+        raise ArchiveError(f'"{path}" {found}')
 
 
 def _look(path: Path) -> str:
@@ -149,14 +150,15 @@ def _check_attributes(thing: Any) -> None:
 def _check_text(name: str, text: str) -> None:
     if len(text) > TEXT:
         raise DamagedError(f"is damaged: {name} has {len(text)} letters")
-    if printable(text) != text:
-        raise DamagedError(f"is damaged: {name} holds control characters ({printable(text)[:60]})")
+    if shown(text) != text:
+        raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
 
 
 def _check_archive(file: netCDF4.Dataset) -> None:
     optional = (*words.POSES, *words.ADDED)
     missing = [v.name for v in words.ROWS if v not in optional and v.name not in file.variables]
-    missing += [group for group in GROUPS if group not in file.groups]
+    first = getattr(file, "format", 1) == 1
+    missing += [group for group in (GROUPS if first else (*GROUPS, *ADDED)) if group not in file.groups]
     missing += [word for word in SAID if not isinstance(getattr(file, word, None), str)]
     if missing:
         raise DamagedError(f"is not an archive of tolcontact: it has no {', '.join(missing)}")
@@ -168,11 +170,18 @@ def _check_archive(file: netCDF4.Dataset) -> None:
         for group in [] if parent is None else (parent.groups.values() if name == "field" else [parent]):
             for variable in known:
                 _check_variable(group, variable)
+    for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
+        _need(group, OF_MESH)
+        for variable in OF_MESH:
+            _check_variable(group, variable)
     for name in LABELS:
         if name in file.variables:
             labels = _texts(file[name])
             if len(set(labels)) < len(labels) or "" in labels:
                 raise DamagedError(f"is damaged: its names of each {name} are not different, or empty")
+    rows = getattr(file, "block_rows", words.BLOCK_ROWS)
+    if not (isinstance(rows, int | np.integer) and 0 < rows <= words.BLOCK_ROWS):
+        raise DamagedError(f"is damaged: its blocks have {rows!r} realizations")
     _check_needed(file)
 
 
@@ -199,7 +208,8 @@ def _check_needed(file: netCDF4.Dataset) -> None:
     if getattr(file, "format", 1) > 1:
         _need(file, (words.ROW_CHECKSUM, words.ROW_VARIABLE_LABEL, words.SUMMED_ROWS))
         summed = np.ma.getdata(file[words.SUMMED_ROWS.name][...])
-        if (summed < words.UNFINISHED).any() or (summed > len(file.dimensions[words.REALIZATION])).any():
+        most = len(file.dimensions[words.BLOCK]) * int(file.block_rows)
+        if (summed < words.UNFINISHED).any() or (summed > most).any():
             raise DamagedError("is damaged: its checkpoints are of more realizations than it holds")
     if tuple(_texts(file[words.STATE])) != words.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
@@ -233,7 +243,7 @@ def _texts(stored: netCDF4.Variable) -> list[str]:
 def _check_sums(group: netCDF4.Dataset) -> None:
     """Whether what is written once, or in one go, has the checksum that is stored beside it."""
     kind = group.path.split("/")[1]
-    known = {v.name: v for v in ONCE["field" if "/mesh/" in group.path else kind]} if kind in ONCE else {}
+    known = {v.name: v for v in (OF_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
     for name, stored in group.variables.items():
         if words.CHECKSUM in stored.ncattrs() and name in known:
             values = _declaration(stored) if known[name] is words.DECLARATION else _values(stored, known[name])

@@ -43,7 +43,7 @@ def model_of(results: xr.DataTree) -> Assembly:
     """The declared assembly, rebuilt from an archive."""
     try:
         document = json.loads(str(results["model"][words.DECLARATION.name].values))
-    except (ValueError, RecursionError) as error:
+    except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
     meshes = {}
     if "mesh" in results["model"].children:

@@ -9,6 +9,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
+from tolcontact.archive.header import kept_rows
 from tolcontact.archive.variables import ROW_CHUNK
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
@@ -23,9 +24,14 @@ def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: 
     if needed > free:
         less = "; or keep less of each realization (measures)" if words.ROTATION in rows else ""
         raise ArchiveError(
-            f'archive "{path}" needs {_size(needed)} for {samples} realizations, but its disk has {_size(free)} free; '
-            f"ask for fewer, or write to another disk{less}"
+            f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
+            f"{size_in_words(free)} free; ask for fewer, or write to another disk{less}"
         )
+
+
+def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
+    """How many bytes `samples` realizations take in an archive that keeps what `keep` says."""
+    return samples * bytes_of_row(nominal, kept_rows(keep))
 
 
 def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
@@ -43,7 +49,8 @@ def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
     return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (words.NUMBERS, *rows))
 
 
-def _size(count: float) -> str:
+def size_in_words(count: float) -> str:
+    """A number of bytes for people: 1.5 GB."""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000:
             return f"{count:.3g} {unit}"
@@ -62,6 +69,6 @@ def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
                 stored[some] = np.full((some.stop - some.start, *stored.shape[1:]), nothing)
         file[words.REALIZATION][some] = np.arange(some.start, some.stop)
     sums = file[words.ROW_CHECKSUM.name]
-    blocks = slice(len(sums), -(-stop // words.BLOCK_ROWS))
+    blocks = slice(len(sums), -(-stop // int(file.block_rows)))
     if blocks.stop > blocks.start:
         sums[blocks] = np.full((blocks.stop - blocks.start, sums.shape[1]), words.UNFINISHED)

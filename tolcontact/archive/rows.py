@@ -20,12 +20,12 @@ def check_rows(results: xr.DataTree) -> None:
     Archives of format 1 have no checksums; nor are there any of the rows that somebody took from an archive.
     """
     stored = results.to_dataset()
-    count = stored.sizes[words.REALIZATION]
-    if words.ROW_CHECKSUM.name not in stored or stored.sizes[words.BLOCK] != -(-count // words.BLOCK_ROWS):
+    count, rows = stored.sizes[words.REALIZATION], int(stored.attrs.get("block_rows", words.BLOCK_ROWS))
+    if words.ROW_CHECKSUM.name not in stored or stored.sizes[words.BLOCK] != -(-count // rows):
         return
     try:
-        for name, block in _damaged(results, stored, count):
-            first, last = block * words.BLOCK_ROWS, min((block + 1) * words.BLOCK_ROWS, count) - 1
+        for name, block in _damaged(results, stored, rows):
+            first, last = block * rows, min((block + 1) * rows, count) - 1
             raise ArchiveError(
                 f'the archive is damaged: "{name}" of realizations {first} to {last} is not what was written; run it again'
             )
@@ -33,29 +33,28 @@ def check_rows(results: xr.DataTree) -> None:
         raise ArchiveError(f"the archive is damaged: its realizations cannot be read ({error}); run it again") from error
 
 
-def _damaged(results: xr.DataTree, stored: xr.Dataset, count: int) -> Iterator[tuple[str, int]]:
-    """Variables and blocks that do not have their checksums."""
+def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tuple[str, int]]:
+    """Variables and blocks, of so many `rows`, that do not have their checksums."""
     done = finished(results)
-    whole = done if done == count else done // words.BLOCK_ROWS * words.BLOCK_ROWS
+    whole = done if done == stored.sizes[words.REALIZATION] else done // rows * rows
     # Blocks are finished in order: none behind the one that is being written.
-    behind = stored[words.STATUS.name][whole + words.BLOCK_ROWS :].values
+    behind = stored[words.STATUS.name][whole + rows :].values
     if (behind != words.UNFINISHED).any():
-        yield words.STATUS.name, done // words.BLOCK_ROWS
+        yield words.STATUS.name, done // rows
     sums = stored[words.ROW_CHECKSUM.name].values
     names = stored[words.ROW_VARIABLE].values.astype(str).tolist()
     for variable in words.BY_REALIZATION:
         if variable.name in names:
-            rows = (results["sample"].to_dataset() if variable is words.DEVIATION else stored)[variable.name][:whole]
-            wrong = np.flatnonzero(
-                _checksums(variable, rows) != sums[: -(-whole // words.BLOCK_ROWS), names.index(variable.name)]
-            )
+            values = (results["sample"].to_dataset() if variable is words.DEVIATION else stored)[variable.name][:whole]
+            found, expected = _checksums(variable, values, rows), sums[: -(-whole // rows), names.index(variable.name)]
+            wrong = np.flatnonzero(found != expected)
             yield from ((variable.name, int(block)) for block in wrong[:1])
 
 
-def _checksums(variable: Variable, rows: xr.DataArray) -> np.ndarray:
-    """Checksums (block,) of the values of a variable."""
-    found = []
-    for first in range(0, len(rows), PIECE):
-        piece = rows[first : first + PIECE].values
-        found += [crc32(variable, piece[k : k + words.BLOCK_ROWS]) for k in range(0, len(piece), words.BLOCK_ROWS)]
+def _checksums(variable: Variable, values: xr.DataArray, rows: int) -> np.ndarray:
+    """Checksums (block,) of the values of a variable in blocks of so many `rows`."""
+    found, at_once = [], -(-PIECE // rows) * rows
+    for first in range(0, len(values), at_once):
+        piece = values[first : first + at_once].values
+        found += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]
     return np.array(found, dtype=np.int64)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from tolcontact.archive.inspection import check_name
 from tolcontact.errors import ArchiveError, OptionError
 
 
@@ -20,6 +21,7 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
     if overwrite and resume:
         raise OptionError("an archive cannot be overwritten and resumed; choose one of the two")
     real = Path(os.path.realpath(path))
+    check_name(real)
     if not real.parent.is_dir():
         raise ArchiveError(f'archive "{path}" cannot be written: folder "{real.parent}" does not exist; make it first')
     if real.exists() and not real.is_file():

@@ -42,6 +42,7 @@ class ArchiveWriter:
 
     rows      realizations that are in it with all that is known of them; the next block starts there
     samples   realizations that it was begun for
+    block_rows   realizations of a block, all but the last one
     """
 
     def __init__(self, path: Path, program: Program, *, seed: int, samples: int, keep: str, surfaces: int) -> None:
@@ -92,7 +93,7 @@ class ArchiveWriter:
         self._nominal = nominal
         self._rows_kept = [variable for variable in words.BY_REALIZATION if self._stored(variable) is not None]
         self._fields_written = time.monotonic()
-        self.samples = int(self._file.samples)
+        self.samples, self.block_rows = int(self._file.samples), int(self._file.block_rows)
         self._take_up_sums()
 
     def _take_up_sums(self) -> None:
@@ -156,7 +157,7 @@ class ArchiveWriter:
             if values[variable].size and variable is not words.STATUS and stored is not None:
                 stored[rows] = values[variable]
         checksums = [crc32(variable, values[variable]) for variable in self._rows_kept]
-        self._file[words.ROW_CHECKSUM.name][block.start // words.BLOCK_ROWS] = checksums
+        self._file[words.ROW_CHECKSUM.name][block.start // self.block_rows] = checksums
         self._file.sync()
         self._file[words.STATUS.name][rows] = block.status
         self._file.sync()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.discretization.edges import edges
-from tolcontact.discretization.fault import shown
+from tolcontact.discretization.fault import clipped
 from tolcontact.discretization.step_text import Solid
 
 SHOWN = 12  # bodies that a message lists
@@ -26,7 +26,7 @@ class Body:
     is_open: bool = False
 
     def __str__(self) -> str:
-        called = ("open, " if self.is_open else "") + (f'"{shown(self.name, 60)}"' if self.name else "without a name")
+        called = ("open, " if self.is_open else "") + (f'"{clipped(self.name, 60)}"' if self.name else "without a name")
         if self.lower is None or self.upper is None:
             return called
         size = " x ".join(f"{length:.4g}" for length in self.upper - self.lower)

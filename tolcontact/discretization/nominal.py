@@ -1,5 +1,6 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
+import logging
 import math
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -28,7 +29,11 @@ from tolcontact.errors import ContactWarning, ModelError
 CONDITION_LIMIT = 1e8
 DEFAULT_REACH = 0.1
 DEFAULT_POINTS = 200
+MANY = 100_000  # contact points of a pair; more are announced
+SECONDS_PER_POINT = 1e-4
 SAME = 1e-9  # of the part's size: points that are no farther apart are one
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,6 +147,7 @@ def discretize(assembly: Assembly) -> Nominal:
     faults = list(assembly.faults())
     clean = not faults
     clear = [part for part in assembly.parts if not any(part.geometry.faults())]
+    log.info("reading the shapes of %d parts", len(clear))
     contents = read_files(part.geometry for part in clear)
     attempts = {part: _attempt(faults, _where("part", part), shape, part.geometry, contents) for part in clear}
     shapes = {part: found for part, found in attempts.items() if found is not None}
@@ -287,6 +293,7 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         sampled = own_vertices(own.mesh)
     else:
         evenly = DEFAULT_POINTS if pair.points is None and pair.spacing is None else pair.points
+        _announce(pair, own.mesh.area, evenly)
         sampled = spread(own.mesh, evenly, pair.spacing)
     P_m, finest = moving.place(sampled), assembly.finest()
     if is_flat(placed_own) and is_flat(target):
@@ -322,6 +329,15 @@ def _contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part,
         own=placed_own,
         facets=facet_error(placed_own, target, reach),
     )
+
+
+def _announce(pair: ContactPair, area: float, count: int | None) -> None:
+    points = count if pair.spacing is None else area / pair.spacing**2
+    log.log(
+        logging.WARNING if points and points > MANY else logging.INFO,
+        'contact pair "%s": some %d contact points, some %.0f s',
+        pair.name, points or 0, SECONDS_PER_POINT * (points or 0),
+    )  # fmt: skip
 
 
 def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndarray, finest: float, reach: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tolcontact.discretization.fault import GeometryFault, shown
+from tolcontact.discretization.fault import GeometryFault, clipped
 
 # A STEP file of 1 MB takes some 2 s, one of 20 MB 41 s, on one core; machines differ, and other jobs run on them.
 SECONDS, SECONDS_PER_MB = 30.0, 20.0
@@ -99,7 +99,7 @@ def _awaited(process: subprocess.Popen, seconds: float, *left: Path) -> bool:
 def _left(path: Path, folder: Path, k: int) -> dict[str, np.ndarray] | GeometryFault:
     said = folder / f"{k}.txt"
     if said.exists():
-        return GeometryFault(f'"{path}" {shown(said.read_text(encoding="utf-8", errors="replace"))}')
+        return GeometryFault(f'"{path}" {clipped(said.read_text(encoding="utf-8", errors="replace"))}')
     with np.load(folder / f"{k}.npz", allow_pickle=False) as arrays:
         return dict(arrays)
 
@@ -117,4 +117,4 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
         what = f"signal {-code}" + (f", {signal.Signals(-code).name}" if known else "")
         return f"is damaged: it brought its reader down ({what}); export it again"
     last = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
-    return f"was not read: its reader ended with exit code {code} ({shown(last) or 'without a word'}); export it again"
+    return f"was not read: its reader ended with exit code {code} ({clipped(last) or 'without a word'}); export it again"

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from tolcontact.assembly.geometry import STEP
-from tolcontact.discretization.fault import GeometryFault, shown
+from tolcontact.discretization.fault import GeometryFault, clipped
 from tolcontact.discretization.step_text import StepText, step_text
 
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
@@ -161,5 +161,5 @@ def _check_step(path: Path) -> StepText:
 
 
 def _listed(names: tuple[str, ...]) -> str:
-    first = ", ".join(f'"{shown(name, 60)}"' for name in names[:5])
+    first = ", ".join(f'"{clipped(name, 60)}"' for name in names[:5])
     return first + (f" and {len(names) - 5} more" if len(names) > 5 else "")

@@ -14,18 +14,23 @@ import numpy as np
 from tolcontact.sampling import draw
 from tolcontact.simulation.block import Block, Status
 from tolcontact.simulation.contact import ContactResolver
-from tolcontact.symbolic import ENTRIES, Program
+from tolcontact.symbolic import ENTRIES, Program, round_pairs
 from tolcontact.vocabulary import BLOCK_ROWS
+
+CURVED_ROWS, LEAST_ROWS = 512, 16
+LARGE = 24  # bodies that are coupled; a whole block of more would take longer than some ten seconds
 
 
 def simulate_blocks(
-    program: Program, *, samples: int, seed: int, start: int = 0, block: int = BLOCK_ROWS, threads: int | None = None
+    program: Program, *, samples: int, seed: int, start: int = 0, block: int | None = None, threads: int | None = None
 ) -> Iterator[Block]:
-    """Realizations `start` to `samples` in blocks, in order. The realization k is the same in any run.
+    """Realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
+
+    The realization k is the same in any run.
 
     At most two blocks for each of the `threads` (by default one for each processor) are in memory.
     """
-    threads = threads or processors()
+    threads, block = threads or processors(), block or block_rows(program)
     firsts = range(start, samples, block)
     originals = [ContactResolver(program, group) for group in program.groups]
     idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(firsts)))]
@@ -54,6 +59,21 @@ def simulate_blocks(
             yield finish_one()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # where all went well none is left; a stopped run does not wait
+
+
+def block_rows(program: Program) -> int:
+    """Realizations that are simulated together: a power of two, and fewer where one of them takes long.
+
+    What it takes grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
+    should end within seconds: then it is safe, and somebody who waits sees it.
+    """
+    bodies = max((len(group.group.free) for group in program.groups), default=0)
+    rows = BLOCK_ROWS
+    if program.method.resolution == "exact" and any(round_pairs(program.nominal, group.group) for group in program.groups):
+        rows = CURVED_ROWS
+    while rows > LEAST_ROWS and rows * bodies**3 > BLOCK_ROWS * LARGE**3:
+        rows //= 2
+    return rows
 
 
 def processors() -> int:

@@ -1,5 +1,6 @@
 """The compiled model: built once, called by name for blocks of realizations, read by name."""
 
+import logging
 from dataclasses import dataclass
 
 import casadi as ca
@@ -21,6 +22,8 @@ from tolcontact.symbolic.plugins import Plugin, plugin
 from tolcontact.symbolic.pose import ENTRIES, poses_of, relative
 from tolcontact.symbolic.quiet import MAKING, quiet
 from tolcontact.symbolic.tape import record
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +83,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         gaps = tuple(gap_map(gap_matrix(pair), stand_out=pair.locators is not None) for pair in nominal.pairs)
         if method.objective == "seating":
             _check_forces(nominal, groups)
+        log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
             method=method,

@@ -1,0 +1,163 @@
+"""Archives that were damaged, or made to mislead: one message, and nothing else happens."""
+
+import subprocess
+import sys
+
+import netCDF4
+import numpy as np
+import pytest
+import trimesh
+import xarray as xr
+
+import tolcontact as tc
+from models import ra1
+from tests.hostile import HOSTILE, make
+from tests.test_taking import COMMAND
+from tolcontact import vocabulary
+from tolcontact.archive import inspection
+from tolcontact.errors import ArchiveError
+
+HARMLESS = ("type of free length", "declared_at is an escape")  # what is never read, and what is shown as it is written
+NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    path = tmp_path_factory.mktemp("good") / "ra1.nc"
+    tc.run(ra1.assembly, samples=5000, solver="daqp", out=path, surfaces=4).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def program():
+    return tc.build(ra1.assembly, solver="daqp")
+
+
+@pytest.fixture
+def near(monkeypatch):
+    """The inspection in this process: without starting another one, some hundred files take seconds."""
+    monkeypatch.setattr(inspection, "run_child", lambda _script, path, **_: inspection._look(inspection.Path(path)))
+
+
+@pytest.mark.usefixtures("near")
+@pytest.mark.parametrize("name", HOSTILE)
+def test_an_archive_with_a_lie_is_refused_in_one_line(name, good, program, tmp_path):
+    path = tmp_path / "hostile.nc"
+    make(good, path, name)
+    before, refused = path.read_bytes(), []
+    for use in (lambda: tc.summarize(path), lambda: tc.model_of(tc.open_archive(path)), lambda: resume(program, path)):
+        try:
+            use()
+        except ArchiveError as error:
+            refused.append(str(error))
+            assert "\n" not in str(error) and "\x1b" not in str(error) and len(str(error)) < 1000
+            assert path.read_bytes() == before
+    assert refused or name in HARMLESS
+
+
+def resume(program, path):
+    tc.run(program, samples=5000, out=path, resume=True, surfaces=4).close()
+
+
+@pytest.mark.parametrize("name", ["runs tests", "title is an escape", "claims 1e12 realizations", "is deep"])
+def test_the_command_refuses_with_code_2(name, good, tmp_path):
+    path = tmp_path / "hostile.nc"
+    make(good, path, name)
+    code = "import sys, tolcontact as tc; tc.model_of(tc.open_archive(sys.argv[1]))"
+    done = subprocess.run([*COMMAND, "summary", path], capture_output=True, text=True, check=False, timeout=30)
+    model = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=False, timeout=30)
+    assert "Traceback" not in done.stderr and "\x1b" not in done.stdout + done.stderr
+    assert done.returncode == (0 if name in ("runs tests",) else 2), done.stderr
+    assert "ArchiveError" in model.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.usefixtures("near")
+def test_a_damaged_file_is_refused_or_says_what_it_said(seed, good, program, tmp_path):
+    """Bytes changed anywhere, among the headers, or cut off: no other numbers ever."""
+    rng = np.random.default_rng(seed)
+    path, content = tmp_path / "damaged.nc", bytearray(good.read_bytes())
+    where = len(content) if seed % 2 else 60_000
+    for place in rng.integers(0, where, rng.choice([1, 4, 32])):
+        content[place] ^= int(rng.integers(1, 256))
+    path.write_bytes(content if seed % 4 else content[: rng.integers(len(content))])
+    for use in (lambda: tc.summarize(path), lambda: xr.Dataset({"model": str(tc.model_of(tc.open_archive(path)))})):
+        try:
+            found = use()
+        except ArchiveError:
+            continue
+        expected = tc.summarize(good) if "by_status" in found else xr.Dataset({"model": str(program.nominal.assembly)})
+        assert found.identical(expected)
+
+
+def test_damage_to_realizations_is_told_with_its_place(good, tmp_path):
+    path = tmp_path / "damaged.nc"
+    path.write_bytes(good.read_bytes())
+    with netCDF4.Dataset(path, "r+") as file:
+        file["measured"][4500, 1, 0] += 1e-9
+    with pytest.raises(ArchiveError, match='"measured" of realizations 4096 to 4999 is not what was written'):
+        tc.summarize(path)
+    with pytest.raises(ArchiveError, match="is not what was written"):
+        tc.run(ra1.assembly, samples=6000, solver="daqp", out=path, resume=True, surfaces=4)
+
+
+def test_a_status_that_turned_to_unfinished_does_not_hide_what_comes_behind(good, tmp_path):
+    path = tmp_path / "damaged.nc"
+    path.write_bytes(good.read_bytes())
+    with netCDF4.Dataset(path, "r+") as file:
+        file["status"][100] = vocabulary.UNFINISHED
+    with pytest.raises(ArchiveError, match="status"):
+        tc.summarize(path)
+
+
+def test_realizations_that_were_taken_from_an_archive_can_be_summarized(good, tmp_path):
+    with tc.open_archive(good) as whole:
+        some = whole.map_over_datasets(
+            lambda group: group.isel(realization=slice(100)) if "realization" in group.dims else group
+        )
+        some.to_netcdf(tmp_path / "some.nc")
+    assert tc.summarize(tmp_path / "some.nc").attrs["realizations"] == 100
+
+
+def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):
+    path = tmp_path / "first.nc"
+    with tc.open_archive(good) as tree:
+        first = tree.load().drop_nodes("surface")
+    del first.attrs["format"], first.attrs["block_rows"]
+    first.dataset = first.to_dataset().drop_vars(["row_checksum", "row_variable", "starts", "second_answers", "searched"])
+    for field in first["field"].children.values():
+        field.dataset = field.to_dataset(inherit=False).drop_vars(["realizations", "checksum", "sums_checksum"])
+    first.to_netcdf(path)
+    found, expected = tc.summarize(path), tc.summarize(good)
+    for name in ("statistic_value", "by_status", "field_extreme"):
+        assert found[name].identical(expected[name])
+    assert str(tc.model_of(tc.open_archive(path))) == str(ra1.assembly())
+    with pytest.raises(ArchiveError, match="earlier version"):
+        tc.run(ra1.assembly, samples=5000, solver="daqp", out=path, resume=True)
+
+
+def test_a_newer_format_is_named(good, tmp_path):
+    make(good, tmp_path / "newer.nc", "format is newer")
+    with pytest.raises(ArchiveError, match="has format 99; this version of tolcontact reads formats up to 2"):
+        tc.open_archive(tmp_path / "newer.nc")
+
+
+@pytest.mark.parametrize("name", [*NAMES, "part_", "part__", "sum", "vertices", "état", "e\u0301tat", "a b", "点", "x" * 200])
+def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
+    a = tc.Assembly(name)
+    below = a.part(f"{name}_", tc.Box(20, 20, 5))
+    above = a.part(name, tc.Mesh(trimesh.creation.box(bounds=[[0, 0, 0], [10, 10, 5]])), at=(5, 5, 5))
+    for part in (below, above):
+        a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=1), tolerance=0.1)
+    a.contact(name, moving=above.face("-z"), reference=below.face("+z"), points=20)
+    a.measure(name, above.point(5, 5, 5), along="z", tolerance=0.1)
+    path = tmp_path / "named.nc"
+    with tc.run(a, samples=100, solver="daqp", out=path) as results:
+        found = tc.summarize(results)
+    assert found["statistic_value"].sel(measure=name).notnull().any()
+    assert found["field_extreme"].sel(part=name).notnull().all()
+    with xr.open_datatree(path) as tree:  # without us
+        groups = {str(group.attrs["part"]): key for key, group in tree["field"].children.items()}
+        assert set(groups) == {name, f"{name}_"} and len(set(groups.values())) == 2
+    assert str(tc.model_of(tc.open_archive(path))) == str(a)
+    tc.run(a, samples=200, solver="daqp", out=path, resume=True).close()
