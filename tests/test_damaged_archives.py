@@ -17,6 +17,7 @@ from tolcontact import vocabulary
 from tolcontact.archive import inspection
 from tolcontact.errors import ArchiveError
 
+CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
 HARMLESS = ("type of free length", "declared_at is an escape")  # what is never read, and what is shown as it is written
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
@@ -40,7 +41,7 @@ def near(monkeypatch):
 
 
 @pytest.mark.usefixtures("near")
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [name for name in HOSTILE if name not in CRASHES])
 def test_an_archive_with_a_lie_is_refused_in_one_line(name, good, program, tmp_path):
     path = tmp_path / "hostile.nc"
     make(good, path, name)
@@ -59,7 +60,7 @@ def resume(program, path):
     tc.run(program, samples=5000, out=path, resume=True, surfaces=4).close()
 
 
-@pytest.mark.parametrize("name", ["runs tests", "title is an escape", "claims 1e12 realizations", "is deep"])
+@pytest.mark.parametrize("name", ["runs tests", "title is an escape", "claims 1e12 realizations", "is deep", *CRASHES])
 def test_the_command_refuses_with_code_2(name, good, tmp_path):
     path = tmp_path / "hostile.nc"
     make(good, path, name)
