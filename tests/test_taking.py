@@ -16,7 +16,7 @@ from tests import cases
 from tolcontact.archive import writer
 from tolcontact.errors import ArchiveError
 
-COMMAND = [sys.executable, "-c", "from tolcontact.cli import command_line; command_line()"]
+COMMAND = [sys.executable, "-m", "tolcontact"]
 MODEL = """
 import sys
 sys.path.insert(0, {root!r})

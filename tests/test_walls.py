@@ -27,7 +27,7 @@ NOT_IN = {"xarray": ("assembly/", "symbolic/", "discretization/", "simulation/")
 ORDER = (
     "errors", "child", "vocabulary", "checksums", "method", "poses", "assembly", "script", "discretization",
     "symbolic", "sampling", "simulation", "statistics", "archive", "forecasting", "running", "comparing", "report", "cli",
-    "__init__",
+    "__init__", "__main__",
 )  # fmt: skip
 
 

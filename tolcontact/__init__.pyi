@@ -1,6 +1,6 @@
 from .archive import model_of, open_archive
 from .assembly import Assembly, Box, Brep, Facing, Inside, Locator, Mesh, Near, Tolerance, three_two_one
-from .cli import main
+from .cli import command_line, main
 from .comparing import compare
 from .errors import TolcontactError
 from .method import Method
@@ -19,6 +19,7 @@ __all__ = [
     "TolcontactError",
     "Tolerance",
     "build",
+    "command_line",
     "compare",
     "main",
     "model_of",
