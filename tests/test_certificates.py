@@ -11,15 +11,15 @@ from studies.certificates.scenes import scene
 from tests import cases
 from tests.test_contact import R_t, simulate
 from tolcontact import poses as pose
+from tolcontact.compilation import plugins, usable_plugins
+from tolcontact.compilation.plugins import PLUGINS, Plugin
+from tolcontact.compilation.polishing import polished
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.overlap import overlap_corners
-from tolcontact.discretization.solids import shape
+from tolcontact.discretization.shapes import shape
 from tolcontact.errors import ContactWarning, OptionError
 from tolcontact.simulation import CORRECTED, RAW, Status
-from tolcontact.symbolic import plugins, usable_plugins
-from tolcontact.symbolic.plugins import PLUGINS, Plugin
-from tolcontact.symbolic.polishing import polished
 
 SEATED = tc.Method(objective="seating", resolution="exact")
 SOLVERS = ("daqp", "qpoases")

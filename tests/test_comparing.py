@@ -9,7 +9,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.test_bad_input import call
-from tolcontact.comparing import compare
+from tolcontact.workflow.compare import compare
 
 
 def test_solvers_that_agree_are_said_to_agree():

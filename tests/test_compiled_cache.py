@@ -12,7 +12,7 @@ import tolcontact
 
 SCRIPT = """
 import numpy as np
-from tolcontact.simulation import kernel
+from tolcontact.statistics import kernel
 powers = np.zeros((4, 3))
 kernel.add_magnitudes(np.ones((2, 3, 4)), np.ones((3, 3)), np.zeros(3), powers)
 assert np.allclose(powers[1], 96), powers
@@ -55,7 +55,7 @@ def finish(begun):
 
 
 def cached(site, kind):
-    (file,) = (site / "tolcontact/simulation/__pycache__").glob(f"kernel.add_magnitudes-*.{kind}")
+    (file,) = (site / "tolcontact/statistics/__pycache__").glob(f"kernel.add_magnitudes-*.{kind}")
     return file
 
 
@@ -88,13 +88,13 @@ def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(installed, tmp_pa
 
 
 def test_without_a_place_to_write_it_compiles_anew(installed):
-    shutil.rmtree(installed / "tolcontact/simulation/__pycache__")
-    (installed / "tolcontact/simulation/__pycache__").write_text("in the way")
+    shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
+    (installed / "tolcontact/statistics/__pycache__").write_text("in the way")
     assert call(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
 
 
 def test_several_processes_may_begin_at_once(installed):
-    shutil.rmtree(installed / "tolcontact/simulation/__pycache__")
+    shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
     begun = [start(installed) for _ in range(4)]
     assert all(sum(finish(one)) == 1 for one in begun)
     assert call(installed) == (1, 0)

@@ -7,18 +7,19 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
+from tolcontact.compilation import contact_qp as contact_program
+from tolcontact.compilation.functions import batch
+from tolcontact.compilation.functions.batch import Mapped
+from tolcontact.compilation.functions.native import OPERATIONS, Native, UnknownInstructionError
+from tolcontact.compilation.plugins import plugin
+from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import discretize
-from tolcontact.sampling import draw
+from tolcontact.mechanics.gap import gap_matrix
+from tolcontact.mechanics.gap_map import gap_map
+from tolcontact.mechanics.groups import contact_groups
 from tolcontact.simulation import RAW, Status, simulate_blocks
-from tolcontact.simulation.run import _observe, simulate_block
-from tolcontact.simulation.scan import PairScan, pair_scan
-from tolcontact.symbolic import batch, contact_program
-from tolcontact.symbolic.batch import Mapped
-from tolcontact.symbolic.gap import gap_matrix
-from tolcontact.symbolic.gap_map import gap_map
-from tolcontact.symbolic.groups import contact_groups
-from tolcontact.symbolic.native import OPERATIONS, Native, UnknownInstructionError
-from tolcontact.symbolic.plugins import plugin
+from tolcontact.simulation.blocks import _observe, simulate_block
+from tolcontact.variation.draws import draw
 
 RNG = np.random.default_rng(5)
 MODELS = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}

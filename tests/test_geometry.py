@@ -13,8 +13,8 @@ from tests.test_contact import simulate
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.reading import MAX_TRIANGLES, STEP_CHORD
-from tolcontact.discretization.solids import shape
+from tolcontact.discretization.shape_files.reading import MAX_TRIANGLES, STEP_CHORD
+from tolcontact.discretization.shapes import shape
 from tolcontact.errors import UnitsWarning
 from tolcontact.simulation import CORRECTED
 from tolcontact.statistics import intervals

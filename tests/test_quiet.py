@@ -10,8 +10,8 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.symbolic import usable_plugins
-from tolcontact.symbolic.quiet import quiet
+from tolcontact.compilation import usable_plugins
+from tolcontact.mechanics.quiet import quiet
 
 
 @pytest.mark.parametrize("solver", usable_plugins())
@@ -77,7 +77,7 @@ def test_it_runs_without_streams():
 
 PRINTING = """
 import threading
-from tolcontact.symbolic.quiet import quiet
+from tolcontact.mechanics.quiet import quiet
 done = threading.Event()
 def muffle():
     while not done.is_set():

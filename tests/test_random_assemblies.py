@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 import tolcontact as tc
 from tests import referee
 from tests.test_contact import R_t, simulate
+from tolcontact.compilation import ACCURACY
 from tolcontact.method import OBJECTIVES
 from tolcontact.simulation import CORRECTED, RAW, Status
-from tolcontact.symbolic import ACCURACY
 
 lengths = st.floats(2, 50)
 ranges = st.sampled_from([0.0, 0.01, 0.1, 1.0])

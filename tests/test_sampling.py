@@ -7,7 +7,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.sampling import STREAM, draw
+from tolcontact.variation.draws import STREAM, draw
 
 SHAPES = {
     "normal": stats.norm(0, 0.5),

@@ -5,8 +5,8 @@ import os
 
 import pytest
 
+from tolcontact.declaration.script import load_model
 from tolcontact.errors import ScriptError
-from tolcontact.script import load_model
 
 BODY = """import tolcontact as tc
 

@@ -20,7 +20,7 @@ from tests.step_files import Step, corners
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.solids import shape
+from tolcontact.discretization.shapes import shape
 
 BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])
 STL, ASCII_STL = BLOCK.export(file_type="stl"), BLOCK.export(file_type="stl_ascii").encode()
@@ -124,7 +124,7 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
 
 def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path, monkeypatch):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
-    monkeypatch.setattr("tolcontact.discretization.reader.MEMORY", 350 * 2**20)
+    monkeypatch.setattr("tolcontact.discretization.shape_files.reader.MEMORY", 350 * 2**20)
     assert "takes more than 0.342 GiB of memory" in refusal(tmp_path / "fine.obj")
 
 

@@ -12,10 +12,10 @@ from scipy import stats
 
 import tolcontact as tc
 from tolcontact.archive.header import declaration
-from tolcontact.assembly import tape
-from tolcontact.assembly.document import from_document
+from tolcontact.declaration import tape
+from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError, ModelError
-from tolcontact.symbolic import tape as symbolic_tape
+from tolcontact.mechanics import tape as symbolic_tape
 
 DAMAGED = "^the declared model in the archive is damaged: "
 

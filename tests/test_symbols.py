@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.symbolic.correction import Carried, increments, linear, published, rigid
-from tolcontact.symbolic.gap import gap_matrix
-from tolcontact.symbolic.objective import displacement_energy, moment_table
-from tolcontact.symbolic.pose import Pose, rotation
-from tolcontact.symbolic.tape import record, replay
+from tolcontact.mechanics.correction import Carried, increments, linear, published, rigid
+from tolcontact.mechanics.displacement import displacement_energy, moment_table
+from tolcontact.mechanics.gap import gap_matrix
+from tolcontact.mechanics.pose import Pose, rotation
+from tolcontact.mechanics.tape import record, replay
 
 RNG = np.random.default_rng(7)
 

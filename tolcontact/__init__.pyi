@@ -1,10 +1,9 @@
 from .archive import model_of, open_archive
-from .assembly import Assembly, Box, Brep, Facing, Inside, Locator, Mesh, Near, Tolerance, three_two_one
 from .cli import command_line, main
-from .comparing import compare
+from .declaration import Assembly, Box, Brep, Facing, Inside, Locator, Mesh, Near, Tolerance, three_two_one
 from .errors import TolcontactError
 from .method import Method
-from .running import build, run, summarize
+from .workflow import build, compare, run, summarize
 
 __all__ = [
     "Assembly",

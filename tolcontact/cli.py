@@ -24,16 +24,16 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from tolcontact.archive import open_archive, taken
-from tolcontact.assembly import Assembly
-from tolcontact.comparing import compare as compare_solvers
+from tolcontact.declaration import Assembly
+from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
 from tolcontact.report import comparison_text, grouped, summary_text
-from tolcontact.running import DEFAULT_SOLVER, SURFACES, build, summarize
-from tolcontact.running import run as run_model
-from tolcontact.script import load_model
 from tolcontact.simulation import Status
 from tolcontact.vocabulary import KEPT
+from tolcontact.workflow.compare import compare as compare_solvers
+from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, build, summarize
+from tolcontact.workflow.run import run as run_model
 
 FAILED_SHARE = 0.001
 UNBOUNDED = 10_000  # columns of what is no terminal

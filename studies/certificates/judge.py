@@ -14,9 +14,9 @@ import trimesh
 
 import tolcontact as tc
 from studies.certificates.scenes import scene
+from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.simulation import CORRECTED, RAW, Block, Status, simulate_blocks
-from tolcontact.symbolic import Program
 
 SOLVERS = ("daqp", "qpoases")
 LOOKED_AT = 4  # realizations whose surfaces are looked at

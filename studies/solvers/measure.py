@@ -27,10 +27,11 @@ import qpsolvers
 from scipy.optimize import nnls
 
 import tolcontact as tc
-from tolcontact.sampling import draw
-from tolcontact.simulation.run import simulate_block
-from tolcontact.symbolic import contact_program, contact_solver, plugins
-from tolcontact.symbolic.batch import quiet
+from tolcontact.compilation import contact_qp as contact_program
+from tolcontact.compilation import contact_solver, plugins
+from tolcontact.compilation.functions.batch import quiet
+from tolcontact.simulation.blocks import simulate_block
+from tolcontact.variation.draws import draw
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -23,11 +23,11 @@ import shapes
 
 import tolcontact as tc
 from tolcontact.archive import ArchiveWriter
-from tolcontact.sampling import draw
-from tolcontact.simulation import run as running
+from tolcontact.compilation.functions import batch
+from tolcontact.contact.scan import CompiledScan
+from tolcontact.simulation import blocks as running
 from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.scan import CompiledScan
-from tolcontact.symbolic import batch
+from tolcontact.variation.draws import draw
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt

@@ -13,12 +13,12 @@ import numpy as np
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import nothing_checked
 from tolcontact.archive.variables import define, lay_out, write
-from tolcontact.assembly import Mesh
-from tolcontact.assembly.document import to_document
+from tolcontact.compilation import ACCURACY, Program
+from tolcontact.declaration import Mesh
+from tolcontact.declaration.document import to_document
 from tolcontact.discretization import Nominal
-from tolcontact.simulation.run import block_rows
+from tolcontact.simulation.blocks import block_rows
 from tolcontact.statistics import FieldMoments
-from tolcontact.symbolic import ACCURACY, Program
 from tolcontact.vocabulary import Variable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")

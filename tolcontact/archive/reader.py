@@ -9,8 +9,8 @@ import xarray as xr
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.inspection import inspect
-from tolcontact.assembly import Assembly
-from tolcontact.assembly.document import from_document
+from tolcontact.declaration import Assembly
+from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
 
 

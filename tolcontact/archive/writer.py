@@ -22,16 +22,16 @@ from tolcontact.archive.checked import archived_poses, choose, nothing_checked
 from tolcontact.archive.header import kept_rows, no_field, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.reader import opened
+from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.room import check_room, lay_out_rows
 from tolcontact.archive.rows import check_rows
-from tolcontact.archive.same_run import check_same_run
 from tolcontact.archive.variables import overwrite
 from tolcontact.checksums import crc32
+from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal, NominalPart, movers
 from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments
-from tolcontact.symbolic import Program
 
 FIRST_ROWS = 12 * words.BLOCK_ROWS  # that there is room for from the beginning
 FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be

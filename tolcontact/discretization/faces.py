@@ -6,9 +6,9 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tolcontact.assembly import Brep, Face, Facing, Inside, Near, Part, Picked, Triangles
+from tolcontact.declaration import Brep, Face, Facing, Inside, Near, Part, Picked, Triangles
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.reading import BREP
+from tolcontact.discretization.shape_files.reading import BREP
 from tolcontact.discretization.surface import Surface
 
 NEAR_STATIONS = 100

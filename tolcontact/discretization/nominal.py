@@ -12,18 +12,18 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tolcontact.assembly import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
+from tolcontact.declaration import Assembly, ContactPair, Face, Locator, Measure, Part, Point, ThreeTwoOne, Tolerance
 from tolcontact.discretization.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
+from tolcontact.discretization.doubtful_sizes import warn_of_units
 from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.layout import lay_out
 from tolcontact.discretization.overlap import overlap_corners, rim_points
-from tolcontact.discretization.reading import read_files
-from tolcontact.discretization.solids import field_surface, shape
+from tolcontact.discretization.shape_files.reading import read_files
+from tolcontact.discretization.shapes import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
-from tolcontact.discretization.units import warn_of_units
+from tolcontact.discretization.three_two_one import lay_out
 from tolcontact.errors import ContactWarning, ModelError
 
 CONDITION_LIMIT = 1e8

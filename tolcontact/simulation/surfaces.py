@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.sampling import draw
+from tolcontact.compilation import Program
 from tolcontact.simulation.block import CORRECTED
-from tolcontact.simulation.run import simulate_block
-from tolcontact.symbolic import Program
+from tolcontact.simulation.blocks import simulate_block
+from tolcontact.variation.draws import draw
 
 TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 

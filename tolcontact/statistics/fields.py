@@ -6,8 +6,7 @@ those. Its magnitude is not: its powers are summed up as realizations pass.
 
 import numpy as np
 
-from tolcontact.simulation import kernel
-from tolcontact.statistics import intervals
+from tolcontact.statistics import intervals, kernel
 
 SOME = 256  # realizations whose mean magnitude is near enough to that of all
 

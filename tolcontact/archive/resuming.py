@@ -1,0 +1,50 @@
+"""Whether an archive holds the run that is to be resumed."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as words
+from tolcontact.archive.header import contact_values, declaration
+from tolcontact.compilation import Program
+from tolcontact.errors import ArchiveError
+
+SAME = 1e-9  # mm: points may differ by rounding from one machine to the next
+
+
+def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
+    """Raise ArchiveError where the archive `there`, in the file `path`, is of another model or another run."""
+    if getattr(there, "format", 1) != words.FORMAT:
+        raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
+    if not there.dimensions[words.REALIZATION].isunlimited():
+        raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
+    if _comparable(str(there["model"][words.DECLARATION.name][...])) != _comparable(declaration(program)):
+        raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
+    for part in program.nominal.parts:
+        if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
+            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    for variable, values in contact_values(program.nominal).items():
+        if not _same(there["contact"][variable.name], values):
+            raise ArchiveError(f'"{path}": contact points were others (by {there.versions}); write to a new file')
+    for word, value in settings.items():
+        was = getattr(there, word, None)
+        if word != "samples" and was != value:
+            raise ArchiveError(
+                f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
+            )
+    room = len(there["surface"].dimensions[words.CHECKED])
+    if room != surfaces:
+        raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
+
+
+def _comparable(declared: str) -> Any:
+    """A declaration without the lines of the script in which its items stand."""
+    return json.loads(declared, object_hook=lambda item: {word: item[word] for word in item if word != "declared_at"})
+
+
+def _same(stored: netCDF4.Variable, values: Any) -> bool:
+    return stored.shape == np.shape(values) and np.allclose(stored[...], values, rtol=0, atol=SAME)

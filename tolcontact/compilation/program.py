@@ -1,0 +1,123 @@
+"""The compiled model: built once, called by name for blocks of realizations, read by name."""
+
+import logging
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.compilation.contact_qp import ContactProgram, contact_program
+from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.compilation.functions.batch import Batch
+from tolcontact.compilation.plugins import Plugin, plugin
+from tolcontact.declaration.tape import Tape
+from tolcontact.discretization import Nominal
+from tolcontact.errors import ModelError
+from tolcontact.mechanics.gap import gap_matrix
+from tolcontact.mechanics.gap_map import GapMap, gap_map
+from tolcontact.mechanics.groups import Group, contact_groups
+from tolcontact.mechanics.measures import measured
+from tolcontact.mechanics.placement import raw_poses
+from tolcontact.mechanics.pose import ENTRIES, poses_of, relative
+from tolcontact.mechanics.quiet import MAKING, quiet
+from tolcontact.mechanics.tape import record
+from tolcontact.method import Method
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, eq=False)
+class ContactGroup:
+    """A group of coupled parts and its QP (see contact_program)."""
+
+    group: Group
+    program: ContactProgram
+    solve: ContactSolver
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
+
+    place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
+    observe      poses -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
+    gaps         one per pair: its gaps at X_RM
+    groups       the contact QPs
+    nominal_measures  values of the measures in the nominal assembly
+    tapes        the users' own expressions by measure name
+    """
+
+    nominal: Nominal
+    method: Method
+    plugin: Plugin
+    place: Batch
+    observe: Batch
+    gaps: tuple[GapMap, ...]
+    groups: tuple[ContactGroup, ...]
+    nominal_measures: np.ndarray
+    tapes: dict[str, Tape]
+
+
+def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
+    """Build all Functions of a model.
+
+    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or where the objective
+    is seating for forces that are missing or move nothing.
+    """
+    with MAKING:  # which also calls users' functions, that may print
+        with quiet():
+            chosen = plugin(solver)
+        d = ca.SX.sym("deviations", len(nominal.locator_labels))
+        raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
+        entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
+        poses = poses_of(entries)
+        values = measured(nominal, poses)
+        X_RM = [
+            (poses[pair.moving] if pair.reference is None else relative(poses[pair.moving], poses[pair.reference])).vector()
+            for pair in nominal.pairs
+        ]
+        observe = ca.Function(
+            "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
+        )
+        groups = contact_groups(nominal)
+        gaps = tuple(gap_map(gap_matrix(pair), stand_out=pair.locators is not None) for pair in nominal.pairs)
+        if method.objective == "seating":
+            _check_forces(nominal, groups)
+        log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
+        return Program(
+            nominal=nominal,
+            method=method,
+            plugin=chosen,
+            place=Batch(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
+            observe=Batch(observe),
+            gaps=gaps,
+            groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
+            nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
+            tapes={
+                measure.name: record(value, entries)
+                for measure, value in zip(nominal.measures, values, strict=True)
+                if not measure.points
+            },
+        )
+
+
+def _ready(group: Group, program: ContactProgram) -> ContactGroup:
+    return ContactGroup(group, program, ContactSolver(program))
+
+
+def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
+    moved = {part for group in groups for part, carried in zip(group.parts, group.carried, strict=True) if carried.movers}
+    faults = [
+        f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
+        "leave the force out, or declare the part free and its contacts"
+        for force in nominal.assembly.forces
+        if nominal.part_index(force.at.part) not in moved
+    ]
+    if not nominal.assembly.forces:
+        faults = ['nothing presses its parts, but the objective is "seating"; declare a force with assembly.force(...)']
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+
+
+def _at_rest(parts: int) -> np.ndarray:
+    return np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), parts)

@@ -1,0 +1,1 @@
+"""Resolve contact: which points touch, and where the parts come to rest."""

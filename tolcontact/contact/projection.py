@@ -1,0 +1,61 @@
+"""Contact search at poses other than the nominal one: paper, 2.2, last sentence."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from tolcontact import poses as pose
+from tolcontact.contact.scan import PairScan
+from tolcontact.discretization.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class FoundScan(PairScan):
+    """A scan in which every realization has feet of its own.
+
+    feet, normals    (realization, point, 3): P^r and n^r, nominal
+    over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
+    """
+
+    feet: np.ndarray
+    normals: np.ndarray
+    over: np.ndarray
+
+    def take(self, rows: np.ndarray) -> "FoundScan":
+        return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
+
+    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        apart = pose.apply(relative, self.P_m) - self.feet
+        n = self.normals
+        gaps = n[..., 0] * apart[..., 0] + n[..., 1] * apart[..., 1] + n[..., 2] * apart[..., 2]
+        return np.where(self.over, gaps, np.inf)
+
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        chosen = points[..., None]
+        return self.P_m[points], *(np.take_along_axis(values, chosen, axis=1) for values in (self.feet, self.normals))
+
+
+def reach(scan: PairScan) -> float:
+    """How far a contact point stands for its surroundings [mm]: half the usual distance of two of them."""
+    if len(scan.P_m) < 2:
+        return 0.0
+    distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)
+    return float(np.median(distance[:, 1])) / 2
+
+
+def search(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin: float) -> PairScan:
+    """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
+
+    Points that overhang the rim by up to `margin` [mm] still count: else those at the rim would come and go with every step.
+    """
+    if surface is None:
+        return scan
+    shape = (len(relative), len(scan.P_m), 3)
+    feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
+    return FoundScan(
+        **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
+        feet=feet.reshape(shape),
+        normals=normals.reshape(shape),
+        over=over.reshape(shape[:2]),
+    )

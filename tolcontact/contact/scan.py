@@ -1,0 +1,213 @@
+"""Gaps of the contact points of a pair, what is active, and which points deserve a row of the QP.
+
+Sums run over points in a fixed order, one realization independent of the others, so that results do not depend on
+how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
+"""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from tolcontact.contact import kernel
+from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics import MOMENTS, GapMap
+
+SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
+BEYOND = 1e300  # where no point is
+
+
+@dataclass(frozen=True, eq=False)
+class PairScan:
+    """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
+
+    basis              (13, r), and
+    coordinates        (r, point): gaps [mm] = [X_RM, 1] @ basis @ coordinates
+    tables             moment tables (moment, point) of the sides that enter the objective
+    P_m, P_r, n_r      (point, 3)
+    locators           columns of the deviations by which points stand out, (point,); None where none does
+    leaves             (leaf + 1,): the first point of each leaf, and the end
+    branches           (branch + 1,): the first leaf of each branch, and the end
+    clusters           (cluster + 1,): the first branch of each cluster, and the end
+    """
+
+    basis: np.ndarray
+    coordinates: np.ndarray
+    tables: tuple[np.ndarray, ...]
+    P_m: np.ndarray
+    P_r: np.ndarray
+    n_r: np.ndarray
+    locators: np.ndarray | None
+    leaves: np.ndarray
+    branches: np.ndarray
+    clusters: np.ndarray
+
+    def take(self, rows: np.ndarray) -> "PairScan":
+        """The scan for some of the realizations: here all have the same contact points."""
+        return self
+
+    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
+        slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
+        for entry, row in zip(relative.T, self.basis, strict=False):
+            slopes += entry[:, None] * row
+        result = np.repeat(slopes[:, :1], self.coordinates.shape[1], axis=1)
+        term = np.empty_like(result)
+        for slope, row in zip(slopes.T[1:], self.coordinates[1:], strict=True):
+            result += np.multiply(slope[:, None], row, out=term)
+        return result if self.locators is None else result - deviations[:, self.locators]
+
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
+        P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
+        if self.locators is None:
+            return P_m, P_r, n_r
+        height = np.take_along_axis(deviations, self.locators[points], axis=1)
+        return P_m, P_r + height[..., None] * n_r, n_r
+
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
+        """The number of points whose gap is below `activity` (realization,), and their moments (realization, side, moment)."""
+        active = self.gaps(relative, deviations) < activity
+        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
+        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
+        return active.sum(axis=1), moments
+
+    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """The least gap of all points (realization,) [mm]."""
+        return np.asarray(self.gaps(relative, deviations).min(axis=1))
+
+    def deepest(
+        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The deepest point of each cluster and its depth, both (realization, cluster) [mm]; depth 0 where none is inside.
+
+        Only points where `may_carry` (realization, point) holds are looked at, if it is given.
+        """
+        gaps = np.minimum(self.gaps(relative, deviations), 0)
+        if may_carry is not None:
+            gaps = np.where(may_carry, gaps, 0)
+        firsts = self.leaves[self.branches[self.clusters]]
+        points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
+        return points, -np.take_along_axis(gaps, points, axis=1)
+
+
+class CompiledScan(PairScan):
+    """A scan whose passes are compiled; PairScan is the same in NumPy."""
+
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
+        count = len(relative)
+        active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        flat = moments.reshape(count, len(self._tables))
+        kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
+        return active, moments
+
+    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
+
+    def deepest(
+        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        points, gaps = self._deepest(self.clusters, relative, deviations, may_carry, 0.0)
+        return points, -gaps
+
+    def _deepest(
+        self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, below: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
+        gaps = np.empty(points.shape)
+        poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
+        mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
+        kernel.deepest(self._points, clusters, poses, heights, mask, below, points, gaps)
+        return points, gaps
+
+    @cached_property
+    def _points(self) -> tuple[Any, ...]:
+        """What the kernel knows of the points. The height of a point that stands out is not bounded."""
+        rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0)
+        boxes = []
+        for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
+            low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
+            boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
+        columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
+        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes, np.inf if columns.size else 0.0
+
+    @cached_property
+    def _tables(self) -> np.ndarray:
+        """(side * moment, point)."""
+        return np.array(self.tables).reshape(len(self.tables) * MOMENTS, len(self.P_m))
+
+    @cached_property
+    def _sums(self) -> tuple[np.ndarray, np.ndarray]:
+        """Summed moments of the leaves and of the branches, (leaf, side * moment) and (branch, side * moment)."""
+        of_leaves = np.ascontiguousarray(np.add.reduceat(self._tables, self.leaves[:-1], axis=1).T)
+        return of_leaves, np.add.reduceat(of_leaves, self.branches[:-1], axis=0)
+
+
+def pair_scan(
+    pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, chosen: np.ndarray | None = None
+) -> PairScan:
+    """Sort the points of a pair, or some `chosen` ones, into clusters of neighbours, at most so many; and those into
+    branches and leaves.
+
+    Supports have a cluster each.
+    """
+    chosen = np.arange(len(pair.P_m)) if chosen is None else chosen
+    label = _cluster(pair.P_m[chosen], clusters if pair.locators is None else len(chosen))
+    along = np.roll(gaps.coordinates, -1, axis=0)  # largest extents first, the constant last
+    found = [_leaves(chosen[label == one], along) for one in range(label.max() + 1)]
+    leaves = [leaf for cluster in found for leaf in cluster]
+    order = np.concatenate(leaves)
+    ends = np.cumsum([0, *map(len, found)])
+    firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
+    return CompiledScan(
+        basis=gaps.basis,
+        coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
+        tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
+        P_m=pair.P_m[order],
+        P_r=pair.P_r[order],
+        n_r=pair.n_r[order],
+        locators=None if pair.locators is None else pair.locators[order],
+        leaves=np.cumsum([0, *map(len, leaves)]),
+        branches=np.concatenate([*firsts, [len(leaves)]]),
+        clusters=np.cumsum([0, *map(len, firsts)]),
+    )
+
+
+def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
+    """Halve `points` across their longest extent until no part has more than LEAF of them; neighbours stay together.
+
+    All leaves but one are full: what is missing to a power of two stands beyond all points, and is left out in the end.
+    """
+    count, size = len(points), kernel.LEAF
+    while size < count:
+        size *= 2
+    padded = np.concatenate([coordinates[:, points], np.full((len(coordinates), size - count), BEYOND)], axis=1)
+    parts = np.arange(size).reshape(1, size)
+    while parts.shape[1] > kernel.LEAF:
+        of = padded.take(parts, axis=1)
+        widest = (of.max(axis=2) - of.min(axis=2)).argmax(axis=0)
+        order = np.argpartition(of[widest, np.arange(len(parts))], parts.shape[1] // 2, axis=1)
+        parts = np.take_along_axis(parts, order, axis=1).reshape(2 * len(parts), -1)
+    return [points[leaf[leaf < count]] for leaf in parts[(parts < count).any(axis=1)]]
+
+
+def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
+    """Each point joins the nearest of `clusters` points that lie as far apart as possible."""
+    if len(points) <= clusters:
+        return np.arange(len(points))
+    label = np.zeros(len(points), dtype=int)
+    nearest = ((points - points.mean(axis=0)) ** 2).sum(axis=1)
+    for number in range(clusters):
+        distance = ((points - points[nearest.argmax()]) ** 2).sum(axis=1)
+        nearer = distance < nearest if number else np.ones(len(points), dtype=bool)
+        label[nearer], nearest[nearer] = number, distance[nearer]
+    return np.unique(label, return_inverse=True)[1]
+
+
+def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    """Least gap (row, pair) [mm] of each pair at X_RM (row, pair, 12)."""
+    return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

@@ -1,0 +1,25 @@
+"""Positioning forces: gravity, clamps, whatever presses a part onto its supports."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from tolcontact.declaration.part import Point
+from tolcontact.declaration.vectors import Vector, is_finite
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. It counts in the objective "seating"."""
+
+    name: str
+    at: Point
+    vector: Vector
+    declared_at: str
+
+    def faults(self) -> Iterator[str]:
+        yield from self.at.faults()
+        if not (is_finite(self.vector) and any(self.vector)):
+            yield "vector is not three finite numbers [N] other than zero"
+
+    def __str__(self) -> str:
+        return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

@@ -1,0 +1,64 @@
+"""Shapes of parts, in the part's own frame."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tolcontact.declaration.vectors import is_length
+from tolcontact.errors import shown
+
+
+@dataclass(frozen=True)
+class Box:
+    """A block from the origin of its part's frame to (x, y, z) [mm]."""
+
+    x: float
+    y: float
+    z: float
+
+    def faults(self) -> Iterator[str]:
+        for axis in "xyz":
+            size = getattr(self, axis)
+            if not (is_length(size) and size > 0):
+                yield f"box size along {axis} is {size!r}; expected a length in mm above 0"
+
+    def __str__(self) -> str:
+        return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
+
+
+STEP = (".step", ".stp")
+UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
+
+    `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
+    file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
+    2 um and what single precision leaves of their coordinates, and keep their boundary representation for `tc.Brep`;
+    that needs the extra `tolcontact[step]`. A STEP file holds one body.
+    """
+
+    source: Any
+    units: str | None = None
+
+    def faults(self) -> Iterator[str]:
+        if self.units is not None and self.units not in UNITS:
+            yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
+        if self.units is not None and isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP:
+            yield f'"{self.source}" is a STEP file, which says its units itself; leave units out'
+        if isinstance(self.source, str | Path):
+            path = Path(self.source)
+            if path.is_dir():
+                yield f'"{path}" is a folder; give the path of an STL, OBJ, PLY, GLB or STEP file in it'
+            elif not path.is_file():
+                yield f'mesh file "{path}" does not exist; give the path of an STL, OBJ, PLY, GLB or STEP file'
+        elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
+            yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"
+
+    def __str__(self) -> str:
+        if isinstance(self.source, str | Path):
+            return shown(f"mesh {Path(self.source).name}")
+        return f"mesh of {len(getattr(self.source, 'faces', ()))} triangles"

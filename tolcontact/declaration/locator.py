@@ -1,0 +1,143 @@
+"""Locators: where a part is held, in which direction, and how much that varies."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tolcontact.declaration.names import repetitions, text_faults
+from tolcontact.declaration.part import Face, Part
+from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.tolerance import tolerance as _tolerance
+from tolcontact.declaration.vectors import Vector, is_finite, is_length
+from tolcontact.declaration.vectors import direction as _direction
+from tolcontact.declaration.vectors import vector as _vector
+
+
+@dataclass(frozen=True)
+class Locator:
+    """A point of a part [mm], a direction into the part, and the deviation along it; in the part's own frame.
+
+    A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
+    `one_sided` locator is a support: the part may lift off it along `direction`, and may not pass through it.
+    `stiffness` [N/mm] counts in the objective "locator stiffness".
+    """
+
+    name: str
+    point: Vector
+    direction: Vector
+    tolerance: Tolerance | None
+    one_sided: bool
+    stiffness: float
+
+    def __init__(
+        self,
+        name: str,
+        point: Any,
+        direction: Any,
+        tolerance: Any = None,
+        *,
+        one_sided: bool = False,
+        stiffness: float = 1.0,
+    ) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "point", _vector(point))
+        object.__setattr__(self, "direction", _direction(direction))
+        object.__setattr__(self, "tolerance", None if tolerance is None else _tolerance(tolerance))
+        object.__setattr__(self, "one_sided", one_sided)
+        object.__setattr__(self, "stiffness", stiffness)
+
+    def faults(self) -> Iterator[str]:
+        if not is_finite(self.point):
+            yield "point is not three finite numbers"
+        if not is_finite(self.direction):
+            yield 'direction is neither "+x" to "-z" nor a vector of three finite numbers other than zero'
+        if self.tolerance is not None:
+            yield from self.tolerance.faults()
+        if not isinstance(self.one_sided, bool):
+            yield f"one_sided is {self.one_sided!r}; expected True or False"
+        if not (is_length(self.stiffness) and self.stiffness > 0):
+            yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
+
+    def __str__(self) -> str:
+        point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
+        kind = "one-sided locator" if self.one_sided else "locator"
+        return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}"
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeTwoOne:
+    """A 3-2-1 scheme on three faces; its six points follow from the faces once their geometry is known.
+
+    A1, A2 on the primary face beside the secondary one, `inset` from its ends; A3 opposite, half way; B1, B2 on the
+    secondary face at the same two stations, half way up; C1 in the middle of the tertiary face.
+    """
+
+    primary: Face
+    secondary: Face
+    tertiary: Face
+    inset: float
+
+    @property
+    def faces(self) -> tuple[Face, Face, Face]:
+        return (self.primary, self.secondary, self.tertiary)
+
+    def faults(self) -> Iterator[str]:
+        for face in self.faces:
+            yield from face.faults()
+        if not (is_length(self.inset) and self.inset >= 0):
+            yield f"inset is {self.inset!r}; expected a length in mm, 0 or above"
+
+    def __str__(self) -> str:
+        return f"3-2-1 on {', '.join(str(face) for face in self.faces)}, {self.inset:g} mm inside the edges"
+
+
+def three_two_one(primary: Face, secondary: Face, tertiary: Face, *, inset: float = 0.0) -> ThreeTwoOne:
+    """A 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne)."""
+    return ThreeTwoOne(primary, secondary, tertiary, inset)
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """How one part is located: its locators, their common tolerance, and what they stand on (None: the ground)."""
+
+    part: Part
+    scheme: ThreeTwoOne | tuple[Locator, ...]
+    tolerance: Tolerance | None
+    on: Part | None
+    declared_at: str
+
+    @property
+    def mentioned(self) -> tuple[Part, ...]:
+        """The parts that the faces of its scheme speak of."""
+        faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
+        return tuple(part for face in faces for part in face.parts)
+
+    def faults(self) -> Iterator[str]:
+        if isinstance(self.scheme, ThreeTwoOne):
+            yield from self.scheme.faults()
+            for face in self.scheme.faces:
+                if face.part is not self.part:
+                    yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
+        else:
+            names = [locator.name for locator in self.scheme]
+            for locator in self.scheme:
+                yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
+                if locator.tolerance is None and self.tolerance is None:
+                    yield f'locator "{locator.name}" has no tolerance; give it one, or the locate call'
+            yield from text_faults("locator", names)
+            yield from repetitions("locator", names)
+            two_sided = sum(locator.one_sided is False for locator in self.scheme)
+            if len(self.scheme) < 6 or two_sided > 6:
+                yield (
+                    f"it has {len(self.scheme)} locators; a rigid part is held by exactly 6 (3-2-1 or any six independent "
+                    "directions), or by more when no more than six of them are two-sided"
+                )
+        if self.tolerance is not None:
+            yield from (f"locators: {fault}" for fault in self.tolerance.faults())
+        elif isinstance(self.scheme, ThreeTwoOne):
+            yield "its 3-2-1 scheme has no tolerance; give one to the locate call"
+
+    def __str__(self) -> str:
+        scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
+        ground = self.on.name if self.on else "the ground"
+        return f"location of {self.part.name} on {ground}: {scheme}" + (f"; {self.tolerance}" if self.tolerance else "")

@@ -1,0 +1,150 @@
+"""Criteria that pick the triangles of a face. Coordinates [mm] are those of the part's own frame."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from tolcontact.declaration.vectors import DIRECTIONS, Vector, is_finite, is_length, vector
+from tolcontact.declaration.vectors import direction as _direction
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+FACE_ANGLE = math.radians(1.0)
+
+
+class Selection(Protocol):
+    """One criterion; a face is what meets all of its criteria."""
+
+    def faults(self) -> Iterator[str]: ...
+
+
+@dataclass(frozen=True)
+class Facing:
+    """Triangles whose outward normal is within `angle` [rad] of `direction`: "+x" to "-z", or a vector."""
+
+    direction: Any
+    angle: float = FACE_ANGLE
+
+    @property
+    def axis(self) -> Vector:
+        """Unit vector."""
+        return _direction(self.direction)
+
+    def faults(self) -> Iterator[str]:
+        if not is_finite(self.axis):
+            yield (
+                f'unknown face "{self.direction}"; expected one of {", ".join(DIRECTIONS)}, a criterion such as '
+                "tc.Inside(...), triangle indices, or a function of centres and normals"
+            )
+        if not (is_length(self.angle) and 0 < self.angle < math.pi):
+            yield f"angle is {self.angle!r}; expected radians between 0 and pi"
+
+    def __str__(self) -> str:
+        if isinstance(self.direction, str):
+            return self.direction
+        return "facing ({})".format(", ".join(f"{c:g}" for c in self.axis))
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Triangles by their indices in the mesh."""
+
+    indices: tuple[int, ...]
+
+    def faults(self) -> Iterator[str]:
+        if not all(hasattr(index, "__index__") and not isinstance(index, bool) for index in self.indices):
+            yield (
+                "triangle indices must be whole numbers; for a direction that is no axis use tc.Facing((x, y, z)), for a mask "
+                "a function of centres and normals, or np.flatnonzero(mask)"
+            )
+
+    def __str__(self) -> str:
+        return f"({len(self.indices)} triangles)"
+
+
+@dataclass(frozen=True, eq=False)
+class Picked:
+    """Triangles that a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -] picks."""
+
+    function: "Picker"
+
+    def faults(self) -> Iterator[str]:
+        yield from ()
+
+    def __str__(self) -> str:
+        return "(selected)"
+
+
+@dataclass(frozen=True)
+class Inside:
+    """What lies inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there."""
+
+    lower: Vector
+    upper: Vector
+
+    def __init__(self, lower: Any, upper: Any) -> None:
+        object.__setattr__(self, "lower", vector(lower))
+        object.__setattr__(self, "upper", vector(upper))
+
+    def faults(self) -> Iterator[str]:
+        if not (is_finite(self.lower) and is_finite(self.upper)):
+            yield "a box needs two corners of three finite numbers each"
+        elif not all(low < up for low, up in zip(self.lower, self.upper, strict=True)):
+            yield f"box from {self.lower} to {self.upper} is empty; its first corner must be the lower one in x, y and z"
+
+    def __str__(self) -> str:
+        corners = ("({})".format(", ".join(f"{c:g}" for c in corner)) for corner in (self.lower, self.upper))
+        return "inside {} to {}".format(*corners)
+
+
+@dataclass(frozen=True, eq=False)
+class Near:
+    """Flat faces, and triangles of curved ones, that look at `part` and come within `within` [mm] of it nominally."""
+
+    part: Any  # a Part, whose module stands above this one
+    within: float
+
+    def faults(self) -> Iterator[str]:
+        if not (is_length(self.within) and self.within > 0):
+            yield f"within is {self.within!r}; expected a length in mm above 0"
+
+    def __str__(self) -> str:
+        return f"within {self.within:g} mm of {self.part.name}"
+
+
+@dataclass(frozen=True)
+class Brep:
+    """The face of a STEP file's boundary representation that passes through the point `at` [mm]."""
+
+    at: Vector
+
+    def __init__(self, at: Any) -> None:
+        object.__setattr__(self, "at", vector(at))
+
+    def faults(self) -> Iterator[str]:
+        if not is_finite(self.at):
+            yield "a B-rep face needs a point on it, three finite numbers"
+
+    def __str__(self) -> str:
+        return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in self.at))
+
+
+def criterion(said: Any) -> Selection:
+    """The criterion that a user means by a direction, indices, a function, or a criterion itself."""
+    if isinstance(said, str):
+        return Facing(said)
+    if isinstance(said, Facing | Triangles | Picked | Inside | Near | Brep):
+        return said
+    if callable(said):
+        return Picked(said)
+    try:
+        return Triangles(tuple(said))
+    except TypeError as error:
+        raise TypeError(
+            f'a face cannot be chosen by {said!r}; expected a direction ("+x" to "-z"), a criterion such as tc.Facing(...), '
+            "triangle indices, or a function of centres and normals"
+        ) from error

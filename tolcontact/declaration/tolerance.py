@@ -1,0 +1,92 @@
+"""How much a locator varies: a tolerance range and the distribution that fills it."""
+
+import importlib  # scipy.stats takes longer to import than all the rest: only where it is needed
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from tolcontact.declaration.vectors import is_length
+
+SHAPES = ("normal", "uniform", "triangular", "truncated normal")
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """A deviation [mm] around 0 that fills a zone of full width `range`.
+
+    normal             6 sigma = range, unbounded (the default; DESIGN.md, Tolerance to distribution)
+    uniform            between -range/2 and +range/2
+    triangular         between -range/2 and +range/2, mode 0
+    truncated normal   6 sigma = range, cut at -range/2 and +range/2
+
+    Instead of a name, `distribution` may be any frozen continuous distribution of `scipy.stats`, which then says
+    everything; leave `range` out.
+    """
+
+    range: float | None = None
+    distribution: Any = "normal"
+
+    def faults(self) -> Iterator[str]:
+        if isinstance(self.distribution, str):
+            if self.distribution not in SHAPES:
+                yield (
+                    f'unknown distribution "{self.distribution}"; expected one of {", ".join(SHAPES)}, '
+                    "or a frozen distribution of scipy.stats"
+                )
+            if not (isinstance(self.range, int | float) and math.isfinite(self.range) and self.range >= 0):
+                yield f"tolerance range is {self.range!r}; expected the full width of the zone in mm, 0 or above"
+        elif not (
+            hasattr(getattr(self.distribution, "dist", None), "pdf")
+            and hasattr(getattr(self.distribution, "dist", None), "name")
+        ):
+            yield (
+                f"distribution is a {type(self.distribution).__name__}; expected one of {', '.join(SHAPES)}, "
+                "or a frozen continuous distribution such as scipy.stats.norm(0, 0.1)"
+            )
+        elif fault := _not_archivable(self.distribution):
+            yield fault
+        elif self.range is not None:
+            yield "a range is given beside a scipy.stats distribution, which has its own width; leave the range out"
+        elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
+            yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
+
+    @property
+    def width(self) -> float:
+        """Full width of the zone [mm]: the range, or six standard deviations of a distribution that says everything."""
+        return float(6 * self.distribution.std() if self.range is None else self.range)
+
+    def __str__(self) -> str:
+        if isinstance(self.distribution, str):
+            return f"{self.distribution}, range {self.range:g} mm"
+        return f"scipy.stats.{self.distribution.dist.name}"
+
+
+def tolerance(value: Any) -> Tolerance:
+    """A Tolerance from what a user may write: a range [mm], a frozen scipy.stats distribution, or a Tolerance."""
+    if isinstance(value, Tolerance):
+        return value
+    if hasattr(value, "ppf"):
+        return Tolerance(distribution=value)
+    return Tolerance(range=value)
+
+
+def scipy_distribution(name: str) -> Any | None:
+    """The continuous distribution that scipy.stats has under that name; None where it has none."""
+    stats = importlib.import_module("scipy.stats")
+    found = getattr(stats, name, None)
+    return found if isinstance(found, stats.rv_continuous) and found.name == name else None
+
+
+def _not_archivable(frozen: Any) -> str:
+    """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty where it can."""
+    name, known = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
+    if known is None or type(frozen.dist) is not type(known):
+        return (
+            f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot hold; expected a '
+            "continuous distribution that scipy.stats has under that name"
+        )
+    for parameter in (*frozen.args, *frozen.kwds.values()):
+        if not is_length(parameter):
+            return f"a parameter of scipy.stats.{name} is {parameter}; expected finite numbers [mm]"
+    return ""

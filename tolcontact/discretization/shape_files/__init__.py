@@ -1,0 +1,5 @@
+"""Files of shapes: looked at, read in a process of their own, and told apart into bodies."""
+
+from tolcontact.discretization.shape_files.reading import BREP, Contents, Shape, read, read_files
+
+__all__ = ["BREP", "Contents", "Shape", "read", "read_files"]

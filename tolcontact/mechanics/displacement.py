@@ -1,0 +1,33 @@
+"""Displacement energies of many points, from ten moments of them.
+
+The moments of points P about a nominal centre c are N, sum (P - c) and the six distinct entries of
+sum (P - c)(P - c)': enough for every weighting of points, whatever their number.
+"""
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.mechanics.pose import Pose
+
+MOMENTS = 10
+_UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+
+
+def moment_table(P: np.ndarray, centre: np.ndarray) -> np.ndarray:
+    """What each point adds to the moments about `centre`, shape (moment, point), for points P (point, 3) [mm]."""
+    p = (P - centre).T
+    return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] for i, j in _UPPER)])
+
+
+def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Pose) -> ca.SX:
+    """1/2 sum |x_end - x_start|^2 [mm^2] over the points that `moments` (10, 1) sums up; quadratic in the pose `end`.
+
+    x_end - x_start = a + D (P - c), with a the displacement of the centre and D the difference of the rotations.
+    """
+    count, first = moments[0], moments[1:4]
+    second = ca.SX.zeros(3, 3)
+    for k, (i, j) in enumerate(_UPPER):
+        second[i, j] = second[j, i] = moments[4 + k]
+    a = end.place(ca.DM(centre)) - start.place(ca.DM(centre))
+    D = end.R - start.R
+    return count * ca.dot(a, a) / 2 + ca.dot(a, D @ first) + ca.trace(D @ second @ D.T) / 2

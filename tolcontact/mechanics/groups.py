@@ -1,0 +1,121 @@
+"""Contact groups: parts that contact couples to each other. Each group has a QP of its own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.discretization import Nominal, movers
+from tolcontact.mechanics.correction import Carried
+from tolcontact.mechanics.displacement import moment_table
+
+BALL = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One side of a pair whose points can be displaced: where they are, and the part (of the group) that they belong to."""
+
+    pair: int
+    part: int
+    points: np.ndarray
+    centre: np.ndarray
+
+    @property
+    def table(self) -> np.ndarray:
+        """What each point adds to the moments, shape (moment, point)."""
+        return moment_table(self.points, self.centre)
+
+    def candidates(self, radius: float) -> np.ndarray:
+        """Moments of all points, each of them a small ball, so that points on a line hold all rotations, too."""
+        moments = self.table.sum(axis=1)
+        moments[[4, 7, 9]] += len(self.points) * radius**2
+        return np.asarray(moments)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Parts that contact couples to each other, and the fixed parts that they touch.
+
+    parts, pairs     indices into the nominal model's
+    free             indices of the movers among all parts
+    carried          one per part of `parts`
+    sides            sides of pairs that enter the objective, in the order of the Function's moments
+    length           root mean square distance of the contact points from their centroid [mm]
+    """
+
+    parts: tuple[int, ...]
+    pairs: tuple[int, ...]
+    free: tuple[int, ...]
+    carried: tuple[Carried, ...]
+    sides: tuple[Side, ...]
+    length: float
+
+    def position(self, part: int) -> int:
+        """Where a part stands in `parts`."""
+        return self.parts.index(part)
+
+    @property
+    def ball(self) -> float:
+        """Radius of the ball [mm] that a contact point stands for in the regularization."""
+        return BALL * self.length
+
+
+def round_pairs(nominal: Nominal, group: Group) -> list[int]:
+    """Positions of the pairs of a group whose reference face is curved."""
+    surfaces = [nominal.pairs[index].surface for index in group.pairs]
+    return [k for k, surface in enumerate(surfaces) if surface is not None and surface.curvature > 0]
+
+
+def contact_groups(nominal: Nominal) -> list[Group]:
+    """The groups of parts that contact couples: what touches only fixed parts in common stays apart."""
+    chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
+    clusters: list[set[int]] = []
+    for pair in nominal.pairs:
+        joined = set(chains[pair.moving]) | _movers_of(pair.reference, chains)
+        for cluster in [c for c in clusters if c & joined]:
+            clusters.remove(cluster)
+            joined |= cluster
+        clusters.append(joined)
+    return [_group(nominal, chains, tuple(sorted(cluster))) for cluster in clusters]
+
+
+def _movers_of(part: int | None, chains: Sequence[tuple[int, ...]]) -> set[int]:
+    return set() if part is None else set(chains[part])
+
+
+def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...]) -> Group:
+    own = [
+        (index, pair)
+        for index, pair in enumerate(nominal.pairs)
+        if (set(chains[pair.moving]) | _movers_of(pair.reference, chains)) & set(free)
+    ]
+    moved = {part for part, chain in enumerate(chains) if set(chain) & set(free)}
+    others = {part for _, pair in own for part in (pair.moving, pair.reference)} | {nominal.parts[part].parent for part in free}
+    parts = tuple(sorted(moved | {part for part in others if part is not None}))
+    points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
+    for _, pair in own:
+        points[pair.moving].append(pair.P_m)
+        if pair.reference is not None:
+            points[pair.reference].append(pair.P_r)
+    # A part without contact points of its own turns about those of the last part that moves it.
+    every = np.vstack([pair.P_m for _, pair in own])
+    centre = {part: np.vstack(points[part] or points[(chains[part] or free)[-1]]).mean(axis=0) for part in parts}
+    references = {pair.reference for _, pair in own}
+    sides = [
+        Side(position, parts.index(part), P, centre[part])
+        for position, (_, pair) in enumerate(own)
+        for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
+        if part is not None and chains[part]
+    ]
+    spread = float(np.sqrt(((every - every.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    return Group(
+        parts=parts,
+        pairs=tuple(index for index, _ in own),
+        free=free,
+        carried=tuple(
+            Carried(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
+        ),
+        sides=tuple(sides),
+        length=spread or float(nominal.parts[own[0][1].moving].mesh.scale),
+    )

@@ -1,0 +1,70 @@
+"""Users' expressions onto tapes and back: see tolcontact.declaration.tape."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import casadi as ca
+
+from tolcontact.declaration.tape import BINARY, LONGEST, UNARY, Tape
+from tolcontact.mechanics.pose import ENTRIES, Pose
+
+_UNARY: dict[str, Callable[[Any], Any]] = {
+    "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
+    "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan, "floor": ca.floor,
+    "ceil": ca.ceil, "fabs": ca.fabs, "sign": ca.sign, "erf": ca.erf, "inv": lambda a: 1 / a, "sinh": ca.sinh,
+    "cosh": ca.cosh, "tanh": ca.tanh, "asinh": ca.asinh, "acosh": ca.acosh, "atanh": ca.atanh, "not": ca.logic_not,
+    "log1p": ca.log1p, "expm1": ca.expm1, "assign": lambda a: a,
+}  # fmt: skip
+_BINARY: dict[str, Callable[[Any, Any], Any]] = {
+    "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
+    "pow": ca.power, "constpow": ca.power, "lt": ca.lt, "le": ca.le, "eq": ca.eq, "ne": ca.ne, "and": ca.logic_and,
+    "or": ca.logic_or, "fmod": ca.fmod, "remainder": ca.remainder, "copysign": ca.copysign, "atan2": ca.atan2,
+    "fmin": ca.fmin, "fmax": ca.fmax, "hypot": ca.hypot, "if_else_zero": lambda a, b: ca.if_else(a, b, 0),
+}  # fmt: skip
+_NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
+
+
+def record(expression: ca.SX, poses: ca.SX) -> Tape:
+    """The steps of a scalar expression of the pose entries `poses` (12 * part, 1).
+
+    Raises ValueError for an operation that has no place on a tape, or for too many of them.
+    """
+    function = ca.Function("expression", [poses], [expression])
+    if function.n_instructions() > LONGEST:
+        raise ValueError(f"an expression of {function.n_instructions()} steps cannot be archived; {LONGEST} can")
+    rows: list[tuple[Any, ...]] = []
+    at: dict[int, int] = {}  # work register -> row
+    for k in range(function.n_instructions()):
+        operation = function.instruction_id(k)
+        inputs, outputs = function.instruction_input(k), function.instruction_output(k)
+        if operation == ca.OP_OUTPUT:
+            rows.append(("assign", at[inputs[0]]))
+            continue
+        if operation == ca.OP_INPUT:
+            rows.append(("input", inputs[1]))
+        elif operation == ca.OP_CONST:
+            rows.append(("const", function.instruction_constant(k)))
+        elif operation in _NAMES:
+            rows.append((_NAMES[operation], *(at[register] for register in inputs)))
+        else:
+            raise ValueError(f"CasADi operation {operation} of an expression cannot be archived")
+        at[outputs[0]] = len(rows) - 1
+    return tuple(rows)
+
+
+def replay(tape: Tape, poses: Sequence[Pose]) -> ca.SX:
+    """The expression that a tape holds, on the given poses."""
+    entries = ca.vertcat(*(pose.vector() for pose in poses))
+    if entries.numel() != ENTRIES * len(poses):
+        raise ValueError("a tape needs 12 entries for each pose")
+    values: list[ca.SX] = []
+    for operation, *operands in tape:
+        if operation == "input":
+            values.append(entries[operands[0]])
+        elif operation == "const":
+            values.append(ca.SX(operands[0]))
+        elif operation in _UNARY:
+            values.append(_UNARY[operation](values[operands[0]]))
+        else:
+            values.append(_BINARY[operation](values[operands[0]], values[operands[1]]))
+    return values[-1]

@@ -1,0 +1,6 @@
+"""Results as text for a terminal, or a pipe."""
+
+from tolcontact.report.text.comparison import comparison_text
+from tolcontact.report.text.summary import grouped, summary_text
+
+__all__ = ["comparison_text", "grouped", "summary_text"]

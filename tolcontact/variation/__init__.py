@@ -1,0 +1,5 @@
+"""Sample: tolerances become deviations of the locators."""
+
+from tolcontact.variation.draws import draw
+
+__all__ = ["draw"]

@@ -1,0 +1,51 @@
+"""What a run will take, said before it begins: size, time, memory, disk."""
+
+import logging
+import time
+
+from tolcontact.archive import bytes_of_rows, size_in_words
+from tolcontact.compilation import Program
+from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.blocks import block_rows, processors
+from tolcontact.vocabulary import BLOCK_ROWS
+
+try:
+    import resource
+except ImportError:  # not on Windows, where memory is not told
+    resource = None  # type: ignore[assignment]
+
+TRIAL = 4  # realizations
+MANY = 1_000_000
+LONG = 60.0  # s: what takes less is not announced
+
+log = logging.getLogger(__name__)
+
+
+def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
+    """Log, as a warning, what `samples` more realizations will take, if that is long: from a trial with few of them."""
+    if samples < MANY and block_rows(program) == BLOCK_ROWS:
+        return
+    started = time.perf_counter()
+    list(simulate_blocks(program, samples=TRIAL, seed=seed, threads=1))
+    each = (time.perf_counter() - started) / TRIAL
+    seconds = each * samples / processors()
+    if samples >= MANY or seconds > LONG:
+        nominal = program.nominal
+        points = sum(len(pair.P_m) for pair in nominal.pairs)
+        memory = (
+            ""
+            if resource is None
+            else f", {size_in_words(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)} of memory"
+        )
+        log.warning(
+            "%d parts, %d contact pairs, %d contact points: %d realizations will take some %s%s, and %s in an archive",
+            len(nominal.parts), len(nominal.pairs), points, samples, _duration(seconds), memory,
+            size_in_words(bytes_of_rows(nominal, keep, samples)),
+        )  # fmt: skip
+
+
+def _duration(seconds: float) -> str:
+    for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
+        if seconds >= 2 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"

@@ -1,0 +1,142 @@
+"""From a declared assembly to an archive: the whole flow in one call."""
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import xarray as xr
+
+from tolcontact.archive import ArchiveWriter, check_rows, open_archive, opened, taken
+from tolcontact.compilation import Program, compile_program
+from tolcontact.declaration import Assembly
+from tolcontact.declaration.script import load_model
+from tolcontact.discretization import discretize
+from tolcontact.errors import OptionError
+from tolcontact.method import Method
+from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
+from tolcontact.statistics import summarize as statistics_of
+from tolcontact.vocabulary import KEPT
+from tolcontact.workflow.forecast import announce
+
+DEFAULT_SOLVER = "qpoases"
+SURFACES = 64
+Model = Assembly | Callable[[], Assembly] | str | Path
+Progress = Callable[[int], None]
+
+
+def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Method | None = None) -> Program:
+    """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
+
+    Raises ModelError with all its faults, OptionError for a solver that cannot be used.
+    """
+    return compile_program(discretize(declared(model)), solver, method or Method())
+
+
+def declared(model: Model) -> Assembly:
+    """The assembly of a model, however it is given."""
+    if isinstance(model, str | Path):
+        return load_model(Path(model))
+    if not isinstance(model, Assembly) and callable(model):
+        model = model()
+    if not isinstance(model, Assembly):
+        raise OptionError(
+            f"the model is a {type(model).__name__}; expected a tc.Assembly, a function that returns one, or a script's path"
+        )
+    return model
+
+
+def run(
+    model: Model | Program,
+    *,
+    samples: int = 1000,
+    seed: int = 1,
+    solver: str | None = None,
+    method: Method | None = None,
+    out: str | Path | None = None,
+    overwrite: bool = False,
+    resume: bool = False,
+    keep: str = "all",
+    surfaces: int = SURFACES,
+    progress: Progress | None = None,
+) -> xr.DataTree:
+    """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
+
+    `model` is what `build` takes, or what it gives: a Program, which has its solver and method (else qpoases, Method()).
+    Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
+    status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
+    `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
+    To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
+    `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
+    read, with fields of what is finished, and resumed.
+    Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
+    """
+    check_counts(samples=samples, seed=seed, surfaces=surfaces)
+    if keep not in KEPT:
+        raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
+    if isinstance(model, Program) and not (solver is None and method is None):
+        raise OptionError(
+            "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
+        )
+
+    def write(path: Path) -> None:
+        program = model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
+        start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
+        with start(path, program, seed=seed, samples=samples, keep=keep, surfaces=surfaces) as writer:
+            announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
+            _simulate(program, writer, seed, progress)
+
+    if out is None:
+        for word, value in {"overwrite": overwrite, "resume": resume}.items():
+            if value:
+                raise OptionError(f"{word} speaks of an archive, and none is named; name it: out=...")
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "results.nc"
+            write(path)
+            with opened(path) as tree:
+                return tree.load()
+    with taken(out, overwrite=overwrite, resume=resume) as path:
+        write(path)
+    return opened(path)
+
+
+def _simulate(program: Program, writer: ArchiveWriter, seed: int, progress: Progress | None) -> None:
+    try:
+        for done in simulate_blocks(program, samples=writer.samples, seed=seed, start=writer.rows):
+            writer.append(done)
+            if len(done) == writer.block_rows:
+                writer.check_point()
+            if progress:
+                progress(writer.rows)
+    except KeyboardInterrupt:
+        writer.write_fields_of_checkpoint()
+        raise
+    writer.write_fields()
+    rows = writer.chosen(seed)
+    if rows.size:
+        kept = writer.poses(rows)
+        writer.write_checked(rows, *check_surfaces(program, simulated_poses(program, rows, seed) if kept is None else kept))
+
+
+def summarize(results: xr.DataTree | str | Path) -> xr.Dataset:
+    """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize).
+
+    Raises ArchiveError where realizations are not what was written, or fewer than two are finished.
+    """
+    if isinstance(results, str | Path):
+        with open_archive(results) as tree:
+            return summarize(tree)
+    if not isinstance(results, xr.DataTree):
+        raise OptionError(
+            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
+        )
+    check_rows(results)
+    return statistics_of(results)
+
+
+def check_counts(**counts: int) -> None:
+    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed and surfaces 0)."""
+    for word, value in counts.items():
+        least = {"samples": 2, "seed": 0, "surfaces": 0}[word]
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
+            raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above and below 2^63")
