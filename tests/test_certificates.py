@@ -19,7 +19,7 @@ from tolcontact.discretization.faces import patch
 from tolcontact.discretization.overlap import overlap_corners
 from tolcontact.discretization.shapes import shape
 from tolcontact.errors import ContactWarning, OptionError
-from tolcontact.simulation import CORRECTED, RAW, Status
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SEATED = tc.Method(objective="seating", resolution="exact")
 SOLVERS = ("daqp", "qpoases")

@@ -6,7 +6,8 @@ import pytest
 import tolcontact as tc
 from tests import cases, referee
 from tolcontact.compilation import usable_plugins
-from tolcontact.simulation import CORRECTED, RAW, Block, Status, simulate_blocks
+from tolcontact.simulation import Block, simulate_blocks
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
 def simulate(assembly, samples=200, seed=1, block=1000, **options):

@@ -17,9 +17,10 @@ from tolcontact.discretization import discretize
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import gap_map
 from tolcontact.mechanics.groups import contact_groups
-from tolcontact.simulation import RAW, Status, simulate_blocks
+from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.blocks import _observe, simulate_block
 from tolcontact.variation.draws import draw
+from tolcontact.vocabulary import RAW, Status
 
 RNG = np.random.default_rng(5)
 MODELS = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}

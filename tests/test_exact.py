@@ -8,9 +8,9 @@ from tests import cases, referee
 from tests.nonlinear import TrueProblem
 from tests.test_contact import R_t, simulate
 from tests.test_seating import table
-from tolcontact.simulation import CORRECTED, RAW, Status
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.variation.draws import draw
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 JUDGED = {
     "ra1": (cases.ra1, "active points"),

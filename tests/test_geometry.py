@@ -16,8 +16,8 @@ from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files.reading import MAX_TRIANGLES, STEP_CHORD
 from tolcontact.discretization.shapes import shape
 from tolcontact.errors import UnitsWarning
-from tolcontact.simulation import CORRECTED
 from tolcontact.statistics import intervals
+from tolcontact.vocabulary import CORRECTED
 
 HOUSING = Path(__file__).resolve().parents[1] / "models" / "housing.step"
 BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])

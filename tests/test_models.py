@@ -7,7 +7,8 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases, referee
 from tests.test_contact import R_t, simulate
-from tolcontact.simulation import CORRECTED, RAW, Status, simulate_blocks
+from tolcontact.simulation import simulate_blocks
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 EXACT = tc.Method(resolution="exact", objective="all points")
 MODELS = {

@@ -6,7 +6,8 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.simulation import CORRECTED, RAW, simulate_blocks
+from tolcontact.simulation import simulate_blocks
+from tolcontact.vocabulary import CORRECTED, RAW
 
 SIGMA2 = (10 / 6) ** 2
 # Table 1: mean, 6 sigma, variance.

@@ -12,7 +12,7 @@ from tests import referee
 from tests.test_contact import R_t, simulate
 from tolcontact.compilation import ACCURACY
 from tolcontact.method import OBJECTIVES
-from tolcontact.simulation import CORRECTED, RAW, Status
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 lengths = st.floats(2, 50)
 ranges = st.sampled_from([0.0, 0.01, 0.1, 1.0])

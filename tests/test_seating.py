@@ -8,7 +8,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.test_contact import R_t, simulate
-from tolcontact.simulation import CORRECTED, RAW, Status
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 LEGS = np.array([(5, 5), (95, 5), (95, 55), (5, 55)], dtype=float)
 WEIGHT = np.array([52.0, 31.0])

@@ -29,8 +29,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
 from tolcontact.report import comparison_text, grouped, summary_text
-from tolcontact.simulation import Status
-from tolcontact.vocabulary import KEPT
+from tolcontact.vocabulary import KEPT, UNRESOLVED
 from tolcontact.workflow.compare import compare as compare_solvers
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, build, summarize
 from tolcontact.workflow.run import run as run_model
@@ -238,7 +237,7 @@ def _console() -> Console:
 def _print_summary(results: xr.DataTree) -> None:
     found = summarize(results)
     _console().print(summary_text(found))
-    failed = sum(int(found["by_status"][status]) for status in (Status.NOT_CONVERGED, Status.NOT_ASSEMBLABLE, Status.DOUBTFUL))
+    failed = sum(int(found["by_status"][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * found.attrs["realizations"]:
         typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
         raise typer.Exit(1)

@@ -16,7 +16,8 @@ import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal
-from tolcontact.simulation import CORRECTED, RAW, Block, Status, simulate_blocks
+from tolcontact.simulation import Block, simulate_blocks
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SOLVERS = ("daqp", "qpoases")
 LOOKED_AT = 4  # realizations whose surfaces are looked at

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.simulation import CORRECTED, Status, simulate_blocks
+from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import intervals
+from tolcontact.vocabulary import CORRECTED, Status
 
 HERE = Path(__file__).resolve().parent
 EXACT = tc.Method(resolution="exact")

@@ -9,7 +9,6 @@ from tolcontact import vocabulary as words
 from tolcontact.vocabulary import Variable
 
 PIECE = 100_000  # rows that are read at once
-CERTIFIED = [words.STATUS_MEANINGS.index(meaning) for meaning in ("untouched", "resolved")]
 
 
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
@@ -21,7 +20,7 @@ def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
     deepest, busiest, drawn = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
     lot = np.random.default_rng([seed, rows])
     for first, status, gap, carrying in _pieces(file, rows):
-        number = first + np.flatnonzero(np.isin(status, CERTIFIED))
+        number = first + np.flatnonzero(np.isin(status, words.CERTIFIED))
         inside = -gap[number - first, 1].min(axis=1, initial=np.inf)
         # Only what exceeds rounding is deeper than anything else.
         deepest.add(number, np.where(inside > words.ROUNDED, inside, 0.0))

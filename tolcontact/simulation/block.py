@@ -1,21 +1,8 @@
 """What a block of realizations gives, as plain arrays."""
 
-import enum
 from dataclasses import dataclass
 
 import numpy as np
-
-RAW, CORRECTED = 0, 1
-
-
-class Status(enum.IntEnum):
-    """What became of a realization. Archives keep these numbers."""
-
-    UNTOUCHED = 0  # no contact point penetrates: the corrected state is the raw state, to the last bit
-    RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
-    NOT_CONVERGED = 2  # they do not hold, or one linear step cannot open all gaps: penetration remains
-    NOT_ASSEMBLABLE = 3  # no pose without penetration was found near; the pose is the one of least penetration
-    DOUBTFUL = 4  # the conditions hold, but only far from the raw pose: beyond the limits of the method, so not certified
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ import numpy as np
 from tolcontact.compilation import Program
 from tolcontact.contact.resolver import ContactResolver
 from tolcontact.mechanics import ENTRIES, round_pairs
-from tolcontact.simulation.block import Block, Status
+from tolcontact.simulation.block import Block
 from tolcontact.variation.draws import draw
-from tolcontact.vocabulary import BLOCK_ROWS
+from tolcontact.vocabulary import BLOCK_ROWS, Status
 
 CURVED_ROWS, LEAST_ROWS = 512, 16
 LARGE = 24  # bodies that are coupled; a whole block of more would take longer than some ten seconds

@@ -6,9 +6,9 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.compilation import Program
-from tolcontact.simulation.block import CORRECTED
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.variation.draws import draw
+from tolcontact.vocabulary import CORRECTED
 
 TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 

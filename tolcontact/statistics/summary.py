@@ -12,31 +12,25 @@ from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
 
-ESTIMATE = ("estimate", "lower", "upper")
-PERCENTILES = (0.135, 5, 50, 95, 99.865)
-STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
 LEAST = 2
 PIECE = 24 * words.BLOCK_ROWS  # realizations that are read at once
-OUTSIDE = "outside tolerance"
-UNTOUCHED, NOT_ASSEMBLABLE = (words.STATUS_MEANINGS.index(word) for word in ("untouched", "not_assemblable"))
-SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
 
 
 def summarize(results: xr.DataTree) -> xr.Dataset:
     """Statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
 
-    statistic_value (measure, state, statistic, bound)   in the measure's units; "outside tolerance" is a share
-    change          (measure, change_of, bound)          corrected against raw, from the same realizations
-    touched         (bound)                              share of realizations that contact touched
+    statistic_value (measure, state, statistic, interval) in the measure's units; "outside tolerance" is a share
+    change          (measure, change_of, interval)         corrected against raw, from the same realizations
+    touched         (interval)                           share of realizations that contact touched
     by_status       (status_meaning)                     number of realizations
-    not_assemblable (bound)                              share of realizations without a pose free of penetration
+    not_assemblable (interval)                           share of realizations without a pose free of penetration
     conflicts       (pair)                               in how many of these a pair is among those in conflict
     penetration     (state)                              largest true penetration of any contact point [mm]
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
-    field_extreme   (part, state, extreme, bound)        least and largest 6 sigma of the displacement magnitude [mm]
+    field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
     field_realizations                                   number of realizations in the displacement fields
 
     The attribute `realizations` is the number of those that are finished, `samples` of those that the run was begun for.
@@ -55,17 +49,20 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     parts = rows[words.PART].values
     return xr.Dataset(
         {
-            "statistic_value": ((words.MEASURE, words.STATE, "statistic", "bound"), values),
-            "change": ((words.MEASURE, "change_of", "bound"), changes),
-            "touched": (("bound",), np.array(intervals.share_of(total - by_status[UNTOUCHED], total))),
-            "by_status": (("status_meaning",), by_status),
-            "not_assemblable": (("bound",), np.array(intervals.share_of(by_status[NOT_ASSEMBLABLE], total))),
+            "statistic_value": ((words.MEASURE, words.STATE, words.STATISTIC, words.INTERVAL), values),
+            "change": ((words.MEASURE, words.CHANGE_OF, words.INTERVAL), changes),
+            "touched": ((words.INTERVAL,), np.array(intervals.share_of(total - by_status[words.Status.UNTOUCHED], total))),
+            "by_status": ((words.STATUS_MEANING,), by_status),
+            "not_assemblable": (
+                (words.INTERVAL,),
+                np.array(intervals.share_of(by_status[words.Status.NOT_ASSEMBLABLE], total)),
+            ),
             "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in _pieces(rows)], axis=0)),
-            "iterations": (("of_iterations",), _iterations(rows)),
+            "iterations": ((words.OF_ITERATIONS,), _iterations(rows)),
             "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
             **_checked(results),
             "field_extreme": (
-                (words.PART, words.STATE, "extreme", "bound"),
+                (words.PART, words.STATE, words.EXTREME, words.INTERVAL),
                 np.array([_field_extremes(results, str(part)) for part in parts]),
                 {"units": "mm"},
             ),
@@ -74,14 +71,14 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
         coords={
             words.MEASURE: rows[words.MEASURE].values,
             words.STATE: list(words.STATES),
-            "statistic": [*STATISTICS, OUTSIDE],
-            "bound": list(ESTIMATE),
-            "change_of": [SHIFT, SPREAD_RATIO, VARIANCE_RATIO],
-            "status_meaning": list(words.STATUS_MEANINGS),
+            words.STATISTIC: [*words.STATISTICS, words.OUTSIDE],
+            words.INTERVAL: list(words.ESTIMATE),
+            words.CHANGE_OF: list(words.CHANGES),
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
             words.PART: parts,
             words.PAIR: rows[words.PAIR].values,
-            "of_iterations": ["median", "largest"],
-            "extreme": ["least", "largest"],
+            words.OF_ITERATIONS: list(words.MIDDLES),
+            words.EXTREME: list(words.EXTREMES),
             "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),
             "measure_tolerance": (words.MEASURE, rows[words.MEASURE_TOLERANCE.name].values),
         },
@@ -101,7 +98,7 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     These are the pairs that the pose of least penetration leaves inside each other.
     """
     gap = rows[words.GAP_MIN.name].sel({words.STATE: "corrected"}).transpose(words.REALIZATION, words.PAIR).values
-    stuck = rows[words.STATUS.name].values == NOT_ASSEMBLABLE
+    stuck = rows[words.STATUS.name].values == words.Status.NOT_ASSEMBLABLE
     return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
 
 
@@ -186,7 +183,7 @@ def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
         outside = intervals.share(Sample(lambda: (np.abs(piece - nominal) > tolerance / 2 for piece in x.pieces())))
     variance = intervals.variance(x)
     spreads = [intervals.root(variance), intervals.root(variance, times=6), variance]
-    return [intervals.mean(x), *spreads, *intervals.percentiles(x, PERCENTILES), outside]
+    return [intervals.mean(x), *spreads, *intervals.percentiles(x, words.PERCENTILES), outside]
 
 
 def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
@@ -196,7 +193,7 @@ def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
 
 def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
     """6 sigma of |u|, and its interval, where the archived field is least and largest; (state, extreme, bound)."""
-    found = np.full((len(words.STATES), 2, len(ESTIMATE)), np.nan)
+    found = np.full((len(words.STATES), 2, len(words.ESTIMATE)), np.nan)
     if not _summed(results, part):
         return found
     field = _field(results, part)

@@ -14,7 +14,8 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import Method
-from tolcontact.simulation import CORRECTED, Status, simulate_blocks
+from tolcontact.simulation import simulate_blocks
+from tolcontact.vocabulary import CORRECTED
 from tolcontact.workflow.run import Model, check_counts, declared
 
 STANDARD = Method()
@@ -104,8 +105,8 @@ def _said(name: str, value: object) -> str:
 
 
 def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
-    resolved = np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED])
-    both = resolved & np.isin(first["status"], [Status.UNTOUCHED, Status.RESOLVED])
+    resolved = np.isin(run["status"], words.CERTIFIED)
+    both = resolved & np.isin(first["status"], words.CERTIFIED)
     poses, others = (each["poses"][both] for each in (run, first))
     turn = (poses - others)[:, :, :9].reshape(*poses.shape[:2], 3, 3)
     apart = np.einsum("kpij,pcj->kpci", turn, corners) + (poses - others)[:, :, None, 9:]

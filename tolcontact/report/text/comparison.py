@@ -6,6 +6,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from tolcontact.vocabulary import UNRESOLVED
+
 
 def comparison_text(comparison: xr.Dataset) -> Group:
     """A comparison (see compare) as something that rich prints in 80 columns."""
@@ -16,7 +18,7 @@ def comparison_text(comparison: xr.Dataset) -> Group:
         table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
     for solver in comparison["solver"].values:
         of = comparison.sel(solver=solver)
-        lost = int(of["by_status"].sel(status_meaning=["not_converged", "not_assemblable"]).sum())
+        lost = int(of["by_status"][list(UNRESOLVED)].sum())
         differences = [of["pose_difference"].sel(extent=extent) for extent in ("median", "largest")]
         table.add_row(
             str(solver),

@@ -10,9 +10,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact.statistics.summary import OUTSIDE, SHIFT, SPREAD_RATIO, VARIANCE_RATIO
+from tolcontact.vocabulary import OUTSIDE, SHIFT, SPREAD_RATIO, STATES, VARIANCE_RATIO
 
-RAW, CORRECTED = "raw", "corrected"
+RAW, CORRECTED = STATES
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
 MAX_DECIMALS = 6

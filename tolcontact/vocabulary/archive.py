@@ -1,61 +1,41 @@
-"""Every dimension and variable of an archive: names, units and descriptions, in one place (CF conventions)."""
+"""Every variable of an archive."""
 
 import unicodedata
-from dataclasses import dataclass, field
-from typing import Any
 
-CONVENTIONS = "CF-1.11"
-FORMAT = 2  # of the archive; archives of format 1, which do not say it, can be read
-STATES = ("raw", "corrected")
-AXES = ("x", "y", "z")
-COMPONENTS = (*AXES, "magnitude")
-
-REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
-AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
-VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
-CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
-BLOCK, ROW_VARIABLE = "block", "row_variable"
-BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
-SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
-BOUNDS = ("lower", "upper")
-KEPT = ("measures", "poses", "all")
-
-STATUS_MEANINGS = ("untouched", "resolved", "not_converged", "not_assemblable", "doubtful")
-UNFINISHED = -1
-CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once
-ROUNDED = 1e-9  # mm: less penetration than this is rounding
-
-
-@dataclass(frozen=True, eq=False)
-class Variable:
-    """A variable of an archive: `kind` is a NumPy type, or str; `units=None` marks labels and texts."""
-
-    name: str
-    dims: tuple[str, ...]
-    kind: Any
-    long_name: str
-    units: str | None = None
-    attributes: dict[str, Any] = field(default_factory=dict)
-
-    @property
-    def all_attributes(self) -> dict[str, Any]:
-        units = {} if self.units is None else {"units": self.units}
-        return {"long_name": self.long_name, **units, **self.attributes}
-
-
-def _label(name: str, long_name: str) -> Variable:
-    return Variable(name, (name,), str, long_name)
-
+from tolcontact.vocabulary.labels import (
+    AXIS,
+    BLOCK,
+    BODY_AXIS,
+    BOUND,
+    CHECKED,
+    CHECKPOINT,
+    COMPONENT,
+    CORNER,
+    FACE,
+    LOCATOR,
+    MEASURE,
+    NUMBER,
+    PAIR,
+    PART,
+    POINT,
+    REALIZATION,
+    ROW_VARIABLE,
+    STATE,
+    STATUS_MEANINGS,
+    UNFINISHED,
+    VERTEX,
+)
+from tolcontact.vocabulary.variable import Variable, label
 
 NUMBERS = Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
 COORDINATES = (
     NUMBERS,
-    _label(STATE, "state: raw as located, corrected after contact"),
-    _label(PART, "part"),
-    _label(PAIR, "contact pair"),
-    _label(MEASURE, "measure (key characteristic)"),
-    _label(AXIS, "axis of the nominal assembly frame"),
-    _label(BODY_AXIS, "axis of the part's nominal orientation"),
+    label(STATE, "state: raw as located, corrected after contact"),
+    label(PART, "part"),
+    label(PAIR, "contact pair"),
+    label(MEASURE, "measure (key characteristic)"),
+    label(AXIS, "axis of the nominal assembly frame"),
+    label(BODY_AXIS, "axis of the part's nominal orientation"),
 )
 
 MEASURED = Variable(
@@ -138,7 +118,7 @@ ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not hav
 
 DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
 BY_REALIZATION = (*ROWS, DEVIATION)
-ROW_VARIABLE_LABEL = _label(ROW_VARIABLE, "variable of realizations")
+ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
 ROW_CHECKSUM = Variable(
     "row_checksum",
     (BLOCK, ROW_VARIABLE),
@@ -177,7 +157,7 @@ LOCATOR_OF_POINT = Variable(
     "number of the one-sided locator that a contact point stands for: its gap is less by the locator's deviation; -1: none",
 )
 
-LOCATOR_LABEL = _label(LOCATOR, "locator, as part.locator")
+LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator")
 TOLERANCE_RANGE = Variable(
     "tolerance_range",
     (LOCATOR,),
@@ -191,7 +171,7 @@ ONE_SIDED = Variable("one_sided", (LOCATOR,), "i1", "1: a support that the part 
 LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
 LOCATOR_DIRECTION = Variable("locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1")
 
-COMPONENT_LABEL = _label(COMPONENT, "component of the displacement")
+COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
 FIELD_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
 FIELD_FACES = MESH_FACES
 FIELD_MEAN = Variable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
@@ -202,7 +182,7 @@ FIELD_SIX_SIGMA = Variable(
     "six standard deviations of the displacement of a surface point",
     "mm",
 )
-BOUND_LABEL = _label(BOUND, "bound of a 95 % confidence interval")
+BOUND_LABEL = label(BOUND, "bound of a 95 % confidence interval")
 FIELD_INTERVAL = Variable(
     "magnitude_six_sigma_interval",
     (STATE, VERTEX, BOUND),
@@ -256,22 +236,3 @@ def group_of(part: str) -> str:
     """
     name = unicodedata.normalize("NFC", part)  # as the netCDF library stores it
     return f"{name}_" if name.rstrip("_") in {coordinate.name for coordinate in COORDINATES} else name
-
-
-# What a comparison of solvers holds.
-COMPARED_LABELS = (
-    _label(SOLVER, "solver, and what the methods differ in"),
-    _label(STATUS_MEANING, "meaning of a status"),
-    _label(EXTENT, "of the realizations: median, or largest"),
-)
-COMPARED = (
-    Variable("seconds", (SOLVER,), "f8", "wall time of all realizations, from draws to measures", "s"),
-    Variable("by_status", (SOLVER, STATUS_MEANING), "i8", "number of realizations", "1"),
-    Variable("kkt_residual", (SOLVER,), "f8", "largest KKT residual of the realizations that count as resolved", "mm"),
-    Variable("penetration", (SOLVER,), "f8", "largest true penetration left", "mm"),
-    Variable(
-        "pose_difference", (SOLVER, EXTENT), "f8", "largest distance between both answers, corners of bounding boxes", "mm"
-    ),
-    Variable("measure_difference", (SOLVER, EXTENT, MEASURE), "f8", "difference of a measure, in its own units"),
-    Variable("both_resolved", (SOLVER,), "i8", "number of realizations that count in the differences", "1"),
-)

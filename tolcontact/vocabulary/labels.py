@@ -1,0 +1,39 @@
+"""Labels, statuses and dimensions: the words that archives, summaries and comparisons share."""
+
+import enum
+
+CONVENTIONS = "CF-1.11"
+FORMAT = 2  # of the archive; archives of format 1, which do not say it, can be read
+STATES = ("raw", "corrected")
+RAW, CORRECTED = 0, 1  # their positions
+AXES = ("x", "y", "z")
+COMPONENTS = (*AXES, "magnitude")
+
+REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
+AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
+VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
+CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
+BLOCK, ROW_VARIABLE = "block", "row_variable"
+BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
+SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
+BOUNDS = ("lower", "upper")
+KEPT = ("measures", "poses", "all")
+
+UNFINISHED = -1
+CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once
+ROUNDED = 1e-9  # mm: less penetration than this is rounding
+
+
+class Status(enum.IntEnum):
+    """What became of a realization. Archives keep these numbers."""
+
+    UNTOUCHED = 0  # no contact point penetrates: the corrected state is the raw state, to the last bit
+    RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
+    NOT_CONVERGED = 2  # they do not hold, or one linear step cannot open all gaps: penetration remains
+    NOT_ASSEMBLABLE = 3  # no pose without penetration was found near; the pose is the one of least penetration
+    DOUBTFUL = 4  # the conditions hold, but only far from the raw pose: beyond the limits of the method, so not certified
+
+
+STATUS_MEANINGS = tuple(status.name.lower() for status in Status)
+CERTIFIED = (Status.UNTOUCHED, Status.RESOLVED)
+UNRESOLVED = (Status.NOT_CONVERGED, Status.NOT_ASSEMBLABLE, Status.DOUBTFUL)

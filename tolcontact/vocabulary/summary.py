@@ -1,0 +1,11 @@
+"""What a summary holds: its dimensions, and their labels."""
+
+INTERVAL, STATISTIC, CHANGE_OF, EXTREME, OF_ITERATIONS = "interval", "statistic", "change_of", "extreme", "of_iterations"
+ESTIMATE = ("estimate", "lower", "upper")  # labels of `interval`: 95 %
+PERCENTILES = (0.135, 5, 50, 95, 99.865)
+STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
+OUTSIDE = "outside tolerance"
+SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
+CHANGES = (SHIFT, SPREAD_RATIO, VARIANCE_RATIO)
+EXTREMES = ("least", "largest")
+MIDDLES = ("median", "largest")  # labels of `of_iterations`
