@@ -17,7 +17,7 @@ ROOMS = {
     "numba": ("compiled.py",),
     "llvmlite": ("compilation/functions/native.py",),
     "netCDF4": ("archive/",),
-    "typer": ("cli.py",),
+    "typer": ("cli/",),
     "trimesh": ("discretization/",),
     "igl": ("discretization/",),
     "cascadio": ("discretization/shape_files/worker.py",),

@@ -1,0 +1,64 @@
+"""The application: its options, and how it ends."""
+
+import inspect
+import io
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from tolcontact.declaration import Assembly
+from tolcontact.errors import TolcontactError, shown
+from tolcontact.method import OBJECTIVES, RESOLUTIONS
+
+app = typer.Typer(
+    help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def or_(names: tuple[str, ...]) -> str:
+    """Names as a help text lists them."""
+    return ", ".join(f'"{name}"' if " " in name else name for name in names)
+
+
+Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
+Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
+Samples = Annotated[int, typer.Option(help="Number of realizations.")]
+Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
+Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
+Resolution = Annotated[str, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}.")]
+Objective = Annotated[str, typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}.")]
+
+
+def main(assembly: Callable[[], Assembly]) -> None:
+    """Run the script that defines `assembly`, with the options of `tolcontact run`."""
+    script = inspect.getsourcefile(assembly)
+    command_line([*(["run", script] if script else []), *sys.argv[1:]])
+
+
+def command_line(arguments: list[str] | None = None) -> None:
+    """The console script: `app`, with errors as one message and exit code 2."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # a terminal that knows few letters is no reason to stop
+    try:
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            app(arguments)
+    except TolcontactError as error:
+        typer.echo(f"error: {error}", err=True)
+        sys.exit(2)
+    except OSError as error:
+        refused = shown(str(error))
+        typer.echo(f"error: the system refused: {refused}; an archive that was begun goes on with --resume", err=True)
+        sys.exit(2)
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    typer.echo(f"warning: {shown(str(message))}", err=True)

@@ -1,0 +1,26 @@
+"""tolcontact check."""
+
+import typer
+
+from tolcontact.cli.app import Model, Objective, Resolution, Solver, app
+from tolcontact.declaration.script import load_model
+from tolcontact.method import OBJECTIVES, Method
+from tolcontact.workflow.run import DEFAULT_SOLVER, build
+
+
+@app.command()
+def check(
+    model: Model,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = "linearized",
+    objective: Objective = OBJECTIVES[0],
+) -> None:
+    """Say what is wrong with a model, or with running it so; run nothing."""
+    program = build(load_model(model), solver=solver, method=Method(resolution=resolution, objective=objective))
+    typer.echo(program.nominal.assembly)
+    for part in program.nominal.parts:
+        size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
+        typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
+    for pair in program.nominal.pairs:
+        typer.echo(f"  contact {pair.name}: {len(pair.P_m)} contact points within reach")
+    typer.echo("no faults found")

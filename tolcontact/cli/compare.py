@@ -1,0 +1,50 @@
+"""tolcontact compare."""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolcontact.archive import taken
+from tolcontact.cli.app import Model, Samples, Seed, app, or_
+from tolcontact.cli.output import console
+from tolcontact.declaration.script import load_model
+from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
+from tolcontact.report import comparison_text
+from tolcontact.workflow.compare import compare as compare_solvers
+from tolcontact.workflow.run import DEFAULT_SOLVER
+
+
+@app.command()
+def compare(
+    model: Model,
+    solvers: Annotated[
+        str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")
+    ] = DEFAULT_SOLVER,
+    samples: Samples = 1000,
+    seed: Seed = 1,
+    resolution: Annotated[str, typer.Option(help=f"One or more of {or_(RESOLUTIONS)}.")] = "linearized",
+    objective: Annotated[str, typer.Option(help=f"One or more of {or_(OBJECTIVES)}.")] = OBJECTIVES[0],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
+) -> None:
+    """Compare solvers, resolutions or objectives on the same draws: agreement, failures, residuals, time."""
+    methods = [Method(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
+    with contextlib.nullcontext() if out is None else taken(out) as path:
+        found = compare_solvers(load_model(model), _names(solvers), samples=samples, seed=seed, methods=methods)
+        if path is not None:
+            # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
+            texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
+            found.to_netcdf(path, engine="netcdf4", encoding=texts)
+    if as_json:
+        # JSON has no NaN: where no realization can be compared a difference is null.
+        readable = found.astype(object).where(found.notnull(), None)
+        typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
+    else:
+        console().print(comparison_text(found))
+
+
+def _names(words: str) -> list[str]:
+    return [word.strip() for word in words.split(",") if word.strip()]

@@ -1,0 +1,29 @@
+"""Results on standard output."""
+
+import sys
+
+import typer
+import xarray as xr
+from rich.console import Console
+
+from tolcontact.report import summary_text
+from tolcontact.vocabulary import UNRESOLVED
+from tolcontact.workflow.run import summarize
+
+FAILED_SHARE = 0.001
+UNBOUNDED = 10_000  # columns of what is no terminal
+
+
+def console() -> Console:
+    """Standard output; what is no terminal is never cut."""
+    return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
+
+
+def print_summary(results: xr.DataTree) -> None:
+    """Print the summary of a run. Ends with exit code 1 where too many realizations were not resolved."""
+    found = summarize(results)
+    console().print(summary_text(found))
+    failed = sum(int(found["by_status"][status]) for status in UNRESOLVED)
+    if failed > FAILED_SHARE * found.attrs["realizations"]:
+        typer.echo(f"error: {failed} realizations were not resolved, more than {FAILED_SHARE:.1%} of all", err=True)
+        raise typer.Exit(1)

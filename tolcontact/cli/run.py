@@ -1,0 +1,58 @@
+"""tolcontact run."""
+
+import functools
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, or_
+from tolcontact.cli.output import print_summary
+from tolcontact.cli.progress import progress_bar, show_log, stopped
+from tolcontact.declaration.script import load_model
+from tolcontact.errors import OptionError, shown
+from tolcontact.method import OBJECTIVES, Method
+from tolcontact.vocabulary import KEPT
+from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES
+from tolcontact.workflow.run import run as run_model
+
+
+@app.command()
+def run(
+    model: Model,
+    samples: Samples = 1000,
+    seed: Seed = 1,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = "linearized",
+    objective: Objective = OBJECTIVES[0],
+    out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
+    keep: Annotated[str, typer.Option(help=f"What to archive of each realization: {or_(KEPT)}.")] = "all",
+    surfaces: Annotated[
+        int, typer.Option(help="Number of realizations that are checked against the surfaces between contact points.")
+    ] = SURFACES,
+) -> None:
+    """Simulate a model with and without contact, and print what happens to its measures.
+
+    Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
+    """
+    if out is None and (overwrite or resume):
+        raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
+    method = Method(resolution=resolution, objective=objective)
+    with progress_bar() as bar, stopped(out, done := [0, samples]):
+        task = bar.add_task(shown(model.stem), total=samples)
+        show_log(bar.console, lambda words: bar.update(task, description=words))
+
+        def show(rows: int) -> None:
+            done[:] = rows, max(samples, rows)
+            bar.update(task, completed=rows, total=done[1], description=shown(model.stem))
+
+        results = run_model(
+            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
+            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, progress=show,
+        )  # fmt: skip
+    with results:
+        print_summary(results)
+    if out is not None:
+        typer.echo(f"\narchive: {shown(str(out))}")
