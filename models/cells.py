@@ -3,8 +3,8 @@
 Each cell is set into a tray, off its place by the tolerance of its pocket and askew as that lets it; two neighbours are
 nominally 0.2 mm apart. Without contact they pass through each other; with contact they push each other along, the plates hold
 the row, and there is always room, since the clearances add up. Expected: a terminal's spread along the row falls, least in
-the middle, where cells have most room to give way; a pitch varies much less. All cells move together, so take: --resolution
-exact --objective "all points". Dimensions are those of a prismatic cell of a car's battery, rounded; tolerances are guesses.
+the middle, where cells have most room to give way; a pitch varies much less. All cells move together, so the model asks for
+the exact resolution and all points. Dimensions are those of a prismatic cell of a car's battery; tolerances are guesses.
 
 x along the row, z up. Lengths in mm. A tolerance is the full width of its zone.
 """
@@ -35,7 +35,7 @@ def pocket() -> list[tc.Locator]:
 
 
 def assembly() -> tc.Assembly:
-    model = tc.Assembly("cells")
+    model = tc.Assembly("cells", method=tc.Method(resolution="exact", objective="all points"))
     row = [model.part("first plate", tc.Box(PLATE, WIDTH, HEIGHT), at=(-PLATE - CLEARANCE, 0, 0), fixed=True)]
     for k in range(CELLS):
         row.append(model.part(f"cell {k + 1}", tc.Box(THICKNESS, WIDTH, HEIGHT), at=(k * PITCH, 0, 0)))

@@ -1,7 +1,7 @@
 """A U-channel pushed into a U-channel without clearance: two opposed pairs of flanges and a web.
 
-One linear step cannot open all gaps here: it lets a part that turns grow, and a part that grows does not fit. Resolve it with
---resolution exact. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
+One linear step cannot open all gaps here: it lets a part that turns grow, and a part that grows does not fit. So the
+model asks for the exact resolution. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
 """
 
 import numpy as np
@@ -27,7 +27,7 @@ def channel(half_width: float, floor: float, opening: float) -> trimesh.Trimesh:
 
 def assembly(opening: float = 0.0) -> tc.Assembly:
     """`opening`: by how much the flanges lean outwards. Those that lean let a part escape upwards; vertical ones do not."""
-    model = tc.Assembly("channel")
+    model = tc.Assembly("channel", method=tc.Method(resolution="exact"))
     outer = model.part("outer", tc.Mesh(channel(WIDTH / 2 + SHEET, -SHEET, opening)), fixed=True)
     inner = model.part("inner", tc.Mesh(channel(WIDTH / 2, 0, opening)))
     model.locate(

@@ -3,7 +3,7 @@
 The pins stand off their places by the tolerance of the holes that they are pressed into; the cover is set down by hand, up to
 half a millimetre off, and the pins bring it to where its hole (clearance 0.1 on the diameter) and its slot let it be.
 Expected: an edge is off as the nearest pin is, and by half the clearance more; without contact the cover passes through its
-pins. Pins are round, so one linear step is not enough: --resolution exact --objective "all points". Dimensions were chosen for
+pins. Pins are round, so one linear step is not enough, and the model asks for the exact resolution. Dimensions were chosen for
 this model; cover_cad.py makes both STEP files from them.
 
 Needs the extra `tolcontact[step]`. Lengths in mm. A tolerance is the full width of its zone.
@@ -34,7 +34,7 @@ def six(x: float, y: float, length: float, width: float) -> list[tc.Locator]:
 
 
 def assembly() -> tc.Assembly:
-    model = tc.Assembly("cover")
+    model = tc.Assembly("cover", method=tc.Method(resolution="exact", objective="all points"))
     housing = model.part("housing", tc.Mesh(HERE / "housing.step"), fixed=True)
     cover = model.part("cover", tc.Mesh(HERE / "cover.step"), at=(0, 0, TOP))
     model.locate(cover, six(LENGTH / 2, WIDTH / 2, LENGTH, WIDTH), tolerance=PLACED)

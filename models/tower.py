@@ -5,8 +5,8 @@ below, contact pushes the two apart; where it hangs over a gap, it stays, since 
 sink into each other, so the top hardly ever stands lower than nominal; it stands higher on average, and varies much less than
 without contact. One free body per block: change BLOCKS to see what bodies cost.
 
-Resolve it with --resolution exact --objective "all points". With "active points" a block that its neighbours hardly touch may
-slide far away, and is then called doubtful.
+The model asks for the exact resolution and all points: with "active points" a block that its neighbours hardly touch may slide
+far away, and is then called doubtful.
 
 z up. Lengths in mm. A tolerance is the full width of its zone.
 """
@@ -20,7 +20,7 @@ FIXTURE = 1.0
 
 def assembly(blocks: int = BLOCKS) -> tc.Assembly:
     """So many free `blocks` on a fixed one."""
-    model = tc.Assembly("tower")
+    model = tc.Assembly("tower", method=tc.Method(resolution="exact", objective="all points"))
     below = model.part("block 0", tc.Box(*SIZE), fixed=True)
     for k in range(1, blocks + 1):
         block = model.part(f"block {k}", tc.Box(*SIZE), at=(0, 0, k * SIZE[2]), fixed=False)

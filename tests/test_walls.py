@@ -31,9 +31,9 @@ NEVER = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "errors", "child", "vocabulary", "checksums", "method", "poses", "compiled", "declaration", "discretization", "variation",
-    "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "workflow", "report", "cli", "__init__",
-    "__main__",
+    "version", "errors", "child", "vocabulary", "checksums", "method", "poses", "compiled", "declaration", "discretization",
+    "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "workflow", "report", "cli",
+    "__init__", "__main__",
 )  # fmt: skip
 
 

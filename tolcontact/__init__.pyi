@@ -1,29 +1,42 @@
 from .archive import model_of, open_archive
 from .cli import command_line, main
-from .declaration import Assembly, Box, Brep, Facing, Inside, Locator, Mesh, Near, Tolerance, three_two_one
-from .errors import TolcontactError
+from .compilation import Program
+from .declaration import (
+    Assembly,
+    Box,
+    Brep,
+    ContactPair,
+    Face,
+    Facing,
+    Force,
+    Inside,
+    Locator,
+    Measure,
+    Mesh,
+    Near,
+    Part,
+    Point,
+    Tolerance,
+    three_two_one,
+)
+from .errors import (
+    ArchiveError,
+    ContactWarning,
+    ModelError,
+    OptionError,
+    ScriptError,
+    TolcontactError,
+    UnitsWarning,
+)
 from .method import Method
-from .workflow import build, compare, run, summarize
+from .simulation import simulate_blocks
+from .version import __version__
+from .vocabulary import Status
+from .workflow import build, check, compare, run, summarize
 
 __all__ = [
-    "Assembly",
-    "Box",
-    "Brep",
-    "Facing",
-    "Inside",
-    "Locator",
-    "Mesh",
-    "Method",
-    "Near",
-    "TolcontactError",
-    "Tolerance",
-    "build",
-    "command_line",
-    "compare",
-    "main",
-    "model_of",
-    "open_archive",
-    "run",
-    "summarize",
-    "three_two_one",
-]
+    "ArchiveError", "Assembly", "Box", "Brep", "ContactPair", "ContactWarning", "Face", "Facing", "Force", "Inside", "Locator",
+    "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Part", "Point", "Program", "ScriptError", "Status",
+    "TolcontactError", "Tolerance", "UnitsWarning", "__version__", "build", "check", "command_line", "compare", "main",
+    "model_of", "open_archive", "run", "simulate_blocks", "summarize", "three_two_one",
+]  # fmt: skip

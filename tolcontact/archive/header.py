@@ -17,6 +17,7 @@ from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import to_document
 from tolcontact.discretization import Nominal
+from tolcontact.method import Method
 from tolcontact.simulation.blocks import block_rows
 from tolcontact.statistics import FieldMoments
 from tolcontact.vocabulary import Variable
@@ -42,12 +43,21 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
         "search": method.search,
         "near_turn": method.near_turn,
         "near_travel": method.near_travel,
+        "method_from": _whose(program),
         "sampler": "monte-carlo",
         "seed": np.int64(seed),
         "samples": np.int64(samples),
         "kept": keep,
         "block_rows": np.int64(block_rows(program)),
     }
+
+
+def _whose(program: Program) -> str:
+    """Where the method came from: the model, the defaults, or whoever ran it."""
+    own = program.nominal.assembly.method
+    if program.method == (own or Method()):
+        return "defaults" if own is None else "model"
+    return "options"
 
 
 def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:

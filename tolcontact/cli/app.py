@@ -13,6 +13,7 @@ import typer
 from tolcontact.declaration import Assembly
 from tolcontact.errors import TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
+from tolcontact.version import __version__
 
 app = typer.Typer(
     help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
@@ -20,6 +21,21 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"tolcontact {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit.")
+    ] = False,
+) -> None:
+    pass
 
 
 def or_(names: tuple[str, ...]) -> str:
@@ -32,8 +48,18 @@ Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a r
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]
 Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
 Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
-Resolution = Annotated[str, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}.")]
-Objective = Annotated[str, typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}.")]
+Resolution = Annotated[
+    str | None, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}; else the model's own choice.")
+]
+Objective = Annotated[
+    str | None,
+    typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}; else the model's own choice."),
+]
+
+
+def chosen(**words: str | None) -> dict[str, str]:
+    """The words of a method that were given, instead of the model's own."""
+    return {word: value for word, value in words.items() if value is not None}
 
 
 def main(assembly: Callable[[], Assembly]) -> None:

@@ -2,9 +2,8 @@
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Solver, app
+from tolcontact.cli.app import Model, Objective, Resolution, Solver, app, chosen
 from tolcontact.declaration.script import load_model
-from tolcontact.method import OBJECTIVES, Method
 from tolcontact.workflow.run import DEFAULT_SOLVER, build
 
 
@@ -12,11 +11,11 @@ from tolcontact.workflow.run import DEFAULT_SOLVER, build
 def check(
     model: Model,
     solver: Solver = DEFAULT_SOLVER,
-    resolution: Resolution = "linearized",
-    objective: Objective = OBJECTIVES[0],
+    resolution: Resolution = None,
+    objective: Objective = None,
 ) -> None:
     """Say what is wrong with a model, or with running it so; run nothing."""
-    program = build(load_model(model), solver=solver, method=Method(resolution=resolution, objective=objective))
+    program = build(load_model(model), solver=solver, method=chosen(resolution=resolution, objective=objective))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)

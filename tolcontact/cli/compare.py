@@ -2,16 +2,17 @@
 
 import contextlib
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tolcontact.archive import taken
-from tolcontact.cli.app import Model, Samples, Seed, app, or_
+from tolcontact.cli.app import Model, Samples, Seed, app, chosen, or_
 from tolcontact.cli.output import console
 from tolcontact.declaration.script import load_model
-from tolcontact.method import OBJECTIVES, RESOLUTIONS, Method
+from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text
 from tolcontact.workflow.compare import compare as compare_solvers
 from tolcontact.workflow.run import DEFAULT_SOLVER
@@ -25,15 +26,15 @@ def compare(
     ] = DEFAULT_SOLVER,
     samples: Samples = 1000,
     seed: Seed = 1,
-    resolution: Annotated[str, typer.Option(help=f"One or more of {or_(RESOLUTIONS)}.")] = "linearized",
-    objective: Annotated[str, typer.Option(help=f"One or more of {or_(OBJECTIVES)}.")] = OBJECTIVES[0],
+    resolution: Annotated[str | None, typer.Option(help=f"One or more of {or_(RESOLUTIONS)}; else the model's own.")] = None,
+    objective: Annotated[str | None, typer.Option(help=f"One or more of {or_(OBJECTIVES)}; else the model's own.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
 ) -> None:
     """Compare solvers, resolutions or objectives on the same draws: agreement, failures, residuals, time."""
-    methods = [Method(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
+    methods = [chosen(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
     with contextlib.nullcontext() if out is None else taken(out) as path:
-        found = compare_solvers(load_model(model), _names(solvers), samples=samples, seed=seed, methods=methods)
+        found = compare_solvers(load_model(model), _listed(solvers), samples=samples, seed=seed, methods=methods)
         if path is not None:
             # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
@@ -46,5 +47,9 @@ def compare(
         console().print(comparison_text(found))
 
 
-def _names(words: str) -> list[str]:
+def _names(words: str | None) -> Sequence[str | None]:
+    return [None] if words is None else _listed(words)
+
+
+def _listed(words: str) -> list[str]:
     return [word.strip() for word in words.split(",") if word.strip()]

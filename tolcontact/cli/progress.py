@@ -23,7 +23,8 @@ def progress_bar() -> Progress:
     return Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal)
 
 
-def show_log(console: Console, show: Callable[[str], None]) -> None:
+@contextlib.contextmanager
+def log_shown(console: Console, show: Callable[[str], None]) -> Iterator[None]:
     """Show what the package is at, and print what it announces."""
 
     class Shown(logging.Handler):
@@ -34,9 +35,15 @@ def show_log(console: Console, show: Callable[[str], None]) -> None:
             else:
                 show(words)
 
-    log = logging.getLogger("tolcontact")
-    log.handlers, log.propagate = [Shown()], False
+    log, handler = logging.getLogger("tolcontact"), Shown()
+    before = log.level
+    log.addHandler(handler)
     log.setLevel(logging.INFO)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(before)
 
 
 @contextlib.contextmanager

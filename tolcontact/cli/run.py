@@ -6,12 +6,11 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, or_
+from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, chosen, or_
 from tolcontact.cli.output import print_summary
-from tolcontact.cli.progress import progress_bar, show_log, stopped
+from tolcontact.cli.progress import log_shown, progress_bar, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
-from tolcontact.method import OBJECTIVES, Method
 from tolcontact.vocabulary import KEPT
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES
 from tolcontact.workflow.run import run as run_model
@@ -23,8 +22,8 @@ def run(
     samples: Samples = 1000,
     seed: Seed = 1,
     solver: Solver = DEFAULT_SOLVER,
-    resolution: Resolution = "linearized",
-    objective: Objective = OBJECTIVES[0],
+    resolution: Resolution = None,
+    objective: Objective = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
@@ -39,19 +38,19 @@ def run(
     """
     if out is None and (overwrite or resume):
         raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
-    method = Method(resolution=resolution, objective=objective)
+    method = chosen(resolution=resolution, objective=objective)
     with progress_bar() as bar, stopped(out, done := [0, samples]):
         task = bar.add_task(shown(model.stem), total=samples)
-        show_log(bar.console, lambda words: bar.update(task, description=words))
 
         def show(rows: int) -> None:
             done[:] = rows, max(samples, rows)
             bar.update(task, completed=rows, total=done[1], description=shown(model.stem))
 
-        results = run_model(
-            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, progress=show,
-        )  # fmt: skip
+        with log_shown(bar.console, lambda words: bar.update(task, description=words)):
+            results = run_model(
+                functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
+                overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, progress=show,
+            )  # fmt: skip
     with results:
         print_summary(results)
     if out is not None:

@@ -1,5 +1,6 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
+import html
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -14,6 +15,7 @@ from tolcontact.declaration.part import Face, Part, Point
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import direction, script_line
 from tolcontact.declaration.vectors import vector as _vector
+from tolcontact.method import Method
 
 CONSTANT = 1e-3
 
@@ -24,22 +26,37 @@ class Assembly:
     The methods only note what is said; `faults()` lists what is wrong with it, all at once.
     """
 
-    def __init__(
-        self,
-        name: str,
-        parts: Iterable[Part] = (),
-        locations: Iterable[Location] = (),
-        pairs: Iterable[ContactPair] = (),
-        measures: Iterable[Measure] = (),
-        forces: Iterable[Force] = (),
-    ) -> None:
-        """Scripts give the name only, and declare the rest by the methods."""
+    def __init__(self, name: str, *, method: Method | None = None) -> None:
+        """`method` is how contact in this model has to be resolved, unless whoever runs it says otherwise."""
+        _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         self.name = name
-        self._parts = list(parts)
-        self._locations = list(locations)
-        self._pairs = list(pairs)
-        self._measures = list(measures)
-        self._forces = list(forces)
+        self.method = method
+        self._parts: list[Part] = []
+        self._locations: list[Location] = []
+        self._pairs: list[ContactPair] = []
+        self._measures: list[Measure] = []
+        self._forces: list[Force] = []
+
+    @classmethod
+    def of(
+        cls,
+        name: str,
+        method: Method | None,
+        *,
+        parts: Iterable[Part],
+        locations: Iterable[Location],
+        pairs: Iterable[ContactPair],
+        measures: Iterable[Measure],
+        forces: Iterable[Force],
+    ) -> "Assembly":
+        """An assembly of things that are declared already."""
+        made = cls(name, method=method)
+        made._parts.extend(parts)
+        made._locations.extend(locations)
+        made._pairs.extend(pairs)
+        made._measures.extend(measures)
+        made._forces.extend(forces)
+        return made
 
     @property
     def parts(self) -> tuple[Part, ...]:
@@ -79,7 +96,7 @@ class Assembly:
 
     def locate(
         self, part: Part, scheme: ThreeTwoOne | Sequence[Locator], *, tolerance: Any = None, on: Part | None = None
-    ) -> None:
+    ) -> Location:
         """Locate a part by six locators, on the ground or `on` another part.
 
         `tolerance` holds for every locator that has none of its own: the full width of its zone [mm], a Tolerance, or
@@ -92,6 +109,7 @@ class Assembly:
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
         common = None if tolerance is None else _tolerance(tolerance)
         self._locations.append(Location(part, scheme, common, on, script_line()))
+        return self._locations[-1]
 
     def contact(
         self,
@@ -102,16 +120,18 @@ class Assembly:
         points: int | str | None = None,
         spacing: float | None = None,
         within: float | None = None,
-    ) -> None:
+    ) -> ContactPair:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
             _expect(f'contact "{name}": {side}', face, Face, 'part.face("+z")')
         self._pairs.append(ContactPair(name, moving, reference, points, spacing, within, script_line()))
+        return self._pairs[-1]
 
-    def force(self, name: str, *, at: Point, vector: Any) -> None:
+    def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         _expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
         self._forces.append(Force(name, at, _vector(vector), script_line()))
+        return self._forces[-1]
 
     def measure(
         self,
@@ -122,10 +142,11 @@ class Assembly:
         along: Any = None,
         tolerance: float | None = None,
         units: str = "mm",
-    ) -> None:
+    ) -> Measure:
         """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
         axis = None if along is None else direction(along)
         self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line()))
+        return self._measures[-1]
 
     def location_of(self, part: Part) -> Location | None:
         """How `part` is located; None where it is not."""
@@ -214,6 +235,13 @@ class Assembly:
     def __str__(self) -> str:
         rows = [*self._parts, *self._locations, *self._pairs, *self._forces, *self._measures]
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
+
+    def __repr__(self) -> str:
+        return str(self)
+
+    def _repr_html_(self) -> str:
+        """As notebooks show it."""
+        return f"<pre>{html.escape(str(self))}</pre>"
 
 
 def _expect(what: str, value: Any, kind: Any, wanted: str) -> None:

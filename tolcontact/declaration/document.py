@@ -1,6 +1,7 @@
 """An assembly as a plain document (dicts, lists, numbers, texts), and back: what an archive keeps of a model."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any, TypeVar
 
 from tolcontact.declaration.assembly import Assembly
@@ -15,6 +16,8 @@ from tolcontact.declaration.selection import Facing, Inside, Triangles
 from tolcontact.declaration.tape import Tape, tape_of
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.declaration.vectors import DIRECTIONS
+from tolcontact.errors import OptionError
+from tolcontact.method import Method
 
 Document = dict[str, Any]
 T = TypeVar("T")
@@ -43,6 +46,7 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
 
     return {
         "name": assembly.name,
+        "method": None if assembly.method is None else asdict(assembly.method),
         "parts": [
             {"geometry": _geometry(part.geometry), **_plain(part, "name", "at", "rotation", "fixed", "declared_at")}
             for part in assembly.parts
@@ -156,13 +160,14 @@ def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
         if new.name in parts:
             raise said["name"].wrong("a name that no other part has")
         parts[new.name] = new
-    assembly = Assembly(
+    assembly = Assembly.of(
         whole["name"].text(),
-        parts.values(),
-        map(location, whole["locations"]),
-        map(pair, whole["pairs"]),
-        map(measure, whole["measures"]),
-        map(force, whole["forces"]),
+        _optional(whole["method"], _method_of) if "method" in whole else None,  # which the first format does not say
+        parts=parts.values(),
+        locations=map(location, whole["locations"]),
+        pairs=map(pair, whole["pairs"]),
+        measures=map(measure, whole["measures"]),
+        forces=map(force, whole["forces"]),
     )
     for fault in assembly.faults():  # a model that has any is not archived
         raise whole.refused(fault)
@@ -171,6 +176,14 @@ def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
 
 def _optional(said: Said, read: Callable[[Said], T]) -> T | None:
     return None if said.is_none else read(said)
+
+
+def _method_of(said: Said) -> Method:
+    choices = {word: value.text() if value.is_text else value.number() for word, value in said.pairs().items()}
+    try:
+        return Method(**choices)  # type: ignore[arg-type]
+    except (OptionError, TypeError) as error:
+        raise said.refused(str(error)) from error
 
 
 def _count(said: Said) -> int:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tolcontact.declaration.selection import Picker
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Part:
     """A rigid body: its shape, its place in the nominal assembly, and whether contact may move it.
 
@@ -52,8 +52,11 @@ class Part:
         choice = {None: "", True: ", fixed", False: ", free"}[self.fixed]
         return f"part {self.name}: {self.geometry}{place}{choice}"
 
+    def __repr__(self) -> str:
+        return str(self)
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Point:
     """A point of a part, in the part's own frame [mm]."""
 
@@ -67,8 +70,11 @@ class Point:
     def __str__(self) -> str:
         return "{} ({:g}, {:g}, {:g})".format(self.part.name, *self.position)
 
+    def __repr__(self) -> str:
+        return str(self)
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Face:
     """What of a part's surface meets all criteria."""
 
@@ -86,3 +92,6 @@ class Face:
 
     def __str__(self) -> str:
         return " ".join([self.part.name, *map(str, self.selections)])
+
+    def __repr__(self) -> str:
+        return str(self)

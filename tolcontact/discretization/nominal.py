@@ -24,7 +24,7 @@ from tolcontact.discretization.shapes import field_surface, shape
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
 from tolcontact.discretization.three_two_one import lay_out
-from tolcontact.errors import ContactWarning, ModelError
+from tolcontact.errors import ContactWarning, ModelError, shown
 
 CONDITION_LIMIT = 1e8
 DEFAULT_REACH = 0.1
@@ -336,7 +336,7 @@ def _announce(pair: ContactPair, area: float, count: int | None) -> None:
     log.log(
         logging.WARNING if points and points > MANY else logging.INFO,
         'contact pair "%s": some %d contact points, some %.0f s',
-        pair.name, points or 0, SECONDS_PER_POINT * (points or 0),
+        shown(pair.name), points or 0, SECONDS_PER_POINT * (points or 0),
     )  # fmt: skip
 
 

@@ -16,9 +16,8 @@ from tolcontact.errors import OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED
-from tolcontact.workflow.run import Model, check_counts, declared
+from tolcontact.workflow.run import Choice, Model, check_counts, chosen, declared
 
-STANDARD = Method()
 WARM_UP = 64  # realizations before the clock runs
 SPEAKS = ("resolution", "objective")  # words whose values say what they are
 QUANTILES = {"median": 0.5, "largest": 1.0}
@@ -30,7 +29,7 @@ def compare(
     *,
     samples: int = 1000,
     seed: int = 1,
-    methods: Method | Sequence[Method] = STANDARD,
+    methods: Choice | Sequence[Choice] | None = None,
 ) -> xr.Dataset:
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
@@ -49,18 +48,20 @@ def compare(
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
     check_counts(samples=samples, seed=seed)
-    solvers, methods = [solvers] if isinstance(solvers, str) else solvers, [methods] if isinstance(methods, Method) else methods
-    for word, named in {"solvers": solvers, "methods": methods}.items():
+    assembly = declared(model)
+    solvers = [solvers] if isinstance(solvers, str) else solvers
+    resolved_by = [chosen(assembly, each) for each in (methods if isinstance(methods, Sequence) else [methods])]
+    for word, named in {"solvers": solvers, "methods": resolved_by}.items():
         if not named or len(set(named)) < len(named):
             raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
-    nominal = discretize(declared(model))
-    contestants = [(solver, method) for method in methods for solver in solvers]
+    nominal = discretize(assembly)
+    contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
     first = _simulated(programs[0], samples, seed)
     rows = [_row(first, first, corners), *(_row(_simulated(each, samples, seed), first, corners) for each in programs[1:])]
     labels = {
-        words.SOLVER: [" ".join([solver, *_apart(method, methods)]) for solver, method in contestants],
+        words.SOLVER: [" ".join([solver, *_apart(method, resolved_by)]) for solver, method in contestants],
         words.STATUS_MEANING: list(words.STATUS_MEANINGS),
         words.EXTENT: list(QUANTILES),
     }
@@ -75,8 +76,8 @@ def compare(
             "reference_solver": labels[words.SOLVER][0],
             "realizations": samples,
             "seed": seed,
-            "resolution": ", ".join(dict.fromkeys(method.resolution for method in methods)),
-            "objective": ", ".join(dict.fromkeys(method.objective for method in methods)),
+            "resolution": ", ".join(dict.fromkeys(method.resolution for method in resolved_by)),
+            "objective": ", ".join(dict.fromkeys(method.objective for method in resolved_by)),
         },
     )
 

@@ -1,8 +1,10 @@
 """From a declared assembly to an archive: the whole flow in one call."""
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import xarray as xr
 
@@ -11,7 +13,7 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
-from tolcontact.errors import OptionError
+from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
@@ -23,14 +25,38 @@ DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
 Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
+Choice = Method | Mapping[str, Any]  # a method, or some of its words, the others as the model says
 
 
-def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Method | None = None) -> Program:
+def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
     """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
 
-    Raises ModelError with all its faults, OptionError for a solver that cannot be used.
+    `method` is used instead of the model's own; of a mapping, such as {"resolution": "exact"}, its words only.
+    Raises ModelError with all its faults, OptionError for a solver or a method that cannot be used.
     """
-    return compile_program(discretize(declared(model)), solver, method or Method())
+    assembly = declared(model)
+    return compile_program(discretize(assembly), solver, chosen(assembly, method))
+
+
+def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
+    """What is wrong with a model, every fault; nothing where it can be built (see `build`)."""
+    try:
+        build(model, solver=solver, method=method)
+    except ModelError as error:
+        return error.faults
+    return ()
+
+
+def chosen(assembly: Assembly, method: Choice | None) -> Method:
+    """The method that an assembly is resolved with. Raises OptionError for a word that no method has."""
+    own = assembly.method or Method()
+    if method is None or isinstance(method, Method):
+        return method or own
+    known = [field.name for field in fields(Method)]
+    for word in method:
+        if word not in known:
+            raise OptionError(f"a method has no {word!r}; expected some of: {', '.join(known)}")
+    return replace(own, **method)
 
 
 def declared(model: Model) -> Assembly:
@@ -52,7 +78,7 @@ def run(
     samples: int = 1000,
     seed: int = 1,
     solver: str | None = None,
-    method: Method | None = None,
+    method: Choice | None = None,
     out: str | Path | None = None,
     overwrite: bool = False,
     resume: bool = False,
@@ -62,7 +88,8 @@ def run(
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
-    `model` is what `build` takes, or what it gives: a Program, which has its solver and method (else qpoases, Method()).
+    `model` is what `build` takes, or what it gives: a Program, which has its solver and method (else qpoases, and the
+    model's own method).
     Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.

@@ -1,0 +1,78 @@
+"""What a user sees first: names, handles, versions, how things print, and a model's own method."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.test_bad_input import call
+from tolcontact.errors import OptionError
+
+EXACT = tc.Method(resolution="exact", objective="all points")
+
+
+def test_every_public_name_is_there_and_the_version_is_the_projects(tmp_path):
+    for name in tc.__all__:
+        assert getattr(tc, name) is not None
+    project = tomllib.loads((Path(tc.__file__).parents[1] / "pyproject.toml").read_text())["project"]
+    assert tc.__version__ == project["version"]
+    done = call(tmp_path, "--version")
+    assert (done.returncode, done.stdout) == (0, f"tolcontact {project['version']}\n")
+
+
+def test_declarations_return_what_they_declare():
+    a = tc.Assembly("handles")
+    below, above = a.part("below", tc.Box(20, 20, 5), fixed=True), a.part("above", tc.Box(10, 10, 5), at=(5, 5, 5))
+    location = a.locate(above, tc.three_two_one(above.face("-z"), above.face("-y"), above.face("-x"), inset=1), tolerance=0.1)
+    pair = a.contact("joint", moving=above.face("-z"), reference=below.face("+z"), points=20)
+    force = a.force("push", at=above.point(5, 5, 5), vector=(0, 0, -1))
+    measure = a.measure("height", above.point(5, 5, 5), along="z")
+    assert (location,) == a.locations and (pair,) == a.pairs and (force,) == a.forces and (measure,) == a.measures
+    assert isinstance(pair, tc.ContactPair) and isinstance(measure, tc.Measure) and isinstance(force, tc.Force)
+
+
+def test_declared_things_print_as_rows():
+    a = cases.model("ra1")
+    assert repr(a) == str(a) and "contact interface" in repr(a)
+    assert a._repr_html_().startswith("<pre>assembly RA1") and "<script" not in tc.Assembly("<script>")._repr_html_()
+    assert repr(a.parts[0]) == "part base: box 100 x 50 x 10 mm"
+    assert repr(a.parts[0].face("+z")) == "base +z" and repr(a.parts[0].point(1, 2, 3)) == "base (1, 2, 3)"
+
+
+def test_faults_are_listed_without_a_run():
+    assert tc.check(cases.model("ra1")) == ()
+    (fault,) = tc.check(cases.model("ra1"), method={"objective": "seating"})
+    assert "force" in fault
+
+
+def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tmp_path):
+    model = cases.model("tower", 2)
+    assert model.method == EXACT
+    for given, expected, whose in (
+        (None, EXACT, "model"),
+        ({"resolution": "linearized"}, tc.Method(objective="all points"), "options"),
+        (tc.Method(), tc.Method(), "options"),
+    ):
+        with tc.run(model, samples=20, solver="daqp", method=given) as run:
+            assert (run.attrs["resolution"], run.attrs["objective"]) == (expected.resolution, expected.objective)
+            assert run.attrs["method_from"] == whose
+            assert tc.model_of(run).method == EXACT
+    with tc.run(cases.stack(), samples=20, solver="daqp") as run:
+        assert run.attrs["method_from"] == "defaults" and tc.model_of(run).method is None
+    (tmp_path / "tower.py").write_text((cases.MODELS / "tower.py").read_text())
+    assert "resolution: exact" in call(tmp_path, "run", "tower.py", "--samples", "20").stdout
+    linear = call(tmp_path, "run", "tower.py", "--samples", "20", "--resolution", "linearized").stdout
+    assert "resolution: linearized; objective: all points" in linear
+    found = tc.compare(model, "daqp", samples=20)
+    assert (found.attrs["resolution"], found.attrs["objective"]) == ("exact", "all points")
+    assert np.isfinite(found["pose_difference"]).all()
+
+
+def test_what_is_no_method_is_refused():
+    with pytest.raises(TypeError, match=r'assembly "x": method is a str; expected tc.Method'):
+        tc.Assembly("x", method="exact")
+    with pytest.raises(OptionError, match="a method has no 'resolutoin'; expected some of: resolution, objective"):
+        tc.run(cases.stack(), samples=20, method={"resolutoin": "exact"})
