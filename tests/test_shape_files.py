@@ -75,7 +75,8 @@ def stalling():
 ALONE = """
 import sys
 import tolcontact as tc
-from tolcontact.discretization import discretize, reader
+from tolcontact.discretization import discretize
+from tolcontact.discretization.shape_files import reader
 from tolcontact.errors import ModelError
 reader.SECONDS = 2.0
 a = tc.Assembly("strange")

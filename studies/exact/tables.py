@@ -26,7 +26,7 @@ def model(name: str, *choices) -> tc.Assembly:
 
 def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = None, solver: str = "daqp"):
     """Arrays of all realizations by name, and the time [s] from draws to measures."""
-    program = tc.build(assembly, solver=solver, method=method)
+    program = tc.build(assembly, solver=solver, method=method or tc.Method())
     start = time.perf_counter()
     blocks = list(simulate_blocks(program, samples=samples, seed=1))
     taken = time.perf_counter() - start

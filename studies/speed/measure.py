@@ -53,7 +53,7 @@ def ours(
     method: tc.Method | None = None,
     block: int = running.BLOCK,
 ) -> Contender:
-    program = tc.build(assembly, solver=solver, method=method)
+    program = tc.build(assembly, solver=solver, method=method or tc.Method())
     list(simulate_blocks(program, samples=256, seed=1))
 
     def turn() -> float:
