@@ -87,7 +87,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
 
     contact_solver.Mapped.__call__ = record
     try:
-        program = tc.build(assembly, solver="daqp")
+        program = tc.build(assembly, solver="daqp", method=tc.Method())
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
         contact_program._standing, contact_solver.Mapped.__call__ = kept, solve

@@ -298,7 +298,7 @@ def breakdown(samples: int) -> None:
                 whole = time.perf_counter() - start
                 with tempfile.TemporaryDirectory() as folder:
                     path = Path(folder) / "run.nc"
-                    with ArchiveWriter(path, program, seed=1, samples=samples // 4, keep="measures") as writer:
+                    with ArchiveWriter(path, program, seed=1, samples=samples // 4, keep="measures", surfaces=0) as writer:
                         for block in blocks:
                             writer.append(block)
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
