@@ -18,7 +18,7 @@ from tolcontact.archive import inspection
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
-HARMLESS = ("type of free length", "declared_at is an escape")  # what is never read, and what is shown as it is written
+HARMLESS = ("declared_at is an escape",)  # what is shown as it is written
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
 

@@ -124,7 +124,8 @@ def _check_group(group: netCDF4.Dataset, size: int) -> None:
     _check_attributes(group)
     for name, variable in group.variables.items():
         where = f"{group.path.rstrip('/')}/{name}"
-        if not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
+        own = isinstance(variable.datatype, netCDF4.VLType | netCDF4.CompoundType | netCDF4.EnumType)
+        if own or not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
             raise DamagedError(f"is no archive of tolcontact: {where} holds neither numbers nor text")
         least = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
         packed = any((variable.filters() or {}).get(word) for word in ("zlib", "szip", "zstd", "bzip2", "blosc"))

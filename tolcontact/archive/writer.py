@@ -152,11 +152,13 @@ class ArchiveWriter:
             words.DEVIATION: block.deviations,
             words.STATUS: block.status,
         }
-        for variable in self._rows_kept:
+        # As they will be stored: once, for the file and for the checksum.
+        values = {variable: np.ascontiguousarray(values[variable], dtype=variable.kind) for variable in self._rows_kept}
+        for variable, data in values.items():
             stored = self._stored(variable)
-            if values[variable].size and variable is not words.STATUS and stored is not None:
-                stored[rows] = values[variable]
-        checksums = [crc32(variable, values[variable]) for variable in self._rows_kept]
+            if data.size and variable is not words.STATUS and stored is not None:
+                stored[rows] = data
+        checksums = [crc32(variable, data) for variable, data in values.items()]
         self._file[words.ROW_CHECKSUM.name][block.start // self.block_rows] = checksums
         self._file.sync()
         self._file[words.STATUS.name][rows] = block.status
