@@ -111,13 +111,15 @@ def test_a_status_that_turned_to_unfinished_does_not_hide_what_comes_behind(good
         tc.summarize(path)
 
 
-def test_realizations_that_were_taken_from_an_archive_can_be_summarized(good, tmp_path):
+@pytest.mark.parametrize("count", [100, 4900])
+def test_realizations_that_were_taken_from_an_archive_can_be_summarized(count, good, tmp_path):
     with tc.open_archive(good) as whole:
         some = whole.map_over_datasets(
-            lambda group: group.isel(realization=slice(100)) if "realization" in group.dims else group
+            lambda group: group.isel(realization=slice(count)) if "realization" in group.dims else group
         )
         some.to_netcdf(tmp_path / "some.nc")
-    assert tc.summarize(tmp_path / "some.nc").attrs["realizations"] == 100
+    found = tc.summarize(tmp_path / "some.nc")
+    assert found.attrs["realizations"] == found.attrs["samples"] == count
 
 
 def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):

@@ -13,7 +13,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.archive import writer
+from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
 
 COMMAND = [sys.executable, "-m", "tolcontact"]
@@ -100,7 +100,7 @@ def test_more_than_the_disk_holds_is_refused_before_the_first_byte(tmp_path):
 
 
 def test_a_long_run_stands_under_its_own_name_from_its_first_block_on(tmp_path):
-    path, sizes, samples = tmp_path / "long.nc", [], writer.FIRST_ROWS + 9000
+    path, sizes, samples = tmp_path / "long.nc", [], vocabulary.FIRST_ROWS + 9000
     tc.run(
         cases.stack(), samples=samples, solver="daqp", out=path, keep="measures",
         progress=lambda rows: sizes.append((rows, path.stat().st_size)),

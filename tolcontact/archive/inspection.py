@@ -102,7 +102,7 @@ def _check_format(file: netCDF4.Dataset) -> None:
         raise DamagedError(f"is damaged: its format is {number!r}")
     if number > words.FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {words.FORMAT}, a newer one does"
+            f"has format {number}; this version of tolcontact reads formats up to {words.FORMAT}; use a newer one"
         )
 
 

@@ -27,20 +27,28 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
     if real.exists() and not real.is_file():
         raise ArchiveError(f'archive "{path}" cannot be written: it is not a file')
     lock = real.with_name(f".{real.name}.lock")
+    holding = FileLock(lock, timeout=0)
+    try:
+        _acquire(holding, lock, path)
+        if real.exists():
+            _check_replaceable(path, real, asked=overwrite or resume)
+        yield real
+    finally:
+        # Also whoever was stopped between making the file and locking it leaves none behind, unless it is another run's.
+        with contextlib.suppress(OSError):
+            holding.acquire()
+            lock.unlink(missing_ok=True)  # whoever opened it meanwhile finds that it is gone, and tries again
+            holding.release(force=True)
+
+
+def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
     try:
         lock.touch()  # says what is wrong where it cannot be made
-        holding = FileLock(lock, timeout=0).acquire()
+        holding.acquire()
     except Timeout as error:
         raise ArchiveError(f'archive "{path}" is being written by another run; wait, or write to a new file') from error
     except OSError as error:
         raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror}') from error
-    with holding:
-        try:
-            if real.exists():
-                _check_replaceable(path, real, asked=overwrite or resume)
-            yield real
-        finally:
-            lock.unlink(missing_ok=True)  # whoever opened it meanwhile finds that it is gone, and tries again
 
 
 def _check_replaceable(path: str | Path, real: Path, *, asked: bool) -> None:

@@ -33,7 +33,6 @@ from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments
 
-FIRST_ROWS = 12 * words.BLOCK_ROWS  # that there is room for from the beginning
 FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be
 
 
@@ -54,7 +53,7 @@ class ArchiveWriter:
         check_room(path, program.nominal, kept_rows(keep), samples)
         with _replacing(path) as part, _opened(part, "w") as file:
             write_header(file, program, run_settings(program, seed, samples, keep), surfaces)
-            lay_out_rows(file, 0, min(samples, FIRST_ROWS))
+            lay_out_rows(file, 0, min(samples, words.FIRST_ROWS))
         self._go_on(path, program.nominal)
 
     @classmethod

@@ -39,7 +39,7 @@ def run(
     if out is None and (overwrite or resume):
         raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
     method = chosen(resolution=resolution, objective=objective)
-    with progress_bar() as bar, stopped(out, done := [0, samples]):
+    with stopped(out, done := [0, samples]), progress_bar() as bar:  # who stops it gets the cursor back first
         task = bar.add_task(shown(model.stem), total=samples)
 
         def show(rows: int) -> None:

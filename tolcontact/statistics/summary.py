@@ -85,7 +85,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
         attrs={
             "title": results.attrs.get("title", ""),
             "realizations": total,
-            "samples": max(total, int(results.attrs["samples"])),
+            "samples": _begun_for(results, total),
             **{word: results.attrs[word] for word in ("resolution", "objective", "active_set")},
             "smallest_range": _smallest_range(results, rows),
         },
@@ -173,6 +173,13 @@ def finished(results: xr.DataTree) -> int:
             return rows + int(unfinished[0])
         rows += len(piece)
     return rows
+
+
+def _begun_for(results: xr.DataTree, done: int) -> int:
+    """How many realizations the run was begun for; those that are there, if somebody took them from an archive."""
+    samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[words.REALIZATION]
+    unfinished = size > done or size == words.FIRST_ROWS
+    return max(samples, done) if unfinished else done
 
 
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:

@@ -14,6 +14,7 @@ AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
 CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
 BLOCK, ROW_VARIABLE = "block", "row_variable"
+FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")

@@ -135,10 +135,10 @@ def _simulate(program: Program, writer: ArchiveWriter, seed: int, progress: Prog
                 writer.check_point()
             if progress:
                 progress(writer.rows)
+        writer.write_fields()
     except KeyboardInterrupt:
         writer.write_fields_of_checkpoint()
         raise
-    writer.write_fields()
     rows = writer.chosen(seed)
     if rows.size:
         kept = writer.poses(rows)
