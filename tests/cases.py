@@ -298,7 +298,7 @@ def ring_opening(wedges: int, sigma: float = 0.05) -> float:
 
 def excess_of_hinged_ring(nominal, deviations: np.ndarray, sigma: float = 0.05) -> np.ndarray:
     """By how much (realization,) the wedges are wider than the full turn, at 30 mm from the axis [mm]."""
-    labels = nominal.locator_labels
+    labels = nominal.locators.labels
     wide = sum(
         (1.0 if label.startswith("ahead") else -1.0) * deviations[:, column]
         for column, label in enumerate(labels)

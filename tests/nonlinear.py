@@ -23,7 +23,7 @@ class TrueProblem:
         self.centre, self.length = every.mean(axis=0), np.linalg.norm(every.std(axis=0))
         parts = len(nominal.parts)
         raw, new = ca.SX.sym("raw", 12, parts), ca.SX.sym("new", 12, parts)
-        deviations = ca.SX.sym("deviations", len(nominal.locator_labels))
+        deviations = ca.SX.sym("deviations", len(nominal.locators.labels))
         weights = [ca.SX.sym(f"w{k}", 1, len(pair.P_m)) for k, pair in enumerate(nominal.pairs)]
         gaps = ca.vertcat(*(self._gaps(pair, new, deviations) for pair in nominal.pairs))
         springs, stiffness, elongations = self._locators(raw, new, deviations)
@@ -61,7 +61,7 @@ class TrueProblem:
         else:
             x_r, n = at(new, pair.reference, pair.P_r), turned(new, pair.reference) @ ca.DM(pair.n_r.T)
         gap = ca.sum1((x_m - x_r) * n).T
-        return gap if pair.locators is None else gap - ca.vertcat(*(deviations[int(k)] for k in pair.locators))
+        return gap - ca.DM(pair.offsets.matrix.T) @ deviations[pair.offsets.columns.tolist()] if pair.is_supports else gap
 
     def _motion(self, raw, new, weights):
         """1/2 sum of squared displacements: of the points that count, and of all points as small balls; their numbers."""
@@ -79,14 +79,14 @@ class TrueProblem:
 
     def _locators(self, raw, new, deviations):
         """Energy of the two-sided locators as springs, their total stiffness, and their elongations from the deviation."""
-        labels = np.cumsum([0, *(len(part.labels) for part in self.nominal.parts)])
+        labels = np.cumsum([0, *(len(part.locators) for part in self.nominal.parts)])
         springs, stiffness, elongations = 0, 0, []
         for part in self.free:
             own = self.nominal.parts[part]
-            for k in np.flatnonzero(~own.one_sided):
-                a, b = own.locator_points[[k]], ca.DM(own.locator_directions[k])
-                springs += own.stiffness[k] * ca.dot(b, at(new, part, a) - at(raw, part, a)) ** 2 / 2
-                stiffness += own.stiffness[k]
+            for k in np.flatnonzero(~own.locators.one_sided):
+                a, b = own.locators.points[[k]], ca.DM(own.locators.directions[k])
+                springs += own.locators.stiffness[k] * ca.dot(b, at(new, part, a) - at(raw, part, a)) ** 2 / 2
+                stiffness += own.locators.stiffness[k]
                 elongations.append(ca.dot(b, at(new, part, a) - ca.DM(a.T)) - deviations[int(labels[part] + k)])
         return springs, stiffness, elongations
 
@@ -118,7 +118,7 @@ class TrueProblem:
         split = np.split(raw_gaps, np.cumsum([len(pair.P_m) for pair in pairs])[:-1])
         if self.objective != "active points":
             return every
-        return [np.where(gap < 1e-9, 1.0, 0.0) * (pair.locators is None) for gap, pair in zip(split, pairs, strict=True)]
+        return [np.where(gap < 1e-9, 1.0, 0.0) * (not pair.is_supports) for gap, pair in zip(split, pairs, strict=True)]
 
     def solve(self, raw, deviations, weights) -> tuple[float, bool]:
         """Least energy from the raw poses (part, 12), and whether ipopt is content."""

@@ -117,7 +117,7 @@ def test_limits_that_are_none_are_refused(option):
 
 
 def errors_of_the_v(program, run):
-    labels = program.nominal.locator_labels
+    labels = program.nominal.locators.labels
     left, right = (run["deviations"][:, labels.index(f"{side}.H")] for side in ("left", "right"))
     return run["measured"][:, CORRECTED, 0] - (left + right) / np.sqrt(2)
 

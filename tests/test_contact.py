@@ -148,7 +148,7 @@ def test_one_dimensional_contact(base_tolerance):
     _, run = simulate(cases.one_dimensional(base_tolerance), samples=samples, solver="daqp")
     labels = ["base.Z", "block.Z"]
     program = tc.build(cases.one_dimensional(base_tolerance))
-    base, block = (run["deviations"][:, program.nominal.locator_labels.index(label)] for label in labels)
+    base, block = (run["deviations"][:, program.nominal.locators.labels.index(label)] for label in labels)
     height = run["measured"][:, CORRECTED, 0]
     assert np.abs(height - np.maximum(base, block)).max() < 1e-9
     mean, variance = (0.398942, 0.340845) if base_tolerance == 0 else (0.564190, 1 - 1 / np.pi)
@@ -251,7 +251,7 @@ def test_a_single_stop_holds(stops, method):
     for state in (RAW, CORRECTED):
         R, t = R_t(run["poses"][:, state, 1])
         places = pair.P_m @ R.swapaxes(1, 2) + t[:, None]
-        gaps[state] = ((places - pair.P_r) * pair.n_r).sum(axis=2) - run["deviations"][:, pair.locators]
+        gaps[state] = ((places - pair.P_r) * pair.n_r).sum(axis=2) - run["deviations"][:, pair.offsets.columns]
     assert (run["active"][:, 0] == (gaps[RAW] < 0).sum(axis=1)).all()
     assert (gaps[RAW] < -0.1).any() and gaps[CORRECTED].min() > -1e-9
     assert ((run["status"] == Status.RESOLVED) == (gaps[RAW] < 0).any(axis=1)).all()

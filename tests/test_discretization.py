@@ -73,9 +73,9 @@ def test_projections_on_curved_faces_lie_on_them_with_normals_outward(solid):
 
 def test_a_three_two_one_scheme_stands_inside_the_edges_of_its_faces():
     base, top = discretize(cases.model("ra1")).parts
-    assert base.locator_points.tolist() == [[5, 5, 0], [95, 5, 0], [50, 45, 0], [5, 0, 5], [95, 0, 5], [0, 25, 5]]
-    assert top.locator_points[:3, :2].tolist() == [[55, 32.5], [95, 32.5], [75, 17.5]]
-    assert base.locator_directions.tolist() == [[0, 0, 1]] * 3 + [[0, 1, 0]] * 2 + [[1, 0, 0]]
+    assert base.locators.points.tolist() == [[5, 5, 0], [95, 5, 0], [50, 45, 0], [5, 0, 5], [95, 0, 5], [0, 25, 5]]
+    assert top.locators.points[:3, :2].tolist() == [[55, 32.5], [95, 32.5], [75, 17.5]]
+    assert base.locators.directions.tolist() == [[0, 0, 1]] * 3 + [[0, 1, 0]] * 2 + [[1, 0, 0]]
 
 
 def test_every_declared_thing_prints_as_one_row_and_remembers_its_line():

@@ -7,10 +7,9 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.compilation import contact_qp as contact_program
-from tolcontact.compilation.functions import batch
-from tolcontact.compilation.functions.batch import Mapped
-from tolcontact.compilation.functions.native import OPERATIONS, Native, UnknownInstructionError
+from tolcontact.compilation import contact_qp
+from tolcontact.compilation.functions import InterpretedFunction, adaptive
+from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import discretize
@@ -31,11 +30,11 @@ MODELS = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": l
 def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(make, method):
     nominal = discretize(make())
     for group in contact_groups(nominal):
-        gaps = [gap_map(gap_matrix(pair)) for pair in nominal.pairs]
-        program = contact_program.contact_program(nominal, group, gaps, method, plugin("daqp"))
+        gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
+        program = contact_qp.contact_program(nominal, group, gaps, method, plugin("daqp"))
         for function in (program.assemble, program.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
-            for found, expected in zip(Native(function)(inputs), Mapped(function)(inputs)[0], strict=True):
+            for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):
                 assert np.array_equal(found, expected, equal_nan=True)
 
 
@@ -49,7 +48,7 @@ def test_every_translated_instruction_does_what_casadi_does():
     assert set(OPERATIONS) - used <= {ca.OP_ASSIGN, ca.OP_FABS}
     special = np.array([0.0, -0.0, 1.0, -2.5, 1e300, np.inf, -np.inf, np.nan])
     grid = [each.reshape(-1, 1) for each in np.meshgrid(special, special)]
-    found, expected = Native(function)(grid)[0], Mapped(function)(grid)[0][0]
+    found, expected = NativeFunction(function)(grid)[0], InterpretedFunction(function)(grid)[0][0]
     assert np.array_equal(found, expected, equal_nan=True)
     assert (np.signbit(found) == np.signbit(expected))[np.isfinite(expected)].all()
 
@@ -58,7 +57,7 @@ def test_an_instruction_without_translation_is_left_to_casadi():
     x = ca.SX.sym("x")
     function = ca.Function("f", [x], [ca.erf(x)])
     with pytest.raises(UnknownInstructionError):
-        Native(function)
+        NativeFunction(function)
 
 
 EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": cases.rollers} | {
@@ -71,7 +70,7 @@ EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": 
 def test_few_rows_give_what_all_rows_give(make, resolution, monkeypatch):
     """Curved contact and several bodies included: the same QPs, once with the rows that are found, once with every row."""
     few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
-    monkeypatch.setattr(contact_program, "_standing", lambda gaps, method: np.arange(gaps.coordinates.shape[1]))
+    monkeypatch.setattr(contact_qp, "standing_points", lambda gaps, method: np.arange(gaps.coordinates.shape[1]))
     every = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
     assert any(len(g.program.standing[0]) > 4 for g in every.groups)
     blocks = [next(simulate_blocks(program, samples=40, seed=8)) for program in (few, every)]
@@ -84,7 +83,7 @@ def test_few_rows_give_what_all_rows_give(make, resolution, monkeypatch):
 def test_only_corners_of_planar_contacts_can_be_the_deepest():
     (pair,) = discretize(cases.ra1()).pairs
     G = gap_matrix(pair)
-    found = gap_map(G)
+    found = gap_map(G, pair.offsets)
     assert found.basis.shape == (13, 3) and len(found.corners) == 4
     assert np.abs(found.basis @ found.coordinates - G).max() < 1e-11
     X = np.hstack([Rotation.random(500, rng=1).as_matrix().reshape(500, 9), RNG.normal(size=(500, 3)), np.ones((500, 1))])
@@ -121,7 +120,7 @@ def test_a_block_alone_does_not_depend_on_those_before():
 
 
 def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
-    monkeypatch.setattr(batch, "ENOUGH", 150)
+    monkeypatch.setattr(adaptive, "ENOUGH", 150)
     program = tc.build(cases.ra1(), solver="daqp")
     first, *_, last = (next(simulate_blocks(program, samples=100, seed=1)) for _ in range(4))
     assert program.place._evaluate._native is not None

@@ -113,8 +113,8 @@ def test_conflicts_do_not_loosen_two_sided_locators():
     assert stuck.sum() > 100 and stuck[2217]
     plate = program.nominal.parts[0]
     R, t = R_t(block.poses[:, CORRECTED, 0])
-    places = plate.locator_points @ R.swapaxes(1, 2) + t[:, None]
-    moved = ((places - plate.locator_points) * plate.locator_directions).sum(axis=2)[:, ~plate.one_sided]
+    places = plate.locators.points @ R.swapaxes(1, 2) + t[:, None]
+    moved = ((places - plate.locators.points) * plate.locators.directions).sum(axis=2)[:, ~plate.locators.one_sided]
     assert np.abs(moved[stuck | (block.status == Status.RESOLVED)]).max() < 1e-8
 
 

@@ -21,7 +21,7 @@ def heights(samples, seed, solver="daqp"):
     program = tc.build(cases.model("ra1"), solver=solver)
     blocks = list(simulate_blocks(program, samples=samples, seed=seed))
     labels = [f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]
-    columns = [program.nominal.locator_labels.index(label) for label in labels]
+    columns = [program.nominal.locators.labels.index(label) for label in labels]
     d = np.concatenate([b.deviations for b in blocks])[:, columns]
     return np.concatenate([b.measured[..., 0] for b in blocks]), d
 
@@ -81,8 +81,8 @@ def test_raw_mean_is_the_second_order_of_the_rotation(many):
     ours, _ = many
     program = tc.build(cases.model("ra1"))
     top = program.nominal.parts[1]
-    c = top.locator_points.mean(axis=0)
-    J = np.hstack([top.locator_directions, np.cross(top.locator_points - c, top.locator_directions)])
+    c = top.locators.points.mean(axis=0)
+    J = np.hstack([top.locators.directions, np.cross(top.locators.points - c, top.locators.directions)])
     covariance = SIGMA2 * (np.linalg.inv(J) @ np.linalg.inv(J).T)[3:, 3:]
     r = np.array([100, 12.5, 20]) - c
     predicted = 0.5 * (covariance @ r - np.trace(covariance) * r)[2]

@@ -99,7 +99,7 @@ def test_certificates_hold(assembly, solver, resolution, objective):
     # The archived least gaps are those of the archived poses, by the paper's formula.
     R, t = R_t(run["poses"])
     for index, pair in enumerate(program.nominal.pairs):
-        if pair.locators is None:
+        if not pair.is_supports:
             for k in range(20):
                 least = referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED]).min()
                 assert least == pytest.approx(run["gap_min"][k, CORRECTED, index], rel=1e-9, abs=1e-9)

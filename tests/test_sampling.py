@@ -58,6 +58,6 @@ def test_locators_and_realizations_are_independent():
 
 def test_a_locator_keeps_its_draws_when_others_come_or_go():
     alone, among = discretize(cases.one_dimensional(6)), discretize(cases.one_dimensional(0))
-    k = alone.locator_labels.index("block.Z")
+    k = alone.locators.labels.index("block.Z")
     assert (draw(alone, seed=1, start=0, stop=50)[:, k] == draw(among, seed=1, start=0, stop=50)[:, k]).all()
     assert (draw(among, seed=1, start=0, stop=50)[:, 0] == 0).all()

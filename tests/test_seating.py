@@ -42,7 +42,7 @@ def heights(run, program, state):
     """How far each leg's foot is above its support, (realization, leg): from the poses and deviations alone."""
     (part,) = program.nominal.parts
     R, t = R_t(run["poses"][:, state, 0])
-    foot = part.locator_points[:4] @ R.swapaxes(1, 2) + t[:, None]
+    foot = part.locators.points[:4] @ R.swapaxes(1, 2) + t[:, None]
     return foot[..., 2] - run["deviations"][:, :4]
 
 
@@ -57,7 +57,7 @@ def test_a_table_rocks_onto_the_three_legs_that_can_carry_its_weight(solver):
     # The weight's line of action goes through the triangle of the legs that carry.
     (part,) = program.nominal.parts
     R, t = R_t(run["poses"][:, CORRECTED, 0])
-    feet = part.locator_points[:4] @ R.swapaxes(1, 2) + t[:, None]
+    feet = part.locators.points[:4] @ R.swapaxes(1, 2) + t[:, None]
     weight = R @ [*WEIGHT, 42] + t
     for k in range(500):
         down = np.flatnonzero(np.abs(apart[k]) < 1e-8)
@@ -90,7 +90,7 @@ def test_the_raw_pose_fits_more_than_six_locators_by_least_squares():
     R, t = R_t(run["poses"][:, RAW, 0])
     part = program.nominal.parts[0]
     guided = (
-        (part.locator_points[4:] @ R.swapaxes(1, 2) + t[:, None] - part.locator_points[4:]) * part.locator_directions[4:]
+        (part.locators.points[4:] @ R.swapaxes(1, 2) + t[:, None] - part.locators.points[4:]) * part.locators.directions[4:]
     ).sum(2)
     assert np.abs(guided).max() < 2e-2  # two-sided locators are kept exactly, to first order
 
@@ -153,7 +153,7 @@ def test_a_part_pressed_onto_a_base_rests_on_three_points_and_keeps_its_guides()
     assert (run["carrying"].sum(axis=1) >= 3).all()
     part, start = program.nominal.parts[1], 6
     R, t = R_t(run["poses"][:, CORRECTED, 1])
-    moved = ((part.locator_points @ R.swapaxes(1, 2) + t[:, None] - part.locator_points) * part.locator_directions).sum(2)
+    moved = ((part.locators.points @ R.swapaxes(1, 2) + t[:, None] - part.locators.points) * part.locators.directions).sum(2)
     assert np.abs(moved[:, 3:] - run["deviations"][:, start + 3 :]).max() < 1e-8
     assert (moved[:, :3] - run["deviations"][:, start : start + 3]).min() > -1e-8
     # Vertical balance: base and supports together carry the clamp, but for the tilt of the base.

@@ -86,7 +86,7 @@ def test_raw_pose_puts_locators_where_their_deviations_say():
     program, poses = placed(cases.ra1(), deviations)
     for index, part in enumerate(program.nominal.parts):
         R, t = poses[0, index, :9].reshape(3, 3), poses[0, index, 9:]
-        moved = ((part.locator_points @ R.T + t - part.locator_points) * part.locator_directions).sum(axis=1)
+        moved = ((part.locators.points @ R.T + t - part.locators.points) * part.locators.directions).sum(axis=1)
         assert np.abs(moved - deviations[6 * index : 6 * index + 6]).max() < 1e-8
         assert np.abs(R.T @ R - np.eye(3)).max() < 1e-15
 

@@ -6,10 +6,37 @@ from math import pi
 from tolcontact.errors import OptionError
 
 RESOLUTIONS = ("linearized", "exact")
-OBJECTIVES = ("active points", "all points", "locator stiffness", "seating")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
 SEARCHES = ("fixed", "iterated")
+
+
+@dataclass(frozen=True)
+class Objective:
+    """What a corrected pose minimizes, with everything that depends on this choice but its energy.
+
+    reaction_units   of what the rows of contact points carry
+    counts_points    it sums up displacements of contact points,
+    counts_all       of all of them, not only of those that are active in the raw state
+    presses          forces press the parts: every realization moves, two-sided locators hold, and a force has to be declared
+    """
+
+    name: str
+    reaction_units: str
+    counts_points: bool = False
+    counts_all: bool = False
+    presses: bool = False
+
+
+OBJECTIVES = {
+    objective.name: objective
+    for objective in (
+        Objective("active points", "mm", counts_points=True),
+        Objective("all points", "mm", counts_points=True, counts_all=True),
+        Objective("locator stiffness", "N"),
+        Objective("seating", "N", presses=True),
+    )
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +77,7 @@ class Method:
     def __post_init__(self) -> None:
         choices = {
             "resolution": RESOLUTIONS,
-            "objective": OBJECTIVES,
+            "objective": tuple(OBJECTIVES),
             "regularization": REGULARIZATIONS,
             "active_set": ACTIVE_SETS,
             "search": SEARCHES,
@@ -68,3 +95,28 @@ class Method:
             raise OptionError(f"near_travel is {self.near_travel!r}; expected a number of part sizes above 0")
         if self.search == "iterated" and self.resolution != "exact":
             raise OptionError('search is "iterated" with a linearized resolution; it needs resolution "exact"')
+
+    @property
+    def minimizes(self) -> Objective:
+        """The objective, with what depends on it."""
+        return OBJECTIVES[self.objective]
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether steps are repeated until the true gaps are open."""
+        return self.resolution == "exact"
+
+    @property
+    def is_iterated(self) -> bool:
+        """Whether contact points are projected again before every step."""
+        return self.search == "iterated"
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether points may carry that are not active in the raw state."""
+        return self.active_set == "closed"
+
+    @property
+    def corners_suffice(self) -> bool:
+        """Whether of points that lie in one plane only the corners of their hull can carry: all may, and they stay."""
+        return self.is_closed and not self.is_iterated

@@ -50,8 +50,8 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
             x_r = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.P_r) + t[:, None, CORRECTED, pair.reference]
             n = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.n_r)
         gap = ((x_m - x_r) * n).sum(axis=2)
-        if pair.locators is not None:
-            gap = gap - run["deviations"][:, pair.locators]
+        if pair.is_supports:
+            gap = gap - run["deviations"][:, pair.offsets.columns]
         here = certified & ~run["searched"].astype(bool)
         found["archived gap"] += int(
             (np.abs(gap.min(axis=1) - run["gap_min"][:, CORRECTED, k])[here] > 1e-9 * size + 1e-9).sum()

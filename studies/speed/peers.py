@@ -82,9 +82,9 @@ class Loop:
         )
         self.schemes = []  # per part: inverse of the locator matrix about the locators' centroid, and that centroid
         for part in nominal.parts:
-            centre = part.locator_points.mean(axis=0) if len(part.locator_points) else np.zeros(3)
-            arms = part.locator_points - centre
-            rows = [np.r_[n, np.cross(x, n)] for x, n in zip(arms, part.locator_directions, strict=True)]
+            centre = part.locators.points.mean(axis=0) if len(part.locators.points) else np.zeros(3)
+            arms = part.locators.points - centre
+            rows = [np.r_[n, np.cross(x, n)] for x, n in zip(arms, part.locators.directions, strict=True)]
             self.schemes.append((np.linalg.inv(np.array(rows)) if rows else np.zeros((6, 0)), centre))
         measure = nominal.assembly.measures[0]
         self.at, self.along = nominal.place(measure.of), np.array(measure.along)

@@ -185,7 +185,10 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
     }
     if not pairs:
         return parts
-    locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
+    locators = [
+        pair.offsets.columns[pair.offsets.matrix.argmax(axis=0)] if pair.is_supports else np.full(len(pair.P_m), -1)
+        for pair in pairs
+    ]
     return parts | {
         words.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
         words.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
@@ -196,20 +199,21 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
 
 
 def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -> None:
-    group.createDimension(words.LOCATOR, len(nominal.locator_labels))
+    group.createDimension(words.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, words.DEVIATION)
-    write(group, words.LOCATOR_LABEL, nominal.locator_labels)
-    write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in nominal.tolerances])
+    locators = nominal.locators
+    write(group, words.LOCATOR_LABEL, locators.labels)
+    write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in locators.tolerances])
     write(
         group,
         words.DISTRIBUTION,
-        [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in nominal.tolerances],
+        [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in locators.tolerances],
     )
-    write(group, words.STIFFNESS, np.concatenate([part.stiffness for part in nominal.parts]))
-    write(group, words.ONE_SIDED, np.concatenate([part.one_sided for part in nominal.parts]))
-    write(group, words.LOCATOR_POINT, np.vstack([part.locator_points for part in nominal.parts]))
-    write(group, words.LOCATOR_DIRECTION, np.vstack([part.locator_directions for part in nominal.parts]))
+    write(group, words.STIFFNESS, locators.stiffness)
+    write(group, words.ONE_SIDED, locators.one_sided)
+    write(group, words.LOCATOR_POINT, locators.points)
+    write(group, words.LOCATOR_DIRECTION, locators.directions)
 
 
 def declaration(program: Program) -> str:

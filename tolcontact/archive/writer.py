@@ -28,7 +28,8 @@ from tolcontact.archive.rows import check_rows
 from tolcontact.archive.variables import overwrite
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
-from tolcontact.discretization import Nominal, NominalPart, movers
+from tolcontact.declaration import movers
+from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.errors import ArchiveError
 from tolcontact.simulation import Block
 from tolcontact.statistics import FieldMoments

@@ -4,7 +4,7 @@ import inspect
 import io
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -38,7 +38,7 @@ def _options(
     pass
 
 
-def or_(names: tuple[str, ...]) -> str:
+def or_(names: Iterable[str]) -> str:
     """Names as a help text lists them."""
     return ", ".join(f'"{name}"' if " " in name else name for name in names)
 

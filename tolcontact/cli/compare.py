@@ -17,6 +17,8 @@ from tolcontact.report import comparison_text
 from tolcontact.workflow.compare import compare as compare_solvers
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
+_ONE_OR_MORE = "One or more of {}; else the model's own."
+
 
 @app.command()
 def compare(
@@ -26,8 +28,8 @@ def compare(
     ] = DEFAULT_SOLVER,
     samples: Samples = 1000,
     seed: Seed = 1,
-    resolution: Annotated[str | None, typer.Option(help=f"One or more of {or_(RESOLUTIONS)}; else the model's own.")] = None,
-    objective: Annotated[str | None, typer.Option(help=f"One or more of {or_(OBJECTIVES)}; else the model's own.")] = None,
+    resolution: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(RESOLUTIONS)))] = None,
+    objective: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(OBJECTIVES)))] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
 ) -> None:

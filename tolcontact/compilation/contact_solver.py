@@ -4,16 +4,19 @@ import copy
 
 import numpy as np
 
-from tolcontact.compilation.contact_qp import INPUTS, OUTPUTS, ContactProgram
-from tolcontact.compilation.functions.batch import Batch, Expressions, Mapped, flat
+from tolcontact.compilation.contact_qp import ContactProgram
+from tolcontact.compilation.functions import InterpretedFunction, NamedFunction, flat
+from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
 from tolcontact.compilation.polishing import polished
 from tolcontact.mechanics.quiet import MAKING, quiet
 
-ASSEMBLED = {"h": 0, "g": 1, "a": 2, "lba": 3, "uba": 4}  # which output of `assemble` is which input of the solver
+QP = ("h", "g", "a", "lba", "uba")  # what `assemble` gives a solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
 ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished, and
 NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, where the step is so small that noise would be seen
+
+Arrays = dict[str, np.ndarray]  # by name, (realization, entry)
 
 
 class ContactSolver:
@@ -21,8 +24,8 @@ class ContactSolver:
 
     def __init__(self, program: ContactProgram) -> None:
         self._program = program
-        self._assemble, self._finish = Expressions(program.assemble), Expressions(program.finish)
-        self._energy = Batch(program.energy)
+        self._assemble, self._finish = NamedFunction(program.assemble), NamedFunction(program.finish)
+        self._energy = NamedFunction.dense(program.energy)
         self._plugin = program.plugin
         self.start_over()
 
@@ -37,13 +40,14 @@ class ContactSolver:
         self._first: _PluginSolver = _PluginSolver(self._program, self._plugin)
         self._others: dict[str, _PluginSolver] = {}
 
-    def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
+    def __call__(self, **arrays: np.ndarray) -> Arrays:
         """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
         others, without curvature. `residual` is infinite, and other outputs may be NaN, where all gave up.
         """
-        answer = self._solved(self._first, arrays)
+        inputs = {name: flat(values) for name, values in arrays.items()}
+        answer = self._solved(self._first, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
         for name in self._plugin.second:
             lost = np.flatnonzero(~(answer["residual"][:, 0] <= ACCURACY))
@@ -51,12 +55,10 @@ class ContactSolver:
                 break
             if name not in self._others:
                 self._others[name] = _PluginSolver(self._program, PLUGINS[name])
-            problems = {word: values[lost] for word, values in arrays.items()} | {"newton": np.zeros(len(lost))}
-            again = self._solved(self._others[name], problems)
+            again = self._solved(self._others[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
             again["second"] = np.ones((len(lost), 1))
             better = again["residual"][:, 0] < answer["residual"][lost, 0]
-            for word, values in again.items():
-                answer[word][lost[better]] = values[better]
+            _replace(answer, lost[better], _of(again, better))
             if PLUGINS[name].remembers:
                 del self._others[name]
         return answer
@@ -65,51 +67,45 @@ class ContactSolver:
         """The objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
         return self._energy(**arrays)["energy"][:, 0]
 
-    def _solved(self, solver: "_PluginSolver", arrays: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-        inputs = [flat(arrays[name]) for name in INPUTS]
-        outputs = [np.empty((len(inputs[0]), size)) for size in self._finish.sizes_out]
-        for start in range(0, len(inputs[0]), TOGETHER):
-            rows = slice(start, start + TOGETHER)
-            for output, part in zip(outputs, self._solved_together(solver, [array[rows] for array in inputs]), strict=True):
-                output[rows] = part
-        return dict(zip(OUTPUTS, outputs, strict=True))
+    def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+        count = len(inputs["poses"])
+        parts = [self._solved_together(solver, _of(inputs, slice(k, k + TOGETHER))) for k in range(0, max(count, 1), TOGETHER)]
+        return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def _solved_together(self, solver: "_PluginSolver", inputs: list[np.ndarray]) -> list[np.ndarray]:
-        assembled = self._assemble(inputs)
-        solution, failed = solver(assembled, inputs[INPUTS.index("reactions")])
-        outputs = self._finished(inputs, assembled, solution)
-        residual = outputs[OUTPUTS.index("residual")]
-        residual[failed] = np.inf
-        is_rough = residual[:, 0] > np.where(outputs[OUTPUTS.index("step")][:, 0] < NEARLY, FINE, ROUGH)
-        rough = np.flatnonzero(is_rough & np.isfinite(residual[:, 0]))
+    def _solved_together(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+        problem = self._assemble(**inputs)
+        solution, failed = solver(problem, inputs["reactions"])
+        outputs = self._finished(inputs | problem | solution)
+        outputs["residual"][failed] = np.inf
+        residual = outputs["residual"][:, 0]
+        is_rough = residual > np.where(outputs["step"][:, 0] < NEARLY, FINE, ROUGH)
+        rough = np.flatnonzero(is_rough & np.isfinite(residual))
         if rough.size:
-            inputs, assembled = ([array[rough] for array in arrays] for arrays in (inputs, assembled))
-            polished = self._polished(assembled, [array[rough] for array in solution])
-            again = self._finished(inputs, assembled, polished)
-            better = again[OUTPUTS.index("residual")][:, 0] < residual[rough, 0]
-            for output, values in zip(outputs, again, strict=True):
-                output[rough[better]] = values[better]
+            problem = _of(problem, rough)
+            again = self._finished(_of(inputs, rough) | problem | self._polished(problem, _of(solution, rough)))
+            better = again["residual"][:, 0] < residual[rough]
+            _replace(outputs, rough[better], _of(again, better))
         return outputs
 
-    def _finished(self, inputs: list[np.ndarray], assembled: list[np.ndarray], solution: list[np.ndarray]) -> list[np.ndarray]:
-        H, f, A, lower, _, U, length = assembled
-        outputs = self._finish([*inputs, H, f, A, lower, U, length, *solution])
-        usable = np.isfinite(outputs[OUTPUTS.index("corrected")]).all(axis=1)
-        residual = outputs[OUTPUTS.index("residual")]
+    def _finished(self, arrays: Arrays) -> Arrays:
+        outputs = self._finish(**arrays)
+        usable = np.isfinite(outputs["corrected"]).all(axis=1)
+        residual = outputs["residual"]
         residual[~(usable & np.isfinite(residual[:, 0]))] = np.inf
         return outputs
 
-    def _polished(self, assembled: list[np.ndarray], solution: list[np.ndarray]) -> list[np.ndarray]:
-        problem = {}
-        for name in ("h", "g", "a", "lba"):
-            sparsity, stored = self._program.assemble.sparsity_out(ASSEMBLED[name]), assembled[ASSEMBLED[name]]
-            dense = np.zeros((len(stored), sparsity.numel()))
-            dense[:, sparsity.find()] = stored
-            shape = (sparsity.size2(), sparsity.size1()) if name in ("h", "a") else (sparsity.numel(),)
-            problem[name] = dense.reshape(len(stored), *shape)
-            if name in ("h", "a"):
-                problem[name] = problem[name].swapaxes(1, 2)
-        return polished(problem, solution, self._program.equalities, self._program.slacks)
+    def _polished(self, problem: Arrays, solution: Arrays) -> Arrays:
+        dense = {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
+        return polished(dense, solution, self._program.equations, self._program.slacks)
+
+    def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
+        """All entries of an output of `assemble`, (realization, row, column), or (realization, row) of a vector."""
+        sparsity = self._program.assemble.sparsity_out(name)
+        columns = np.zeros((len(stored), sparsity.numel()))
+        columns[:, sparsity.find()] = stored
+        if sparsity.size2() == 1:
+            return columns
+        return columns.reshape(len(stored), sparsity.size2(), sparsity.size1()).swapaxes(1, 2)
 
 
 class _PluginSolver:
@@ -119,29 +115,40 @@ class _PluginSolver:
         self._remembers = plugin.remembers
         with MAKING, quiet():
             qp = program.qp(plugin)
-        self._inputs = [ASSEMBLED[name] for name in qp.name_in() if name in ASSEMBLED]
-        self._results = [qp.name_out().index(name) for name in ("x", "lam_a", "lam_x")]
+        self._inputs = [name for name in qp.name_in() if name in QP]
+        self._results = [qp.name_out().index(name) for name in SOLUTION]
         at_least = np.zeros(qp.numel_in("g"))
         at_least[: -program.slacks] = -np.inf
         bounds = {"lbx": at_least, "ubx": np.full(at_least.shape, np.inf)}
         # The other inputs are zero, and starting points that no plugin is told to use.
-        given = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in ASSEMBLED}
+        given = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in QP}
         with MAKING, quiet():
-            self._solve = Mapped(qp, given)
+            self._solve = InterpretedFunction(qp, given)
 
-    def __call__(self, assembled: list[np.ndarray], before: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
+    def __call__(self, problem: Arrays, before: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) where the solver gave up.
 
         A solver that starts from the previous problem's rows has less to change where problems alike follow each other:
         those in which the same rows probably carry, that did `before` (realization, row), or in a first step are violated.
         """
-        problems = [assembled[i] for i in self._inputs]
+        inputs = [problem[name] for name in self._inputs]
         if not self._remembers:
-            solved, failed = self._solve(problems)
-            return [solved[i] for i in self._results], failed
-        violated = assembled[ASSEMBLED["lba"]][:, : before.shape[1]]
+            solved, failed = self._solve(inputs)
+            return {name: solved[i] for name, i in zip(SOLUTION, self._results, strict=True)}, failed
+        violated = problem["lba"][:, : before.shape[1]]
         likely = np.where(before.any(axis=1, keepdims=True), before, violated) > 0
         order = np.lexsort(np.packbits(likely, axis=1).T)
-        solved, failed = self._solve([problem[order] for problem in problems])
+        solved, failed = self._solve([array[order] for array in inputs])
         back = np.argsort(order)
-        return [solved[i][back] for i in self._results], failed[back]
+        return {name: solved[i][back] for name, i in zip(SOLUTION, self._results, strict=True)}, failed[back]
+
+
+def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:
+    """Some rows of all arrays."""
+    return {name: values[rows] for name, values in arrays.items()}
+
+
+def _replace(arrays: Arrays, rows: np.ndarray, others: Arrays) -> None:
+    """Put `others` where some rows of all arrays are."""
+    for name, values in others.items():
+        arrays[name][rows] = values

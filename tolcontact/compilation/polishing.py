@@ -4,13 +4,17 @@ Solvers stop where their own tolerance is met, in which more or less of the true
 long before; the rest is one linear system, the optimality conditions with those rows as equations.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 GIVE = 1e-9  # by which rows may give way, so that rows that depend on each other have a solution; refinement takes it back
 REFINEMENTS = 4
 
 
-def polished(problem: dict[str, np.ndarray], answer: list[np.ndarray], equalities: int, slacks: int) -> list[np.ndarray]:
+def polished(
+    problem: Mapping[str, np.ndarray], answer: Mapping[str, np.ndarray], equations: int, slacks: int
+) -> dict[str, np.ndarray]:
     """x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba, with the last rows equations and the last x >= 0.
 
     problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
@@ -19,11 +23,11 @@ def polished(problem: dict[str, np.ndarray], answer: list[np.ndarray], equalitie
     Where the conditions have no solution it is no number.
     """
     H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
-    x, lam_a, lam_x = answer
+    x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
     count, rows, size = A.shape
     # Of a row and its multiplier the smaller one is rounding, whatever the solver.
     carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
-    carries[:, rows - equalities :] = True
+    carries[:, rows - equations :] = True
     at_zero = (-lam_x > x)[:, size - slacks :]
     bounds = np.zeros((count, slacks, size))
     bounds[:, :, size - slacks :] = np.eye(slacks)
@@ -47,7 +51,7 @@ def polished(problem: dict[str, np.ndarray], answer: list[np.ndarray], equalitie
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
     lam_x[:, size - slacks :] = -multipliers[:, rows:]
-    return [x, -multipliers[:, :rows], lam_x]
+    return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:

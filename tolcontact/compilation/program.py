@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.compilation.contact_qp import ContactProgram, contact_program
 from tolcontact.compilation.contact_solver import ContactSolver
-from tolcontact.compilation.functions.batch import Batch
+from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.tape import Tape
 from tolcontact.discretization import Nominal
@@ -50,8 +50,8 @@ class Program:
     nominal: Nominal
     method: Method
     plugin: Plugin
-    place: Batch
-    observe: Batch
+    place: NamedFunction
+    observe: NamedFunction
     gaps: tuple[GapMap, ...]
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
@@ -67,7 +67,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     with MAKING:  # which also calls users' functions, that may print
         with quiet():
             chosen = plugin(solver)
-        d = ca.SX.sym("deviations", len(nominal.locator_labels))
+        d = ca.SX.sym("deviations", len(nominal.locators))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         poses = poses_of(entries)
@@ -80,16 +80,16 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
         )
         groups = contact_groups(nominal)
-        gaps = tuple(gap_map(gap_matrix(pair), stand_out=pair.locators is not None) for pair in nominal.pairs)
-        if method.objective == "seating":
+        gaps = tuple(gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
+        if method.minimizes.presses:
             _check_forces(nominal, groups)
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
             method=method,
             plugin=chosen,
-            place=Batch(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
-            observe=Batch(observe),
+            place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
+            observe=NamedFunction.dense(observe),
             gaps=gaps,
             groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
             nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),

@@ -7,6 +7,7 @@ another order than NumPy's, and agree to rounding.
 """
 
 import functools
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,24 +20,39 @@ LANES = 8
 ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen terms are rounded by less
 
 
-@inlined
-def _coefficients(basis, X, of):  # type: ignore[no-untyped-def]
-    """Coefficients of the gaps by the coordinates, [X_RM, 1] @ basis, into of (r,)."""
-    for c in range(of.size):
-        of[c] = basis[12, c]
-    for entry in range(12):
-        for c in range(of.size):
-            of[c] += X[entry] * basis[entry, c]
+class Points(NamedTuple):
+    """The contact points of a pair, as PairScan has them (see there), and the boxes of its leaves and branches.
 
-
-@inlined
-def _bounds(boxes, beyond, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
-    """Of some boxes the gap in their middle, and how far gaps can be from that, into middle and reach (count,).
-
-    boxes (2, coordinate, box): centres and half widths of the coordinates, without the first one, which is 1. `beyond`: how
-    far a point may stand out besides.
+    leaf_boxes, branch_boxes    (2, coordinate, box): centres and half widths of the coordinates, without the first one
     """
-    least = beyond + ROUNDING * abs(of[0])
+
+    basis: np.ndarray
+    columns: np.ndarray
+    coordinates: np.ndarray
+    leaves: np.ndarray
+    branches: np.ndarray
+    leaf_boxes: np.ndarray
+    branch_boxes: np.ndarray
+
+
+@inlined
+def _coefficients(points, X, deviations, of):  # type: ignore[no-untyped-def]
+    """Coefficients of the gaps by the coordinates, [[X_RM, 1] @ basis, deviations[columns]], into of (r + k,)."""
+    basis, columns = points.basis, points.columns
+    entries, size = basis.shape[0] - 1, basis.shape[1]
+    for c in range(size):
+        of[c] = basis[entries, c]
+    for entry in range(entries):
+        for c in range(size):
+            of[c] += X[entry] * basis[entry, c]
+    for c in range(columns.size):
+        of[size + c] = deviations[columns[c]]
+
+
+@inlined
+def _bounds(boxes, first, count, of, middle, reach):  # type: ignore[no-untyped-def]
+    """Of some boxes the gap in their middle, and how far gaps can be from that, into middle and reach (count,)."""
+    least = ROUNDING * abs(of[0])
     for box in range(count):
         middle[box] = of[0]
         reach[box] = least
@@ -49,7 +65,7 @@ def _bounds(boxes, beyond, first, count, of, middle, reach):  # type: ignore[no-
 
 
 @inlined
-def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: ignore[no-untyped-def]
+def _gaps(coordinates, first, count, of, gaps):  # type: ignore[no-untyped-def]
     """Gaps [mm] of the points `first` to `first + count`, into gaps (LEAF,)."""
     for j in range(count):
         gaps[j] = of[0]
@@ -58,9 +74,6 @@ def _gaps(coordinates, first, count, of, deviations, locators, gaps):  # type: i
         row = coordinates[c, first : first + count]
         for j in range(count):
             gaps[j] += slope * row[j]
-    if locators.size:
-        for j in range(count):
-            gaps[j] -= deviations[locators[first + j]]
 
 
 @compiled
@@ -89,18 +102,18 @@ def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[n
 def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activity, active, moments):  # type: ignore[no-untyped-def]
     """For each realization the number of points below `activity` (n,), and their moments (n, side * 10).
 
-    points        see PairScan: (basis, coordinates, locators, leaves, branches, boxes of the leaves, of the branches, beyond)
+    points        Points
     tables        (side * moment, point)
     leaf_sums     (leaf, side * moment), and
     branch_sums   (branch, side * moment): of all points there
     """
-    basis, coordinates, locators, leaves, branches, leaf_boxes, branch_boxes, beyond = points
-    of, gaps, counts, lanes = np.empty(basis.shape[1]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
+    leaves, branches = points.leaves, points.branches
+    of, gaps, counts, lanes = np.empty(points.coordinates.shape[0]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     middle_here, reach_here = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _coefficients(basis, relative[k], of)
-        _bounds(branch_boxes, beyond, 0, middle.size, of, middle, reach)
+        _coefficients(points, relative[k], deviations[k], of)
+        _bounds(points.branch_boxes, 0, middle.size, of, middle, reach)
         number = 0
         for branch in range(middle.size):
             if middle[branch] - reach[branch] >= activity:
@@ -111,7 +124,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                 for moment in range(moments.shape[1]):
                     moments[k, moment] += branch_sums[branch, moment]
                 continue
-            _bounds(leaf_boxes, beyond, first_leaf, end_leaf - first_leaf, of, middle_here, reach_here)
+            _bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle_here, reach_here)
             for leaf in range(first_leaf, end_leaf):
                 here = leaf - first_leaf
                 if middle_here[here] - reach_here[here] >= activity:
@@ -122,7 +135,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                     for moment in range(moments.shape[1]):
                         moments[k, moment] += leaf_sums[leaf, moment]
                     continue
-                _gaps(coordinates, first, count, of, deviations[k], locators, gaps)
+                _gaps(points.coordinates, first, count, of, gaps)
                 below = 0
                 for j in range(count):
                     is_active = gaps[j] < activity
@@ -135,11 +148,11 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
 
 
 @inlined
-def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
+def _search(points, first_leaf, end_leaf, of, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
     """The deepest point of some leaves, if it is below `lowest` or as low and before `where`; its gap and number."""
-    _, coordinates, locators, leaves, _, leaf_boxes, _, beyond = points
+    leaves = points.leaves
     gaps, middle, reach = scratch
-    _bounds(leaf_boxes, beyond, first_leaf, end_leaf - first_leaf, of, middle, reach)
+    _bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, of, middle, reach)
     promising = 0
     for here in range(1, end_leaf - first_leaf):
         if middle[here] - reach[here] < middle[promising] - reach[promising]:
@@ -149,7 +162,7 @@ def _search(points, first_leaf, end_leaf, of, deviations, may_carry, lowest, whe
         if turn == promising or middle[here] - reach[here] > lowest:
             continue
         first, count = leaves[first_leaf + here], leaves[first_leaf + here + 1] - leaves[first_leaf + here]
-        _gaps(coordinates, first, count, of, deviations, locators, gaps)
+        _gaps(points.coordinates, first, count, of, gaps)
         for j in range(count):
             if may_carry.size and not may_carry[first + j]:
                 continue
@@ -164,17 +177,17 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
 
     Else they are the cluster's first point, and `below`.
 
-    points      as in `survey`
+    points      Points
     clusters    (cluster + 1,): the first branch of each cluster, and the end
     may_carry   (n, point), only these points are looked at; all where it is (n, 0)
     """
-    basis, _, _, leaves, branches, _, branch_boxes, beyond = points
-    of = np.empty(basis.shape[1])
+    leaves, branches = points.leaves, points.branches
+    of = np.empty(points.coordinates.shape[0])
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _coefficients(basis, relative[k], of)
-        _bounds(branch_boxes, beyond, 0, middle.size, of, middle, reach)
+        _coefficients(points, relative[k], deviations[k], of)
+        _bounds(points.branch_boxes, 0, middle.size, of, middle, reach)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
             lowest, where = below, leaves[branches[begin]]
@@ -187,6 +200,6 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
                 if turn == promising or middle[branch] - reach[branch] > lowest:
                     continue
                 lowest, where = _search(
-                    points, branches[branch], branches[branch + 1], of, deviations[k], may_carry[k], lowest, where, scratch
+                    points, branches[branch], branches[branch + 1], of, may_carry[k], lowest, where, scratch
                 )
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest

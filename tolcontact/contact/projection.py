@@ -29,11 +29,15 @@ class FoundScan(PairScan):
         apart = pose.apply(relative, self.P_m) - self.feet
         n = self.normals
         gaps = n[..., 0] * apart[..., 0] + n[..., 1] * apart[..., 1] + n[..., 2] * apart[..., 2]
+        if self.columns.size:
+            gaps -= self.offsets.heights(deviations, np.broadcast_to(np.arange(len(self.P_m)), gaps.shape))
         return np.where(self.over, gaps, np.inf)
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        chosen = points[..., None]
-        return self.P_m[points], *(np.take_along_axis(values, chosen, axis=1) for values in (self.feet, self.normals))
+        feet, normals = (np.take_along_axis(values, points[..., None], axis=1) for values in (self.feet, self.normals))
+        if self.columns.size:
+            feet = feet + self.offsets.heights(deviations, points)[..., None] * normals
+        return self.P_m[points], feet, normals
 
 
 def reach(scan: PairScan) -> float:

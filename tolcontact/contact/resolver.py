@@ -118,7 +118,7 @@ class ContactResolver:
             relative=relative[rows],
             deviations=deviations[rows],
             moments=np.concatenate([self._moments(k, moments[rows]) for k, (_, moments) in enumerate(surveys)], axis=1),
-            may_carry=[self._may_carry(scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
+            may_carry=[self._may_carry(k, scan, relative[rows, k], deviations[rows]) for k, scan in enumerate(scans)],
         )
         state = self._state(task.raw, task.relative)
         self._attempt(task, state, scans, Start())
@@ -259,16 +259,16 @@ class ContactResolver:
     def _moments(self, pair: int, active: np.ndarray) -> np.ndarray:
         """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
         scan = self._scans[pair]
-        if scan.locators is not None:  # supports are not among the paper's contact points
+        if self._pairs[pair].is_supports:  # they are not among the paper's contact points
             return np.zeros_like(active)
         if self._method.objective != "all points":
             return active
         every = np.array([table.sum(axis=1) for table in scan.tables]).reshape(active.shape[1:])
         return np.broadcast_to(every, active.shape)
 
-    def _may_carry(self, scan: PairScan, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray | None:
+    def _may_carry(self, pair: int, scan: PairScan, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray | None:
         """Which points (row, point) may carry: in the paper's set those that are active in the raw state, X_RM (row, 12)."""
-        if self._method.active_set == "closed" or scan.locators is not None:
+        if self._method.is_closed or self._pairs[pair].is_supports:
             return None
         return np.asarray(scan.gaps(relative, deviations) < self._method.activity)
 

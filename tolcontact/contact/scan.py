@@ -8,12 +8,11 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
 from tolcontact.contact import kernel
-from tolcontact.discretization import ContactPoints
+from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
 
 SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
@@ -24,23 +23,25 @@ BEYOND = 1e300  # where no point is
 class PairScan:
     """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
 
-    basis              (13, r), and
-    coordinates        (r, point): gaps [mm] = [X_RM, 1] @ basis @ coordinates
+    basis              (13, r),
+    columns            (k,), and
+    coordinates        (r + k, point): gaps [mm] = [[X_RM, 1] @ basis, deviations[columns]] @ coordinates
     tables             moment tables (moment, point) of the sides that enter the objective
     P_m, P_r, n_r      (point, 3)
-    locators           columns of the deviations by which points stand out, (point,); None where none does
+    offsets            of the points
     leaves             (leaf + 1,): the first point of each leaf, and the end
     branches           (branch + 1,): the first leaf of each branch, and the end
     clusters           (cluster + 1,): the first branch of each cluster, and the end
     """
 
     basis: np.ndarray
+    columns: np.ndarray
     coordinates: np.ndarray
     tables: tuple[np.ndarray, ...]
     P_m: np.ndarray
     P_r: np.ndarray
     n_r: np.ndarray
-    locators: np.ndarray | None
+    offsets: Offsets
     leaves: np.ndarray
     branches: np.ndarray
     clusters: np.ndarray
@@ -52,21 +53,21 @@ class PairScan:
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
         slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
-        for entry, row in zip(relative.T, self.basis, strict=False):
+        for entry, row in zip(relative.T, self.basis[:-1], strict=True):
             slopes += entry[:, None] * row
+        slopes = np.hstack([slopes, deviations[:, self.columns]])
         result = np.repeat(slopes[:, :1], self.coordinates.shape[1], axis=1)
         term = np.empty_like(result)
         for slope, row in zip(slopes.T[1:], self.coordinates[1:], strict=True):
             result += np.multiply(slope[:, None], row, out=term)
-        return result if self.locators is None else result - deviations[:, self.locators]
+        return result
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
-        if self.locators is None:
-            return P_m, P_r, n_r
-        height = np.take_along_axis(deviations, self.locators[points], axis=1)
-        return P_m, P_r + height[..., None] * n_r, n_r
+        if self.columns.size:
+            P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
+        return P_m, P_r, n_r
 
     def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
         """The number of points whose gap is below `activity` (realization,), and their moments (realization, side, moment)."""
@@ -125,15 +126,13 @@ class CompiledScan(PairScan):
         return points, gaps
 
     @cached_property
-    def _points(self) -> tuple[Any, ...]:
-        """What the kernel knows of the points. The height of a point that stands out is not bounded."""
+    def _points(self) -> kernel.Points:
         rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0)
         boxes = []
         for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
             low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
             boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
-        columns = np.array([] if self.locators is None else self.locators, dtype=np.int64)
-        return self.basis, self.coordinates, columns, self.leaves, self.branches, *boxes, np.inf if columns.size else 0.0
+        return kernel.Points(self.basis, self.columns, self.coordinates, self.leaves, self.branches, *boxes)
 
     @cached_property
     def _tables(self) -> np.ndarray:
@@ -156,7 +155,7 @@ def pair_scan(
     Supports have a cluster each.
     """
     chosen = np.arange(len(pair.P_m)) if chosen is None else chosen
-    label = _cluster(pair.P_m[chosen], clusters if pair.locators is None else len(chosen))
+    label = _cluster(pair.P_m[chosen], len(chosen) if pair.is_supports else clusters)
     along = np.roll(gaps.coordinates, -1, axis=0)  # largest extents first, the constant last
     found = [_leaves(chosen[label == one], along) for one in range(label.max() + 1)]
     leaves = [leaf for cluster in found for leaf in cluster]
@@ -165,12 +164,13 @@ def pair_scan(
     firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
     return CompiledScan(
         basis=gaps.basis,
+        columns=gaps.columns,
         coordinates=np.ascontiguousarray(gaps.coordinates[:, order]),
         tables=tuple(np.ascontiguousarray(table[:, order]) for table in tables),
         P_m=pair.P_m[order],
         P_r=pair.P_r[order],
         n_r=pair.n_r[order],
-        locators=None if pair.locators is None else pair.locators[order],
+        offsets=pair.offsets.take(order),
         leaves=np.cumsum([0, *map(len, leaves)]),
         branches=np.concatenate([*firsts, [len(leaves)]]),
         clusters=np.cumsum([0, *map(len, firsts)]),

@@ -3,6 +3,7 @@
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.force import Force
+from tolcontact.declaration.freedom import has_supports, is_free, movers
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
@@ -29,5 +30,8 @@ __all__ = [
     "ThreeTwoOne",
     "Tolerance",
     "Triangles",
+    "has_supports",
+    "is_free",
+    "movers",
     "three_two_one",
 ]

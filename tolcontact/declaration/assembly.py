@@ -166,18 +166,6 @@ class Assembly:
         widths += [float(m.tolerance) for m in self._measures if m.tolerance is not None and m.units == "mm"]
         return min((width for width in widths if width > CONSTANT * max(widths)), default=math.inf)
 
-    def is_free(self, part: Part) -> bool:
-        """Whether contact may move the part: as declared, else whether it is a moving side or has one-sided locators."""
-        if part.fixed is not None:
-            return not part.fixed
-        return any(pair.moving.part is part for pair in self._pairs) or bool(self.supports_of(part))
-
-    def supports_of(self, part: Part) -> tuple[int, ...]:
-        """Positions of the one-sided ones among the locators of `part`."""
-        location = self.location_of(part)
-        scheme = location.scheme if location and isinstance(location.scheme, tuple) else ()
-        return tuple(k for k, locator in enumerate(scheme) if locator.one_sided)
-
     def faults(self) -> Iterator[str]:
         """What is wrong with the declarations themselves, one sentence each, naming the thing at fault."""
         if not self._parts:

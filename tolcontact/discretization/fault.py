@@ -1,4 +1,6 @@
-"""What is wrong with a shape."""
+"""What is wrong with a shape, and whose."""
+
+from tolcontact.declaration import ContactPair, Part
 
 
 class GeometryFault(Exception):
@@ -9,3 +11,8 @@ def clipped(words: str, most: int = 400) -> str:
     """Words of a stranger's file as they may stand in a message: on one line, printable, and not too many."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in words).split())
     return line if len(line) <= most else f"{line[:most]}..."
+
+
+def where(kind: str, thing: Part | ContactPair) -> str:
+    """How a message names a declared thing: kind, name, and the line of the script."""
+    return f'{kind} "{thing.name}" ({thing.declared_at})'

@@ -1,6 +1,6 @@
 """Increments dq = (dt, w) of the free parts, and the poses that they cause. Paper (6), (7), (12)."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -40,6 +40,19 @@ class Twist:
     def moving(self, X: Pose, turn: ca.SX) -> Pose:
         """A pose after the motion x -> c + d + turn (x - c)."""
         return Pose(turn @ X.R, turn @ (X.t - self.c) + self.c + self.d)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The increments of the movers of a group, about the poses `now` of its parts."""
+
+    carried: Sequence[Carried]
+    now: Sequence[Pose]
+    movers: Sequence[Twist]
+
+    def by(self, update: Callable[[Carried, Pose, Sequence[Twist]], Pose]) -> list[Pose]:
+        """The poses that the increments cause, as `linear`, `rigid`, `quadratic` or `published` has it."""
+        return [update(part, X, self.movers) for part, X in zip(self.carried, self.now, strict=True)]
 
 
 def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:

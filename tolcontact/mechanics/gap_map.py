@@ -10,25 +10,29 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from tolcontact.discretization import Offsets
+
 ROUNDING = 1e-13  # of the largest entry: normals of flat faces differ by that much
 
 
 @dataclass(frozen=True, eq=False)
 class GapMap:
-    """All gaps of a pair: [X_RM, 1] @ basis @ coordinates [mm].
+    """All gaps of a pair: [[X_RM, 1] @ basis, deviations[columns]] @ coordinates [mm].
 
     basis         (13, r)
-    coordinates   (r, point), the first row is 1
+    columns       (k,) of the deviations by which points stand out
+    coordinates   (r + k, point), the first row is 1, the last k are what deviations take from the gaps
     corners       numbers of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
     """
 
     basis: np.ndarray
+    columns: np.ndarray
     coordinates: np.ndarray
     corners: np.ndarray
 
 
-def gap_map(G: np.ndarray, *, stand_out: bool = False) -> GapMap:
-    """Take the matrix G (13, point) apart, exactly but for rounding. Points that `stand_out` have heights of their own."""
+def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
+    """Take the matrix G (13, point) apart, exactly but for rounding."""
     centre = G.mean(axis=1)
     U, S, V = np.linalg.svd(G - centre[:, None], full_matrices=False)
     tolerance = ROUNDING * np.abs(G).max()
@@ -36,12 +40,12 @@ def gap_map(G: np.ndarray, *, stand_out: bool = False) -> GapMap:
     while rank < len(S) and np.abs(U[:, rank:] * S[rank:] @ V[rank:]).max() > tolerance:
         rank += 1
     basis = np.column_stack([centre, U[:, :rank]])
-    coordinates = np.vstack([np.ones(G.shape[1]), S[:rank, None] * V[:rank]])
-    return GapMap(basis, coordinates, np.arange(G.shape[1]) if stand_out else _corners(coordinates[1:]))
+    coordinates = np.vstack([np.ones(G.shape[1]), S[:rank, None] * V[:rank], -offsets.matrix])
+    return GapMap(basis, offsets.columns, coordinates, _corners(coordinates[1:]))
 
 
 def _corners(coordinates: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of points (coordinate, point), in order; all points beyond two coordinates."""
+    """Corners of the convex hull of points (coordinate, point), in order; beyond two coordinates all points."""
     if len(coordinates) == 0:
         return np.array([0])
     if len(coordinates) == 1:

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.discretization import Nominal, movers
+from tolcontact.declaration import movers
+from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Carried
 from tolcontact.mechanics.displacement import moment_table
 

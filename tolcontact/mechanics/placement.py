@@ -1,20 +1,14 @@
-"""Locator deviations to raw poses: q = M d (see placing_matrix) of each part, on the ground or on another part."""
+"""Locator deviations to raw poses: q = M d (see Locators) of each part, on the ground or on another part."""
 
 import casadi as ca
-import numpy as np
 
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.discretization.nominal import placing_matrix
 from tolcontact.mechanics.pose import Pose, rotation
 
 
 def raw_poses(nominal: Nominal, deviations: ca.SX) -> list[Pose]:
-    """The raw pose of every part for deviations (locator, 1) [mm] in the order of `nominal.locator_labels`."""
-    columns = np.cumsum([0, *(len(part.labels) for part in nominal.parts)])
-    own = [
-        _on_its_locators(part, deviations[int(start) : int(stop)])
-        for part, start, stop in zip(nominal.parts, columns[:-1], columns[1:], strict=True)
-    ]
+    """The raw pose of every part for deviations (locator, 1) [mm] in the order of `nominal.locators`."""
+    own = [_on_its_locators(part, deviations[nominal.columns(index).tolist()]) for index, part in enumerate(nominal.parts)]
 
     def follow(index: int) -> Pose:
         parent = nominal.parts[index].parent
@@ -29,9 +23,9 @@ def _on_its_locators(part: NominalPart, d: ca.SX) -> Pose:
     Turning about c, not about the origin, makes the pose the same wherever the assembly stands: the two differ by
     terms of order theta^2 times the distance of the origin.
     """
-    if not part.labels:
+    if not len(part.locators):
         return Pose(ca.SX.eye(3), ca.SX.zeros(3))
-    M, c = placing_matrix(part)
+    M, c = part.locators.placing_matrix
     q = ca.DM(M) @ d
     R = rotation(q[3:])
     return Pose(R, q[:3] + c - R @ ca.DM(c))

@@ -49,13 +49,6 @@ def rotation(theta: ca.SX) -> ca.SX:
     return ca.SX.eye(3) + (ca.sin(angle) / angle) * K + (half**2 / 2) * (K @ K)
 
 
-def affine(X: Pose, z: ca.SX) -> Pose:
-    """The pose to first order in `z` about z = 0."""
-    entries, at_rest = X.vector(), ca.SX.zeros(z.shape)
-    slope = ca.substitute(ca.jacobian(entries, z), z, at_rest)
-    return pose_of(ca.substitute(entries, z, at_rest) + slope @ z)
-
-
 def relative(X_WM: Pose, X_WR: Pose) -> Pose:
     """X_RM: the pose of the moving part in the frame of the reference part."""
     return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))

@@ -27,12 +27,12 @@ _BITS = 52
 
 
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
-    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locator_labels`.
+    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locators`.
 
     Raises ModelError for a distribution that gives no finite numbers.
     """
-    deviations = np.empty((stop - start, len(nominal.locator_labels)))
-    for column, (label, tolerance) in enumerate(zip(nominal.locator_labels, nominal.tolerances, strict=True)):
+    deviations = np.empty((stop - start, len(nominal.locators)))
+    for column, (label, tolerance) in enumerate(zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)):
         deviations[:, column] = quantile(tolerance, _uniform(seed, label, start, stop))
         if not np.isfinite(deviations[:, column]).all():
             raise ModelError(

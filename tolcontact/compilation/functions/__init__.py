@@ -1,1 +1,6 @@
-"""Ways to call a Function for many realizations: interpreted by CasADi, or compiled to machine code."""
+"""Ways to call a CasADi Function for many realizations at once: by name, interpreted, compiled, or as it pays."""
+
+from tolcontact.compilation.functions.interpreted import InterpretedFunction
+from tolcontact.compilation.functions.named import NamedFunction, flat
+
+__all__ = ["InterpretedFunction", "NamedFunction", "flat"]

@@ -22,7 +22,7 @@ class UnknownInstructionError(Exception):
     """A Function has an instruction that is not translated; CasADi can still interpret it."""
 
 
-class Native:
+class NativeFunction:
     """A compiled Function, called for many realizations at once: `inputs` and results are (realization, stored entry)."""
 
     def __init__(self, function: ca.Function) -> None:

@@ -1,78 +1,18 @@
-"""Functions evaluated for many realizations at once."""
+"""Functions that CasADi evaluates itself, many realizations in a call; QP solvers above all."""
 
 import contextlib
-import math
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.functions.native import Native, UnknownInstructionError
 from tolcontact.mechanics.quiet import MAKING, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
-ENOUGH = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
-LARGEST = 300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
 
 
-class Batch:
-    """A Function of scalar expressions, called by name; every array has the realization as its first dimension."""
-
-    def __init__(self, function: ca.Function) -> None:
-        inputs = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
-        outputs = [ca.densify(output) for output in function.call(inputs)]
-        self._names, self._results = function.name_in(), function.name_out()
-        self._evaluate = Expressions(ca.Function(function.name(), inputs, outputs))
-
-    def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
-        """Evaluate for all realizations: `name=(realization, ...)` for each input; outputs by name, (realization, entry)."""
-        outputs = self._evaluate([flat(arrays[name]) for name in self._names])
-        return dict(zip(self._results, outputs, strict=True))
-
-
-def flat(array: np.ndarray) -> np.ndarray:
-    """(realization, entry) of an array that is flat or (column, row), CasADi's order, inside a realization."""
-    return np.ascontiguousarray(array, dtype=float).reshape(len(array), math.prod(array.shape[1:]))
-
-
-class Expressions:
-    """A Function of scalar expressions: interpreted by CasADi, compiled once it was evaluated often. Threads may share it.
-
-    Both ways give the same to the last bit, so that nobody needs to know which one it was.
-    """
-
-    def __init__(self, function: ca.Function) -> None:
-        self._function = function
-        self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
-        self._interpreted = Mapped(function)
-        self._native: Native | None = None
-        self._left = ENOUGH if function.n_instructions() <= LARGEST else math.inf
-        self._lock = threading.Lock()
-
-    def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
-        """Outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if self._native is None and self._is_due(len(inputs[0])):
-            # Whatever LLVM cannot do on this machine CasADi can.
-            with contextlib.suppress(UnknownInstructionError, RuntimeError):
-                self._native = Native(self._function)  # other threads go on interpreting meanwhile
-        if self._native is not None:
-            return self._native(inputs)
-        with self._lock:
-            return self._interpreted(inputs)[0]
-
-    def _is_due(self, count: int) -> bool:
-        """Whether the caller should compile the Function now, who is about to evaluate it `count` times: one of all callers."""
-        with self._lock:
-            self._left -= count
-            due = self._left < 0
-            if due:
-                self._left = math.inf
-            return due
-
-
-class Mapped:
-    """A Function that CasADi evaluates itself, many realizations in a call; QP solvers above all.
+class InterpretedFunction:
+    """A Function that CasADi evaluates, by its position of inputs and outputs.
 
     Not to be shared between threads: one evaluation at a time uses its buffers. `given` are inputs, by position, that are
     the same in all realizations.
@@ -82,7 +22,7 @@ class Mapped:
         # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
         caller = ca.Function("caller", inputs, function.call(inputs))
-        self._calls = [_Buffered(caller.map(width) if width > 1 else caller, width, given or {}) for width in (*WIDTHS, 1)]
+        self._calls = [_Buffers(caller.map(width) if width > 1 else caller, width, given or {}) for width in (*WIDTHS, 1)]
         self._solvers = [function] if function.is_a("Conic") else []
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -107,7 +47,7 @@ class Mapped:
                             result[k] = np.nan
         return results, failed
 
-    def _turns(self, count: int) -> Iterator[tuple["_Buffered", int, int]]:
+    def _turns(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
         """Who evaluates which realizations; the narrower of WIDTHS may have idle places at the end."""
         start = 0
         while start < count:
@@ -125,7 +65,7 @@ class Mapped:
             call.is_new = True
 
 
-class _Buffered:
+class _Buffers:
     """One Function, of `width` realizations at once, with arrays that stay where they are."""
 
     def __init__(self, function: ca.Function, width: int, given: Mapping[int, np.ndarray]) -> None:

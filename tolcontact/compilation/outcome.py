@@ -1,0 +1,59 @@
+"""Outcome: from a QP and its solution to poses, reactions, and residuals that judge them."""
+
+from collections.abc import Mapping, Sequence
+
+import casadi as ca
+
+from tolcontact.compilation.conditioning import SLACK, whitening
+from tolcontact.compilation.rows import Rows
+from tolcontact.mechanics.correction import FREEDOMS
+from tolcontact.mechanics.objective import Energy
+from tolcontact.mechanics.pose import Pose
+from tolcontact.mechanics.setting import Setting
+from tolcontact.mechanics.two_sided import misfit
+
+SOLVED = ("h", "g", "a", "lba", "u", "length")  # what the residuals are of: the QP as it was solved
+SOLUTION = ("x", "lam_a", "lam_x")
+
+
+def outcome(
+    setting: Setting,
+    goal: Energy,
+    rows: Rows,
+    poses: Sequence[Pose],
+    problem: Mapping[str, ca.SX],
+    stride: ca.SX,
+) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
+    """Symbols of the QP and its solution, and the outputs of contact_program as expressions of those; `poses` are after z.
+
+    The QP's matrices are inputs, so that nothing is computed twice and the residuals are of what was solved.
+    """
+    group, z, count = setting.group, setting.z, len(rows)
+    size, held = z.numel() + len(group.pairs), problem["a"].size1() - count
+    given = {name: ca.SX.sym(name, problem[name].sparsity()) for name in SOLVED}
+    given |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + held), "lam_x": ca.SX.sym("lam_x", size)}
+    x, lam_a, lam_x, length = given["x"], given["lam_a"], given["lam_x"], given["length"]
+    y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
+    excess = given["a"] @ x - given["lba"]
+    natural = ca.vertcat(ca.fmin(excess[:count], -lam_a[:count]), ca.fmin(s, -lam_s), ca.fmin(excess[:count] * length, 0))
+    stationarity = ca.norm_inf(given["h"] @ x + given["g"] + given["a"].T @ lam_a + lam_x)
+    residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if held else [])]
+    step = whitening(given["u"]) @ y
+    taken = step
+    if setting.method.is_exact:
+        turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
+        taken = step * ca.fmin(1, stride * group.length / ca.norm_inf(turns))
+    after = {
+        "corrected": ca.vertcat(*(pose.vector() for pose in poses)),
+        "relative": ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))),
+        "astray": ca.norm_inf(misfit(setting, poses)) if held else ca.SX(0),
+    }
+    results = {
+        "linearized": ca.substitute(rows.relative, z, step),
+        "multipliers": -lam_a[:count] / length * rows.filled * goal.scale,
+        "residual": ca.mmax(ca.vertcat(*residuals)),
+        "slack": SLACK * s,
+        "step": ca.vertcat(ca.norm_inf(step), ca.norm_inf(y)),
+        **{name: ca.substitute(value, z, taken) for name, value in after.items()},
+    }
+    return given, {name: ca.densify(value) for name, value in results.items()}

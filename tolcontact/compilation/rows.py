@@ -1,0 +1,104 @@
+"""Rows of the contact QP: the gaps of contact points, to first order in the increments."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.discretization import ContactPoints
+from tolcontact.mechanics.gap import gap
+from tolcontact.mechanics.gap_map import GapMap
+from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+from tolcontact.mechanics.setting import Setting
+from tolcontact.method import Method
+
+SLOTS = 12
+
+Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """One row for each slot, and for each point that always has one; the pairs of a group one after the other.
+
+    slopes      (row, z): the gaps' derivatives
+    gaps        (row, 1) [mm] at z = 0
+    filled      (row, 1): 0 if a slot is empty
+    pairs       (row,): position of the row's pair in the group
+    relative    (12 * pair, 1): X_RM of every pair, to first order in z
+    bends       (12 * pair, 1): sums of the reactions of before times the gaps' gradients by the entries of X_RM
+    """
+
+    slopes: ca.SX
+    gaps: ca.SX
+    filled: ca.SX
+    pairs: np.ndarray
+    relative: ca.SX
+    bends: ca.SX
+
+    def __len__(self) -> int:
+        return len(self.pairs)
+
+
+def standing_points(gaps: GapMap, method: Method) -> np.ndarray | None:
+    """The points of a pair that always have a row: those that can be the deepest, if they are few and stay the same."""
+    return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else None
+
+
+def contact_rows(
+    setting: Setting,
+    standing: Sequence[np.ndarray | None],
+    now: Sequence[Pose],
+    moved: Sequence[Pose],
+    inputs: Mapping[str, ca.SX],
+) -> Rows:
+    """The rows about the poses `now`, which the increments change to `moved`; `inputs` as in contact_program."""
+    slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
+    slopes: list[ca.SX] = []
+    gaps, filled, pairs, relative, bends = ([] for _ in range(5))
+    for k, (before, after) in enumerate(zip(setting.relative(now), setting.relative(moved), strict=True)):
+        by_z = setting.slope(after.vector())
+        relative.append(before.vector() + by_z @ setting.z)
+        points = standing[k]
+        if points is None:
+            chosen, bend = list(itertools.islice(slots, SLOTS)), next(slot_bends)
+        else:
+            pair = setting.nominal.pairs[setting.group.pairs[k]]
+            chosen, bend = _always(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
+        for P_m, P_r, n_r, is_filled in chosen:
+            X = ca.SX.sym("X_RM", ENTRIES)
+            g = gap(pose_of(X), P_m, P_r, n_r)
+            gradient = ca.substitute(ca.jacobian(g, X), X, before.vector())
+            if points is not None:
+                bend += gradient.T * inputs["reactions"][len(slopes)]
+            slopes.append(gradient @ by_z)
+            gaps.append(ca.substitute(g, X, before.vector()))
+            filled.append(is_filled)
+            pairs.append(k)
+        bends.append(bend)
+    return Rows(
+        slopes=ca.vertcat(*slopes),
+        gaps=ca.vertcat(*gaps),
+        filled=ca.vertcat(*filled),
+        pairs=np.array(pairs),
+        relative=ca.vertcat(*relative),
+        bends=ca.vertcat(*bends),
+    )
+
+
+def _slots(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
+    """The points in the slots."""
+    columns = (ca.horzsplit(each) for each in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
+    return iter(zip(*columns, strict=True))
+
+
+def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
+    """Points that have a row whatever happens: constants, but for what they stand out by."""
+    P_m, P_r, n_r = (ca.SX(ca.DM(each[points].T)) for each in (pair.P_m, pair.P_r, pair.n_r))
+    offsets = pair.offsets.take(points)
+    if offsets.columns.size:
+        heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
+        P_r = P_r + n_r @ ca.diag(heights)
+    return list(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))

@@ -1,0 +1,84 @@
+"""Locators with numbers, and the locator matrix: what six of them, or more, say about the pose of their part."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.declaration import Tolerance
+from tolcontact.discretization.fault import GeometryFault
+
+CONDITION_LIMIT = 1e8
+
+
+@dataclass(frozen=True, eq=False)
+class Locators:
+    """Locators of a part, or of a model, in the nominal assembly frame.
+
+    labels       "part.locator" for each
+    points       (locator, 3) [mm]
+    directions   (locator, 3): unit vectors into the part
+    tolerances   one for each
+    stiffness    (locator,) [N/mm]
+    one_sided    (locator,) bool: supports that the part may lift off
+    """
+
+    labels: tuple[str, ...]
+    points: np.ndarray
+    directions: np.ndarray
+    tolerances: tuple[Tolerance, ...]
+    stiffness: np.ndarray
+    one_sided: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+    @classmethod
+    def joined(cls, several: Iterable["Locators"]) -> "Locators":
+        """Those of several parts, one after the other."""
+        every = tuple(several)
+        return cls(
+            labels=tuple(label for own in every for label in own.labels),
+            points=np.vstack([own.points for own in every]),
+            directions=np.vstack([own.directions for own in every]),
+            tolerances=tuple(tolerance for own in every for tolerance in own.tolerances),
+            stiffness=np.concatenate([own.stiffness for own in every]),
+            one_sided=np.concatenate([own.one_sided for own in every]),
+        )
+
+    @property
+    def matrix(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and the centroid c (3,) that they turn about."""
+        centre = self.points.mean(axis=0)
+        return np.hstack([self.directions, np.cross(self.points - centre, self.directions)]), centre
+
+    @property
+    def placing_matrix(self) -> tuple[np.ndarray, np.ndarray]:
+        """The matrix M (6, locator) of q = M d, and the centroid c (3,) about which the part turns.
+
+        Six locators give M = J^-1. Of more than six the two-sided ones are kept exactly, and the one-sided ones as well as
+        it goes, in the sense of least squares.
+        """
+        J, centre = self.matrix
+        if len(J) == 6:
+            return np.linalg.inv(J), centre
+        exact, supports = J[~self.one_sided], J[self.one_sided]
+        kkt = np.block([[supports.T @ supports, exact.T], [exact, np.zeros((len(exact), len(exact)))]])
+        M = np.zeros((6, len(J)))
+        inverse = np.linalg.inv(kkt)[:6]
+        M[:, self.one_sided], M[:, ~self.one_sided] = inverse[:, :6] @ supports.T, inverse[:, 6:]
+        return M, centre
+
+    def check_independent(self) -> None:
+        """Raise GeometryFault if they do not fix their part."""
+        J, centre = self.matrix
+        size = np.sqrt(((self.points - centre) ** 2).sum(axis=1).mean())
+        scaled = J / np.array([1, 1, 1, size, size, size]) if size > 0 else np.zeros_like(J)
+        two_sided = scaled[~self.one_sided]
+        condition = max(np.linalg.cond(scaled), np.linalg.cond(two_sided) if len(two_sided) else 0.0)
+        if not condition < CONDITION_LIMIT:
+            raise GeometryFault(
+                f"its {len(J)} locators do not fix it: the locator matrix has condition number {condition:.1e}, the limit is "
+                f"{CONDITION_LIMIT:.0e}; no three points of the primary face may lie on a line, and the directions "
+                "together must hold all three translations and all three rotations"
+            )

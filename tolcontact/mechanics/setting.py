@@ -1,0 +1,59 @@
+"""What an objective, and the rows of a QP, are expressions of: a group of a model, and the symbols of its inputs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from tolcontact.discretization import Nominal
+from tolcontact.mechanics.groups import Group
+from tolcontact.mechanics.pose import Pose, pose_of, relative
+from tolcontact.method import Method
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A group of coupled parts, and the symbols that its equations share. Poses are one for each part of the group.
+
+    raw          poses from which displacements count
+    moments      (10, side) of the points of each side that count in the objective
+    deviations   (locator, 1) of the model [mm]
+    firmness     what multiplies the regularization: 1 in the end
+    z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
+    """
+
+    nominal: Nominal
+    group: Group
+    method: Method
+    raw: Sequence[Pose]
+    moments: ca.SX
+    deviations: ca.SX
+    firmness: ca.SX
+    z: ca.SX
+
+    def at_rest(self, expression: ca.SX) -> ca.SX:
+        """The expression at z = 0."""
+        return ca.substitute(expression, self.z, ca.SX.zeros(self.z.shape))
+
+    def slope(self, expression: ca.SX) -> ca.SX:
+        """Its Jacobian by z, at z = 0."""
+        return self.at_rest(ca.jacobian(expression, self.z))
+
+    def curvature(self, expression: ca.SX) -> ca.SX:
+        """Its Hessian by z, at z = 0."""
+        return self.at_rest(ca.hessian(expression, self.z)[0])
+
+    def linear(self, X: Pose) -> Pose:
+        """The pose to first order in z."""
+        entries = X.vector()
+        return pose_of(self.at_rest(entries) + self.slope(entries) @ self.z)
+
+    def relative(self, poses: Sequence[Pose]) -> list[Pose]:
+        """X_RM of the group's pairs."""
+        pairs = [self.nominal.pairs[index] for index in self.group.pairs]
+        return [
+            poses[self.group.position(pair.moving)]
+            if pair.reference is None
+            else relative(poses[self.group.position(pair.moving)], poses[self.group.position(pair.reference)])
+            for pair in pairs
+        ]

@@ -1,0 +1,33 @@
+"""Two-sided locators as expressions of the poses: how far they are from where they hold their part."""
+
+from collections.abc import Sequence
+
+import casadi as ca
+
+from tolcontact.mechanics.pose import Pose, relative
+from tolcontact.mechanics.setting import Setting
+
+
+def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
+    """How far each two-sided locator of a part is from its nominal place, along its direction [mm] (locator, 1).
+
+    Seen from what the part is located on; to first order in the increments, if `linear`.
+    """
+    group, own = setting.group, setting.nominal.parts[part]
+    X = poses[group.position(part)]
+    X_PM = X if own.parent is None else relative(X, poses[group.position(own.parent)])
+    if own.parent is not None and linear:
+        X_PM = setting.linear(X_PM)
+    exact = ~own.locators.one_sided
+    P, n = own.locators.points[exact], own.locators.directions[exact]
+    return ca.vertcat(*(ca.dot(ca.DM(b), X_PM.place(ca.DM(a)) - ca.DM(a)) for a, b in zip(P, n, strict=True)))
+
+
+def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
+    """How far the two-sided locators of the movers are from their deviations [mm] (locator, 1)."""
+    apart = []
+    for part in setting.group.free:
+        columns = setting.nominal.columns(part)[~setting.nominal.parts[part].locators.one_sided]
+        if columns.size:
+            apart.append(elongation(setting, part, poses, linear=linear) - setting.deviations[columns.tolist()])
+    return ca.vertcat(*apart) if apart else ca.SX(0, 1)
