@@ -37,6 +37,11 @@ def inverse(X: np.ndarray) -> np.ndarray:
     return pose(back, -np.einsum("...ij,...j->...i", back, X[..., 9:]))
 
 
+def relative(X_WM: np.ndarray, X_WR: np.ndarray) -> np.ndarray:
+    """X_RM: the poses of the moving part in the frame of the reference part."""
+    return compose(inverse(X_WR), X_WM)
+
+
 def turn(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """The angle (...) [rad], from 0 to pi, between the rotations of two poses."""
     apart = ((X[..., :9] - Y[..., :9]) ** 2).sum(axis=-1)  # |R - S|^2 = 8 sin^2(angle / 2)

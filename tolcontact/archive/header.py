@@ -18,7 +18,7 @@ from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import to_document
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
-from tolcontact.simulation.blocks import block_rows
+from tolcontact.simulation import block_rows
 from tolcontact.statistics import FieldMoments
 from tolcontact.vocabulary import Variable
 

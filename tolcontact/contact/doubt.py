@@ -4,17 +4,17 @@ Contact points are kept on one side of planes, which stand for the reference fac
 a point may be held by a plane beside the face, or a part may have turned over into another pose that locators allow.
 """
 
-from collections.abc import Callable
-
 import numpy as np
 
 from tolcontact import poses as pose
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics import Group, round_pairs
 from tolcontact.method import Method
 
-Carriers = Callable[[np.ndarray, int], tuple[np.ndarray, np.ndarray, float]]
+ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
+LOST = 1e5  # sizes of the parts: no step will bring it back
 INSIDE = 1e-4  # sizes of the parts, and
 SHARE = 0.01  # of the smallest tolerance range: what faces may lie in each other, beside what their triangles leave open
 
@@ -24,6 +24,7 @@ class Doubt:
 
     def __init__(self, nominal: Nominal, group: Group, method: Method, size: float) -> None:
         self._nominal, self._pairs = nominal, group.pairs
+        self._presses = method.minimizes.presses
         self._size, self._farthest = size, method.near_travel * size
         self._turned_far = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
@@ -36,34 +37,48 @@ class Doubt:
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
     def is_near(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether no part has turned, and no contact point travelled, farther than the method's limits."""
+        """(n,): whether no part has turned, and no contact point travelled, farther than the method's limits."""
         return np.asarray(~self._turned(task, state) & ~self._is_far(task, state))
 
-    def remains(self, task: Task, state: State, carriers: Carriers) -> np.ndarray:
-        """(row,): whether the doubt remains once the faces themselves were looked at.
+    def is_lost(self, task: Task, state: State) -> np.ndarray:
+        """(n,): whether forces pulled a part so far away that no step will bring it back."""
+        return self._has_drifted(task, state, LOST)
 
-        It does where a part turned too far. Where it only travelled, the faces must be free of penetration, and hold the
-        points that carry: `carriers` gives those of some rows and a pair, which row each belongs to and where it is nominally
-        (point, 3), and the usual distance of contact points.
+    def is_adrift(self, task: Task, state: State) -> np.ndarray:
+        """(n,): whether forces found nothing for a part to rest on."""
+        return self._has_drifted(task, state, ADRIFT)
+
+    def _has_drifted(self, task: Task, state: State, sizes: float) -> np.ndarray:
+        if not self._presses:
+            return np.zeros(len(task), dtype=bool)
+        return np.asarray(self.displacement(task.raw, state.poses) / self._size > sizes)
+
+    def remains(self, task: Task, state: State, candidates: Candidates) -> np.ndarray:
+        """(n,): whether the doubt remains once the faces themselves were looked at.
+
+        It does where a part turned too far. If it only travelled, the faces must be free of penetration, and hold the points
+        that carry.
         """
         doubtful = self._turned(task, state)
-        rows = np.flatnonzero(self._is_far(task, state) & ~doubtful & state.solved & ~state.in_conflict)
+        far = np.flatnonzero(self._is_far(task, state) & ~doubtful & state.solved & ~state.in_conflict)
+        travelled = state.take(far)
         for k, index in enumerate(self._pairs):
-            faces, X_RM = self._nominal.face_pair(index) if rows.size else None, state.relative[rows, k]
+            faces, X_RM = self._nominal.face_pair(index) if far.size else None, travelled.relative[:, k]
             if faces is not None:
-                row, points, spacing = carriers(rows, k)
-                beside = faces.reference.face.overhang(pose.apply(X_RM[row], points[:, None])[:, 0])
-                doubtful[rows[row[beside > spacing]]] = True
-                doubtful[rows] |= faces.depth(X_RM) > self.allowed(k)
+                carriers = candidates.carriers(k, travelled)
+                places = pose.apply(X_RM[carriers.realization], carriers.places[:, None])[:, 0]
+                beside = faces.reference.face.overhang(places)
+                doubtful[far[carriers.realization[beside > carriers.spacing]]] = True
+                doubtful[far] |= faces.depth(X_RM) > self.allowed(k)
         return doubtful
 
     def _turned(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether a part turned too far from its raw pose."""
+        """(n,): whether a part turned too far from its raw pose."""
         apart = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return np.asarray(((apart**2).sum(axis=2) > self._turned_far).any(axis=1))
 
     def _is_far(self, task: Task, state: State) -> np.ndarray:
-        """(row,): whether a contact point may be too far from its raw place."""
+        """(n,): whether a contact point may be too far from its raw place."""
         return np.asarray(self.displacement(task.raw, state.poses) > self._farthest)
 
     def allowed(self, k: int) -> float:
@@ -71,7 +86,7 @@ class Doubt:
         return self._open + self._group_pairs[k].facets
 
     def rolled(self, k: int, state: State) -> np.ndarray:
-        """(row,): whether points may have slid around the reference face of pair k until their planes are not its own.
+        """(n,): whether points may have slid around the reference face of pair k until their planes are not its own.
 
         Beside its foot a plane leaves a curved face by the curvature times half the square of the distance.
         """
@@ -80,7 +95,7 @@ class Doubt:
         return np.asarray(curvature * slid**2 / 2 > self.allowed(k))
 
     def displacement(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """What no contact point moves farther than (row,) [mm] between two poses (row, part of the group, 12).
+        """What no contact point moves farther than (n,) [mm] between two poses (n, part of the group, 12).
 
         That of the centre of a ball around the points, and the ball's radius times the turn.
         """
@@ -91,7 +106,7 @@ class Doubt:
 
 
 def _displacement(apart: np.ndarray, centre: np.ndarray, radius: float) -> np.ndarray:
-    """What no point of a ball moves farther than (row,) [mm], for differences of two poses (row, 12)."""
+    """What no point of a ball moves farther than (n,) [mm], for differences of two poses (n, 12)."""
     turn = np.sqrt((apart[:, :9] ** 2).sum(axis=1))
     return np.asarray(np.linalg.norm(pose.apply(apart, centre)[:, 0], axis=1) + radius * turn)
 

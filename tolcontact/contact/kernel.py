@@ -16,7 +16,7 @@ from tolcontact.compiled import compiled
 inlined = functools.partial(compiled, inline=True)
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
-LANES = 8
+SUMS = 8  # side by side
 ROUNDING = 1e-14  # of the gap in the origin of the coordinates: sums of a dozen terms are rounded by less
 
 
@@ -80,18 +80,18 @@ def _gaps(coordinates, first, count, of, gaps):  # type: ignore[no-untyped-def]
 def _add_moments(table, first, count, counts, lanes, moments):  # type: ignore[no-untyped-def]
     """Add to moments (m,) the columns of `table` (m, point) that count: counts (LEAF,), 1 or 0.
 
-    LANES sums side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
+    SUMS side by side, in a fixed order: a compiler that may choose the order chooses another one another day.
     """
-    whole = count - count % LANES
+    whole = count - count % SUMS
     for moment in range(table.shape[0]):
         row = table[moment, first : first + count]
-        for lane in range(LANES):
+        for lane in range(SUMS):
             lanes[lane] = 0.0
-        for j in range(0, whole, LANES):
-            for lane in range(LANES):
+        for j in range(0, whole, SUMS):
+            for lane in range(SUMS):
                 lanes[lane] += counts[j + lane] * row[j + lane]
         total = 0.0
-        for lane in range(LANES):
+        for lane in range(SUMS):
             total += lanes[lane]
         for j in range(whole, count):
             total += counts[j] * row[j]
@@ -108,7 +108,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
     branch_sums   (branch, side * moment): of all points there
     """
     leaves, branches = points.leaves, points.branches
-    of, gaps, counts, lanes = np.empty(points.coordinates.shape[0]), np.empty(LEAF), np.empty(LEAF), np.empty(LANES)
+    of, gaps, counts, lanes = np.empty(points.coordinates.shape[0]), np.empty(LEAF), np.empty(LEAF), np.empty(SUMS)
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     middle_here, reach_here = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
@@ -148,7 +148,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
 
 
 @inlined
-def _search(points, first_leaf, end_leaf, of, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
+def _deepest_of_leaves(points, first_leaf, end_leaf, of, may_carry, lowest, where, scratch):  # type: ignore[no-untyped-def]
     """The deepest point of some leaves, if it is below `lowest` or as low and before `where`; its gap and number."""
     leaves = points.leaves
     gaps, middle, reach = scratch
@@ -199,7 +199,7 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
                 branch = promising if turn < begin else turn
                 if turn == promising or middle[branch] - reach[branch] > lowest:
                     continue
-                lowest, where = _search(
+                lowest, where = _deepest_of_leaves(
                     points, branches[branch], branches[branch + 1], of, may_carry[k], lowest, where, scratch
                 )
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest

@@ -1,4 +1,4 @@
-"""Contact search at poses other than the nominal one: paper, 2.2, last sentence."""
+"""Contact points projected again, at poses other than the nominal one: paper, 2.2, last sentence."""
 
 from dataclasses import dataclass, replace
 
@@ -22,8 +22,8 @@ class FoundScan(PairScan):
     normals: np.ndarray
     over: np.ndarray
 
-    def take(self, rows: np.ndarray) -> "FoundScan":
-        return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
+    def take(self, some: np.ndarray) -> "FoundScan":
+        return replace(self, feet=self.feet[some], normals=self.normals[some], over=self.over[some])
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         apart = pose.apply(relative, self.P_m) - self.feet
@@ -48,7 +48,7 @@ def reach(scan: PairScan) -> float:
     return float(np.median(distance[:, 1])) / 2
 
 
-def search(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin: float) -> PairScan:
+def project(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin: float) -> PairScan:
     """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
     Points that overhang the rim by up to `margin` [mm] still count: else those at the rim would come and go with every step.

@@ -8,6 +8,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,20 @@ from tolcontact.mechanics import MOMENTS, GapMap
 
 SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
 BEYOND = 1e300  # where no point is
+
+
+class Survey(NamedTuple):
+    """How many points of a pair are active (realization,), and their moments (realization, side, moment)."""
+
+    active: np.ndarray
+    moments: np.ndarray
+
+
+class Deepest(NamedTuple):
+    """The deepest point of each cluster, and its depth [mm], both (realization, cluster)."""
+
+    points: np.ndarray
+    depth: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +61,7 @@ class PairScan:
     branches: np.ndarray
     clusters: np.ndarray
 
-    def take(self, rows: np.ndarray) -> "PairScan":
+    def take(self, some: np.ndarray) -> "PairScan":
         """The scan for some of the realizations: here all have the same contact points."""
         return self
 
@@ -69,21 +84,19 @@ class PairScan:
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
-        """The number of points whose gap is below `activity` (realization,), and their moments (realization, side, moment)."""
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
+        """The points whose gap is below `activity`."""
         active = self.gaps(relative, deviations) < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return active.sum(axis=1), moments
+        return Survey(active.sum(axis=1), moments)
 
     def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """The least gap of all points (realization,) [mm]."""
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
 
-    def deepest(
-        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """The deepest point of each cluster and its depth, both (realization, cluster) [mm]; depth 0 where none is inside.
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
+        """The deepest point of each cluster; depth 0 where none is inside.
 
         Only points where `may_carry` (realization, point) holds are looked at, if it is given.
         """
@@ -92,28 +105,26 @@ class PairScan:
             gaps = np.where(may_carry, gaps, 0)
         firsts = self.leaves[self.branches[self.clusters]]
         points = np.stack([gaps[:, a:b].argmin(axis=1) + a for a, b in itertools.pairwise(firsts)], axis=1)
-        return points, -np.take_along_axis(gaps, points, axis=1)
+        return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
 
 
 class CompiledScan(PairScan):
     """A scan whose passes are compiled; PairScan is the same in NumPy."""
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> tuple[np.ndarray, np.ndarray]:
+    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         flat = moments.reshape(count, len(self._tables))
         kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
-        return active, moments
+        return Survey(active, moments)
 
     def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
 
-    def deepest(
-        self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
         points, gaps = self._deepest(self.clusters, relative, deviations, may_carry, 0.0)
-        return points, -gaps
+        return Deepest(points, -gaps)
 
     def _deepest(
         self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, below: float
@@ -209,5 +220,5 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
 
 
 def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-    """Least gap (row, pair) [mm] of each pair at X_RM (row, pair, 12)."""
+    """Least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

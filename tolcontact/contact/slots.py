@@ -4,49 +4,53 @@ from dataclasses import dataclass
 
 import numpy as np
 
-KEPT = 8
-CARRIES = 1e-9
+MOST = 8  # points that keep their slots from one round to the next
+NOTHING = 1e-9  # of the largest multiplier of a pair: smaller ones are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Slots:
-    """points (row, slot): numbers of contact points; filled (row, slot): which slots are in use; reactions (row, slot)."""
+    """points (n, slot): numbers of contact points; filled (n, slot): which slots are in use; reactions (n, slot)."""
 
     points: np.ndarray
     filled: np.ndarray
     reactions: np.ndarray
 
     @classmethod
-    def empty(cls, rows: int, slots: int) -> "Slots":
+    def empty(cls, count: int, slots: int) -> "Slots":
         """No point has a slot."""
-        return cls(np.zeros((rows, slots), dtype=int), np.zeros((rows, slots), dtype=bool), np.zeros((rows, slots)))
+        return cls(np.zeros((count, slots), dtype=int), np.zeros((count, slots), dtype=bool), np.zeros((count, slots)))
 
-    def take(self, rows: np.ndarray) -> "Slots":
-        """The slots of some rows."""
-        return Slots(self.points[rows], self.filled[rows], self.reactions[rows])
+    def copy(self) -> "Slots":
+        """The same, to be kept while these change."""
+        return Slots(self.points.copy(), self.filled.copy(), self.reactions.copy())
 
-    def put(self, rows: np.ndarray, other: "Slots") -> None:
-        """Replace the slots of some rows."""
-        self.points[rows], self.filled[rows], self.reactions[rows] = other.points, other.filled, other.reactions
+    def take(self, some: np.ndarray) -> "Slots":
+        """The slots of some realizations."""
+        return Slots(self.points[some], self.filled[some], self.reactions[some])
+
+    def put(self, some: np.ndarray, other: "Slots") -> None:
+        """Replace the slots of some realizations."""
+        self.points[some], self.filled[some], self.reactions[some] = other.points, other.filled, other.reactions
 
     def reactions_of(self, points: np.ndarray) -> np.ndarray:
-        """The reactions of some contact points (row, slot), 0 where they have none here."""
+        """The reactions of some contact points (n, slot), 0 where they have none here."""
         same = (points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]
         return np.asarray(np.where(same, self.reactions[:, None, :], 0.0).max(axis=2))
 
-    def carrying(self, multipliers: np.ndarray) -> "Slots":
-        """Only the slots whose rows carry, at most KEPT of them, largest multipliers (row, slot) first."""
+    def kept(self, multipliers: np.ndarray) -> "Slots":
+        """Only the slots whose rows carry, at most MOST of them, largest multipliers (n, slot) first."""
         largest = np.where(self.filled, multipliers, 0.0)
         order = np.argsort(-largest, axis=1, kind="stable")
         sorted_ = np.take_along_axis(largest, order, axis=1)
-        carries = sorted_ > CARRIES * np.maximum(sorted_[:, :1], CARRIES)
-        carries[:, KEPT:] = False
+        carries = sorted_ > NOTHING * np.maximum(sorted_[:, :1], NOTHING)
+        carries[:, MOST:] = False
         return Slots(np.take_along_axis(self.points, order, axis=1), carries, np.where(carries, sorted_, 0.0))
 
     def with_deepest(self, points: np.ndarray, depth: np.ndarray, tolerance: float) -> "tuple[Slots, np.ndarray]":
-        """Fill the free slots with the deepest of the candidate `points` (row, cluster) that are inside.
+        """Fill the free slots with the deepest of the candidate `points` (n, cluster) that are inside.
 
-        Returns the new slots, and (row,) whether any candidate was new.
+        Returns the new slots, and (n,) whether any candidate was new.
         """
         known = ((points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]).any(axis=2)
         new = (depth > tolerance) & ~known

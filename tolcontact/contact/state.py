@@ -1,4 +1,8 @@
-"""What a group is asked to resolve, how far its steps have come, and what became of it: plain arrays."""
+"""What a group is asked to resolve, how far its steps have come, and what became of it: plain arrays.
+
+Their first dimension is n: the realizations that contact touches, or some of them. `take` copies some of these, `put` writes
+them back; what works on realizations takes a task and a state, and knows no other index.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
@@ -7,20 +11,23 @@ from typing import Self
 import numpy as np
 
 from tolcontact.compilation import ACCURACY, SLOTS
+from tolcontact.contact.scan import PairScan
 from tolcontact.contact.slots import Slots
 
-CARRIES = 1e-4
+CARRIES = 1e-4  # of the largest reaction of a realization: smaller ones only oppose the regularization
+ANSWER = ("poses", "relative", "multipliers", "slack", "astray")
 
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """What stays the same while realizations are resolved; first dimension of the arrays: the row, one for each of them.
+    """What stays the same while realizations are resolved.
 
-    raw            (row, part of the group, 12)
-    relative       (row, pair of the group, 12): X_RM in the raw state
-    deviations     (row, locator) [mm]
-    moments        (row, side, moment) of the points that count in the objective
-    may_carry      for each pair of the group (row, point), or None where every point may
+    raw            (n, part of the group, 12)
+    relative       (n, pair of the group, 12): X_RM in the raw state
+    deviations     (n, locator) [mm]
+    moments        (n, side, moment) of the points that count in the objective
+    may_carry      for each pair of the group (n, point), or None if every point may
+    scans          for each pair of the group the points that may carry
     """
 
     raw: np.ndarray
@@ -28,31 +35,40 @@ class Task:
     deviations: np.ndarray
     moments: np.ndarray
     may_carry: list[np.ndarray | None]
+    scans: Sequence[PairScan]
 
-    def take(self, rows: np.ndarray) -> "Task":
-        """The task for some rows."""
-        may_carry = [None if mask is None else mask[rows] for mask in self.may_carry]
-        return Task(self.raw[rows], self.relative[rows], self.deviations[rows], self.moments[rows], may_carry)
+    def __len__(self) -> int:
+        return len(self.raw)
+
+    def take(self, some: np.ndarray) -> "Task":
+        """The task of some realizations."""
+        return Task(
+            self.raw[some],
+            self.relative[some],
+            self.deviations[some],
+            self.moments[some],
+            [None if mask is None else mask[some] for mask in self.may_carry],
+            [scan.take(some) for scan in self.scans],
+        )
 
 
 @dataclass(eq=False)
 class State:
-    """How far the steps of a task's rows have come. Steps write into the arrays.
+    """How far the steps of a task have come. Steps write into the arrays.
 
-    poses       (row, part of the group, 12)
-    relative    (row, pair of the group, 12): X_RM
-    residual    (row,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution, or that step
+    poses       (n, part of the group, 12)
+    relative    (n, pair of the group, 12): X_RM
+    residual    (n,) [mm]: KKT residual, any penetration left undone, and the last step of the exact resolution, or that step
                 in the norm of the objective, if it is smaller
-    slack       (row, pair of the group) [mm]: penetration that no increment could remove; where the steps came to no rest
-                for it, the true penetration at the best poses on the way, which are kept
-    astray      (row,) [mm]: how far two-sided locators, where they hold, are from their place at `poses`
-    iterations  (row,): linear steps taken
-    second_answers (row,): QPs that another solver had to answer
-    multipliers (row, row of the QP): reactions in the last QP
-    gap_min     (row, pair of the group) [mm]: least true gap at `poses`, once the steps have ended
-    searched    (row,) bool: contact points were projected again at `poses`, onto curved faces at least
-    doubtful    (row,) bool: `poses` are far from the raw ones, and what they stand on was not confirmed
-    slots       the points that carry most, for the next QP to start with; one for each pair whose points in the QP change
+    slack       (n, pair of the group) [mm]: penetration that no increment could remove
+    astray      (n,) [mm]: how far two-sided locators are from where they should hold
+    iterations  (n,): linear steps taken
+    second_answers (n,): QPs that another solver had to answer
+    multipliers (n, row of the QP): reactions
+    gap_min     (n, pair of the group) [mm]: least true gap at `poses`, once they are an answer
+    searched    (n,): whether contact points were projected again at `poses`
+    doubtful    (n,): whether the answer is farther from the raw pose than the method believes one
+    slots       of the pairs with changing points: what carried last
     """
 
     poses: np.ndarray
@@ -68,20 +84,28 @@ class State:
     doubtful: np.ndarray
     slots: list[Slots]
 
+    def __len__(self) -> int:
+        return len(self.poses)
+
     @property
     def in_conflict(self) -> np.ndarray:
-        """(row,): whether penetration was left that no increment could remove."""
+        """(n,): whether penetration was left that no increment could remove."""
         return np.asarray((self.slack > ACCURACY).any(axis=1))
 
     @property
     def solved(self) -> np.ndarray:
-        """(row,): whether the optimality conditions hold. A conflict is believed where it exceeds what was left undone."""
+        """(n,): whether the optimality conditions hold. A conflict is believed if it exceeds what was left undone."""
         return np.asarray(self.residual <= np.maximum(ACCURACY, self.slack.max(axis=1)))
 
     @property
     def rank(self) -> np.ndarray:
-        """(row,): 0 where an answer is certified, 1 where it is a conflict, 2 where there is none, or a doubtful one."""
+        """(n,): 0 for a certified answer, 1 for a conflict, 2 if there is no answer, or a doubtful one."""
         return np.where(self.solved & ~self.doubtful, np.where(self.in_conflict, 1, 0), 2)
+
+    @property
+    def loaded(self) -> np.ndarray:
+        """(n, row of the QP): whether its point carries."""
+        return np.asarray(self.multipliers > CARRIES * self.multipliers.max(axis=1, initial=0)[:, None])
 
     @classmethod
     def start(cls, poses: np.ndarray, relative: np.ndarray, rows: int, varying: int) -> Self:
@@ -102,30 +126,55 @@ class State:
             slots=[Slots.empty(count, SLOTS) for _ in range(varying)],
         )
 
-    def take(self, rows: np.ndarray) -> Self:
-        """A copy of some rows."""
+    def take(self, some: np.ndarray) -> Self:
+        """A copy of some realizations."""
         return type(self)(
-            **{name: getattr(self, name)[rows] for name in self._arrays()}, slots=[each.take(rows) for each in self.slots]
+            **{name: getattr(self, name)[some] for name in _ARRAYS}, slots=[each.take(some) for each in self.slots]
         )
 
-    def put(self, rows: np.ndarray, other: "State") -> None:
-        """Replace some rows."""
-        for name in self._arrays():
-            getattr(self, name)[rows] = getattr(other, name)
+    def put(self, some: np.ndarray, other: "State") -> None:
+        """Replace some realizations."""
+        for name in _ARRAYS:
+            getattr(self, name)[some] = getattr(other, name)
         for own, each in zip(self.slots, other.slots, strict=True):
-            own.put(rows, each)
+            own.put(some, each)
 
-    @classmethod
-    def _arrays(cls) -> list[str]:
-        return [field.name for field in fields(cls) if field.name != "slots"]
+    def put_answer(self, some: np.ndarray, other: "State") -> None:
+        """Replace the poses of some realizations, and what belongs to them; not the record of how they were found."""
+        for name in ANSWER:
+            getattr(self, name)[some] = getattr(other, name)
+
+
+_ARRAYS = tuple(field.name for field in fields(State) if field.name != "slots")
+
+
+class Unsettled:
+    """Realizations that still move, with a task and a state of their own; those that have settled go back where they were."""
+
+    def __init__(self, task: Task, state: State) -> None:
+        self._whole, self._where = state, np.arange(len(task))
+        self.task, self.state = task, state
+
+    def __len__(self) -> int:
+        return len(self._where)
+
+    def settle(self, done: np.ndarray) -> None:
+        """Put back those that are `done` (n,), and go on with the others."""
+        if not done.any():
+            return
+        if self.state is not self._whole:
+            self._whole.put(self._where[done], self.state.take(done))
+        on = ~done
+        self._where, self.task, self.state = self._where[on], self.task.take(on), self.state.take(on)
 
 
 @dataclass(frozen=True, eq=False)
-class Resolution:
-    """What became of the realizations `rows` of a block, as far as one group is concerned.
+class Resolved:
+    """What became of the realizations `touched` of a block, as far as one group is concerned.
 
-    state     the rows' State in the end
-    starts    (row,): how many places the steps were started from
+    touched   (n,): their numbers in the block
+    state     their State in the end
+    starts    (n,): how many places the steps were started from
 
     and of all realizations of the block:
 
@@ -133,18 +182,17 @@ class Resolution:
     active    (realization, pair of the group): number of active contact points in the raw state
     """
 
-    rows: np.ndarray
+    touched: np.ndarray
     state: State
     starts: np.ndarray
     gap_min: np.ndarray
     active: np.ndarray
 
     def reactions(self, spans: Sequence[slice]) -> np.ndarray:
-        """Sum of the reactions of each pair, (row, pair), whose rows of the QP are `spans`."""
+        """Sum of the reactions of each pair, (n, pair), whose rows of the QP are `spans`."""
         return np.stack([self.state.multipliers[:, span].sum(axis=1) for span in spans], axis=1)
 
     def carrying(self, spans: Sequence[slice]) -> np.ndarray:
-        """Number of carrying points of each pair, (row, pair); smaller reactions only oppose the regularization."""
-        multipliers = self.state.multipliers
-        carries = multipliers > CARRIES * multipliers.max(axis=1, initial=0)[:, None]
-        return np.stack([carries[:, span].sum(axis=1) for span in spans], axis=1)
+        """Number of carrying points of each pair, (n, pair)."""
+        loaded = self.state.loaded
+        return np.stack([loaded[:, span].sum(axis=1) for span in spans], axis=1)

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.discretization import Offsets
 
-ROUNDING = 1e-13  # of the largest entry: normals of flat faces differ by that much
+FLATNESS = 1e-13  # of the largest entry: normals of flat faces differ by that much
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
     """Take the matrix G (13, point) apart, exactly but for rounding."""
     centre = G.mean(axis=1)
     U, S, V = np.linalg.svd(G - centre[:, None], full_matrices=False)
-    tolerance = ROUNDING * np.abs(G).max()
+    tolerance = FLATNESS * np.abs(G).max()
     rank = 0
     while rank < len(S) and np.abs(U[:, rank:] * S[rank:] @ V[rank:]).max() > tolerance:
         rank += 1

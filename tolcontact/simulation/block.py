@@ -1,8 +1,11 @@
 """What a block of realizations gives, as plain arrays."""
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 
 import numpy as np
+
+from tolcontact.vocabulary import STATES, Status
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,3 +44,36 @@ class Block:
 
     def __len__(self) -> int:
         return len(self.status)
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.status, minlength=len(Status))
+        found = ", ".join(f"{counts[status]} {status.name.lower()}" for status in Status if counts[status])
+        return f"realizations {self.start} to {self.start + len(self) - 1}: {found}"
+
+    @classmethod
+    def untouched(cls, start: int, deviations: np.ndarray, raw: np.ndarray, measured: np.ndarray, pairs: int) -> "Block":
+        """Realizations at their raw poses (n, part, 12), with measures (n, measure), that contact leaves as they are."""
+        count, states = len(raw), len(STATES)
+        return cls(
+            start=start,
+            deviations=deviations,
+            poses=np.stack([raw] * states, axis=1),
+            measured=np.stack([measured] * states, axis=1),
+            gap_min=np.empty((count, states, pairs)),
+            active=np.zeros((count, pairs), dtype=int),
+            carrying=np.zeros((count, pairs), dtype=int),
+            reaction=np.zeros((count, pairs)),
+            status=np.full(count, Status.UNTOUCHED, dtype=np.int8),
+            kkt_residual=np.zeros(count),
+            iterations=np.zeros(count, dtype=int),
+            starts=np.zeros(count, dtype=int),
+            second_answers=np.zeros(count, dtype=int),
+            searched=np.zeros(count, dtype=np.int8),
+        )
+
+    @classmethod
+    def joined(cls, blocks: Iterable["Block"]) -> "Block":
+        """Blocks that follow each other, as one."""
+        every = list(blocks)
+        names = [field.name for field in fields(cls) if field.name != "start"]
+        return cls(every[0].start, **{name: np.concatenate([getattr(block, name) for block in every]) for name in names})

@@ -26,13 +26,13 @@ class Surfaces(NamedTuple):
 
 def check_surfaces(program: Program, poses: np.ndarray) -> Surfaces:
     """Look at the faces of every pair at corrected poses (row, part, 12)."""
-    nominal, fixed = program.nominal, program.method.search == "fixed"
+    nominal, fixed = program.nominal, not program.method.is_iterated
     found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None:
             continue
-        X_RM = pose.compose(pose.inverse(poses[:, pair.reference]), poses[:, pair.moving])
+        X_RM = pose.relative(poses[:, pair.moving], poses[:, pair.reference])
         found.penetration[:, k] = faces.depth(X_RM)
         if fixed:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)

@@ -5,8 +5,7 @@ import time
 
 from tolcontact.archive import bytes_of_rows, size_in_words
 from tolcontact.compilation import Program
-from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.blocks import block_rows, processors
+from tolcontact.simulation import block_rows, processors, simulate_blocks
 from tolcontact.vocabulary import BLOCK_ROWS
 
 try:

@@ -1,0 +1,115 @@
+"""The contact points of a group's pairs: all of them, those that may carry, and where they are at other poses."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.compilation import ContactGroup, Program
+from tolcontact.contact.projection import project, reach
+from tolcontact.contact.scan import PairScan, least_gaps, pair_scan
+from tolcontact.contact.state import State
+from tolcontact.mechanics import round_pairs
+
+CLUSTERS = 6
+
+
+class Seen(NamedTuple):
+    """What is seen of the raw state of realizations.
+
+    scans     for each pair the points that may carry
+    least     (realization, pair) [mm]: least gaps
+    active    (realization, pair): number of active points
+    moments   (realization, side, moment) of the points that count in the objective
+    """
+
+    scans: list[PairScan]
+    least: np.ndarray
+    active: np.ndarray
+    moments: np.ndarray
+
+
+class Carriers(NamedTuple):
+    """Points of a pair that carry: the realization of each, its nominal place (point, 3), and their usual distance [mm]."""
+
+    realization: np.ndarray
+    places: np.ndarray
+    spacing: float
+
+
+class Candidates:
+    """The contact points of a group, with X_RM of its pairs as (realization, pair, 12)."""
+
+    def __init__(self, program: Program, group: ContactGroup) -> None:
+        self._method = program.method
+        self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
+        self._standing, self._spans = group.program.standing, group.program.spans
+        self._varying = [k for k, points in enumerate(self._standing) if points is None]
+        self._every, self._some = [], []
+        for position, index in enumerate(group.group.pairs):
+            pair, gaps = program.nominal.pairs[index], program.gaps[index]
+            tables = [side.table for side in group.group.sides if side.pair == position]
+            self._every.append(pair_scan(pair, gaps, tables, CLUSTERS))
+            # If the paper's set of points may carry, those between the corners count, too.
+            corners = self._method.corners_suffice
+            self._some.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if corners else self._every[-1])
+        is_iterated = self._method.is_iterated
+        self.round = round_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
+        self._reaches = {k: reach(self._every[k]) for k in (range(len(self._pairs)) if is_iterated else self.round)}
+
+    def scans(self, relative: np.ndarray, *, anew: bool = False) -> list[PairScan]:
+        """Scans of the points that may carry; projected again if the method says so.
+
+        `anew`: those against curved faces are projected again in any case.
+        """
+        scans = list(self._some)
+        if anew or self._method.is_iterated:
+            for k in self._reaches:
+                scans[k] = self.projected(k, relative[:, k])
+        return scans
+
+    def projected(self, k: int, relative: np.ndarray) -> PairScan:
+        """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
+        return project(self._some[k], self._pairs[k].surface, relative, self._reaches[k])
+
+    def survey(self, relative: np.ndarray, deviations: np.ndarray) -> Seen:
+        """What is seen of raw states, for deviations (realization, locator) [mm]."""
+        scans = self.scans(relative)
+        surveyed = scans if self._method.is_iterated else self._every
+        found = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
+        return Seen(
+            scans=scans,
+            least=least_gaps(scans, relative, deviations),
+            active=np.stack([each.active for each in found], axis=1),
+            moments=np.concatenate([self._counted(k, each.moments) for k, each in enumerate(found)], axis=1),
+        )
+
+    def _counted(self, k: int, active: np.ndarray) -> np.ndarray:
+        """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
+        if self._pairs[k].is_supports:  # they are not among the paper's contact points
+            return np.zeros_like(active)
+        if not self._method.minimizes.counts_all:
+            return active
+        every = np.array([table.sum(axis=1) for table in self._every[k].tables]).reshape(active.shape[1:])
+        return np.broadcast_to(every, active.shape)
+
+    def may_carry(self, scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray | None]:
+        """Which points (realization, point) may carry: in the paper's set those that are active in the raw state."""
+        if self._method.is_closed:
+            return [None for _ in scans]
+        return [
+            None if self._pairs[k].is_supports else scan.gaps(relative[:, k], deviations) < self._method.activity
+            for k, scan in enumerate(scans)
+        ]
+
+    def carriers(self, k: int, state: State) -> Carriers:
+        """The points of pair k that carry."""
+        loaded, standing = state.loaded[:, self._spans[k]], self._standing[k]
+        if standing is None:
+            slots = state.slots[self._varying.index(k)]
+            realization, column = np.nonzero(loaded & slots.filled)
+            places = self._some[k].P_m[slots.points[realization, column]]
+        else:
+            realization, column = np.nonzero(loaded)
+            places = self._pairs[k].P_m[standing[column]]
+        return Carriers(realization, places, 2 * reach(self._every[k]))

@@ -1,0 +1,98 @@
+"""Blocks of realizations on as many threads as there are processors, in order.
+
+A block does not depend on the one before it, nor on the thread that simulates it: the results of a run are the same for any
+number of threads, to the last bit.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from typing import TypeVar
+
+from tolcontact.compilation import Program
+from tolcontact.contact import ContactResolver
+from tolcontact.mechanics import round_pairs
+from tolcontact.simulation.block import Block
+from tolcontact.simulation.blocks import simulate_block
+from tolcontact.variation.draws import draw
+from tolcontact.vocabulary import BLOCK_ROWS
+
+CURVED_ROWS, LEAST_ROWS = 512, 16
+LARGE = 24  # bodies that are coupled; a whole block of more would take longer than some ten seconds
+
+T = TypeVar("T")
+
+
+def simulate_blocks(
+    program: Program, *, samples: int, seed: int, start: int = 0, block: int | None = None, threads: int | None = None
+) -> Iterator[Block]:
+    """Realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
+
+    The realization k is the same in any run.
+
+    At most two blocks for each of the `threads` (by default one for each processor) are in memory.
+    """
+    return map_blocks(lambda done: done, program, samples=samples, seed=seed, start=start, block=block, threads=threads)
+
+
+def map_blocks(
+    function: Callable[[Block], T],
+    program: Program,
+    *,
+    samples: int,
+    seed: int,
+    start: int = 0,
+    block: int | None = None,
+    threads: int | None = None,
+) -> Iterator[T]:
+    """What `function` makes of each block of `simulate_blocks`, in the thread that simulated it; in order."""
+    threads, block = threads or processors(), block or block_rows(program)
+    firsts = range(start, samples, block)
+    originals = [ContactResolver(program, group) for group in program.groups]
+    idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(firsts)))]
+    begun: deque[tuple[Future[T], list[ContactResolver]]] = deque()
+
+    def simulate(first: int, resolvers: list[ContactResolver]) -> T:
+        deviations = draw(program.nominal, seed=seed, start=first, stop=min(first + block, samples))
+        return function(simulate_block(program, deviations, start=first, resolvers=resolvers))
+
+    def finish_one() -> T:
+        future, resolvers = begun.popleft()
+        done = future.result()
+        idle.append(resolvers)
+        return done
+
+    pool = ThreadPoolExecutor(threads)
+    try:
+        for first in firsts:
+            if not idle:
+                yield finish_one()
+            resolvers = idle.pop()
+            for resolver in resolvers:
+                resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
+            begun.append((pool.submit(simulate, first, resolvers), resolvers))
+        while begun:
+            yield finish_one()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)  # where all went well none is left; a stopped run does not wait
+
+
+def block_rows(program: Program) -> int:
+    """Realizations that are simulated together: a power of two, and fewer where one of them takes long.
+
+    What it takes grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
+    should end within seconds: then it is safe, and somebody who waits sees it.
+    """
+    bodies = max((len(group.group.free) for group in program.groups), default=0)
+    rows = BLOCK_ROWS
+    if program.method.is_exact and any(round_pairs(program.nominal, group.group) for group in program.groups):
+        rows = CURVED_ROWS
+    while rows > LEAST_ROWS and rows * bodies**3 > BLOCK_ROWS * LARGE**3:
+        rows //= 2
+    return rows
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
