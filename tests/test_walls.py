@@ -26,14 +26,14 @@ NOT_IN = {"xarray": ("declaration/", "discretization/", "variation/", "mechanics
 # Rooms that a room does not import from, though they stand before it.
 NEVER = {
     "statistics": ("contact", "simulation"),
-    "archive": ("contact",),
+    "archive": ("contact", "statistics"),
     "report": ("contact", "simulation", "archive", "workflow"),
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "child", "vocabulary", "checksums", "method", "poses", "compiled", "declaration", "discretization",
-    "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "workflow", "report", "cli",
-    "__init__", "__main__",
+    "version", "errors", "child", "vocabulary", "checksums", "realizations", "method", "poses", "compiled", "declaration",
+    "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "workflow",
+    "report", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -11,6 +11,11 @@ def rotation(X: np.ndarray) -> np.ndarray:
     return X[..., :9].reshape(*X.shape[:-1], 3, 3)
 
 
+def translation(X: np.ndarray) -> np.ndarray:
+    """t (..., 3) [mm]."""
+    return X[..., 9:]
+
+
 def pose(R: np.ndarray, t: np.ndarray) -> np.ndarray:
     """The poses (..., 12) of R (..., 3, 3) and t (..., 3) [mm]."""
     return np.concatenate([R.reshape(*R.shape[:-2], 9), t], axis=-1)

@@ -8,8 +8,6 @@ import numpy as np
 from tolcontact import vocabulary as words
 from tolcontact.vocabulary import Variable
 
-PIECE = 100_000  # rows that are read at once
-
 
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
     """Numbers (row,) of certified realizations, `count` at most, in order.
@@ -31,8 +29,8 @@ def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
 
 
 def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-    for first in range(0, rows, PIECE):
-        some = slice(first, min(first + PIECE, rows))
+    for first in range(0, rows, words.PIECE_ROWS):
+        some = slice(first, min(first + words.PIECE_ROWS, rows))
         status, gap, carrying = (
             np.ma.getdata(file[variable.name][some]) for variable in (words.STATUS, words.GAP_MIN, words.CARRYING)
         )

@@ -3,9 +3,10 @@
 import datetime
 import json
 import platform
-from collections.abc import Mapping
+import sys
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
-from typing import Any
+from typing import Any, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -19,13 +20,32 @@ from tolcontact.declaration.document import to_document
 from tolcontact.discretization import Nominal
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
-from tolcontact.statistics import FieldMoments
 from tolcontact.vocabulary import Variable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
 
 
-def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[str, Any]:
+class Run(NamedTuple):
+    """What is asked of a run, besides its program.
+
+    keep       what is archived of each realization: one of `KEPT`
+    surfaces   number of realizations that will be checked against the surfaces
+    fields     of how many realizations the magnitude of displacement fields is: a number, "all" or "none"
+    """
+
+    seed: int
+    samples: int
+    keep: str
+    surfaces: int
+    fields: str
+
+    @property
+    def magnitudes(self) -> int:
+        """Over how many realizations, the first ones, magnitudes are summed up."""
+        return int(self.fields) if self.fields.isdigit() else sys.maxsize if self.fields == "all" else 0
+
+
+def run_settings(program: Program, run: Run) -> dict[str, Any]:
     """Global attributes that say how the rows came about; a resumed run must agree in all but `samples`."""
     method = program.method
     return {
@@ -35,7 +55,7 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
-        "weighting": method.objective if method.objective.endswith("points") else "none",
+        "weighting": method.objective if method.minimizes.counts_points else "none",
         "regularization": method.regularization,
         "eta": method.eta,
         "active_set": method.active_set,
@@ -45,9 +65,10 @@ def run_settings(program: Program, seed: int, samples: int, keep: str) -> dict[s
         "near_travel": method.near_travel,
         "method_from": _whose(program),
         "sampler": "monte-carlo",
-        "seed": np.int64(seed),
-        "samples": np.int64(samples),
-        "kept": keep,
+        "seed": np.int64(run.seed),
+        "samples": np.int64(run.samples),
+        "kept": run.keep,
+        "fields": run.fields,
         "block_rows": np.int64(block_rows(program)),
     }
 
@@ -60,10 +81,10 @@ def _whose(program: Program) -> str:
     return "options"
 
 
-def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
+def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[int]) -> None:
     """All attributes, dimensions, labels and groups; of the rows and of the fields what they will be called.
 
-    `surfaces` is the number of realizations that will be checked against the surfaces.
+    `sums` is for each part how many numbers the sums of its field are, in one state.
     """
     nominal = program.nominal
     file.setncatts(
@@ -76,7 +97,7 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
             "Variation Simulation of Rigid Bodies with Contact Representation",
             "history": f"{now()} created",
             "versions": versions(),
-            **settings,
+            **run_settings(program, run),
         }
     )
     labels = {
@@ -95,7 +116,7 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
             write(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
-    rows = kept_rows(str(settings["kept"]))
+    rows = kept_rows(run.keep)
     for variable in words.ROWS:
         if variable in rows:
             define(file, variable)
@@ -105,7 +126,7 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
     define(file, words.ROW_CHECKSUM)
     file.createDimension(words.CHECKPOINT, 2)
     lay_out(file, words.SUMMED_ROWS, [words.UNFINISHED] * 2)
-    file[words.REACTION.name].units = "mm" if program.method.objective.endswith("points") else "N"
+    file[words.REACTION.name].units = program.method.minimizes.reaction_units
     units = [measure.units for measure in nominal.measures]
     if set(units) != {"mm"}:
         file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
@@ -116,22 +137,22 @@ def write_header(file: netCDF4.Dataset, program: Program, settings: Mapping[str,
     _write_contact(file.createGroup("contact"), nominal)
     _write_sample(file.createGroup("sample"), nominal, deviations=words.DEVIATION in rows)
     checked = file.createGroup("surface")
-    checked.createDimension(words.CHECKED, surfaces)
-    _lay_out_together(checked, nothing_checked(surfaces, len(nominal.pairs)))
-    for part in nominal.parts:
+    checked.createDimension(words.CHECKED, run.surfaces)
+    _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
+    for part, numbers in zip(nominal.parts, sums, strict=True):
         group = file.createGroup(f"field/{words.group_of(part.name)}")
         group.setncattr("part", part.name)
         for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
             group.createDimension(name, size)
-        sums = FieldMoments(part.vertices).state.size
-        for name, size in ((words.COMPONENT, len(words.COMPONENTS)), (words.BOUND, len(words.BOUNDS)), (words.NUMBER, sums)):
+        sizes = {words.COMPONENT: len(words.COMPONENTS), words.BOUND: len(words.BOUNDS), words.NUMBER: numbers}
+        for name, size in sizes.items():
             group.createDimension(name, size)
         write(group, words.COMPONENT_LABEL, words.COMPONENTS)
         write(group, words.FIELD_VERTICES, part.vertices)
         write(group, words.FIELD_FACES, part.faces)
         write(group, words.BOUND_LABEL, words.BOUNDS)
         _lay_out_together(group, no_field(len(part.vertices)))
-        lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), sums], np.nan))
+        lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), numbers], np.nan))
         lay_out(group, words.SUMS_CHECKSUM, [words.UNFINISHED] * 2)
 
 
@@ -148,6 +169,7 @@ def no_field(vertices: int) -> dict[Variable, Any]:
         **{v: np.full([states, vertices, len(words.COMPONENTS)], np.nan) for v in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA)},
         words.FIELD_INTERVAL: np.full([states, vertices, len(words.BOUNDS)], np.nan),
         words.FIELD_REALIZATIONS: 0,
+        words.MAGNITUDE_REALIZATIONS: 0,
     }
 
 

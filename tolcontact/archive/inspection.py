@@ -45,7 +45,8 @@ ONCE = {  # by group
     "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
                words.LOCATOR_DIRECTION),
     "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
-    "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS, words.FIELD_SUMS,
+    "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS,
+              words.MAGNITUDE_REALIZATIONS, words.FIELD_SUMS,
               words.SUMS_CHECKSUM, words.GROUP_CHECKSUM),
 }  # fmt: skip
 
@@ -253,7 +254,8 @@ def _check_sums(group: netCDF4.Dataset) -> None:
     if words.GROUP_CHECKSUM.name in group.variables:
         said, found = int(group[words.GROUP_CHECKSUM.name][...]), 0
         for variable in words.SURFACE if kind == "surface" else words.FIELDS:
-            found = crc32(variable, _values(group[variable.name], variable), found)
+            if variable.name in group.variables:  # magnitude_realizations is not in archives of format 2
+                found = crc32(variable, _values(group[variable.name], variable), found)
         if said not in (words.UNFINISHED, found):
             raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
 

@@ -8,10 +8,8 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
-from tolcontact.statistics import finished
+from tolcontact.realizations import finished
 from tolcontact.vocabulary import Variable
-
-PIECE = 24 * words.BLOCK_ROWS  # realizations that are read at once
 
 
 def check_rows(results: xr.DataTree) -> None:
@@ -54,7 +52,7 @@ def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tu
 
 def _checksums(variable: Variable, values: xr.DataArray, rows: int) -> np.ndarray:
     """Checksums (block,) of the values of a variable in blocks of so many `rows`."""
-    found, at_once = [], -(-PIECE // rows) * rows
+    found, at_once = [], -(-words.PIECE_ROWS // rows) * rows
     for first in range(0, len(values), at_once):
         piece = values[first : first + at_once].values
         found += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]

@@ -11,7 +11,7 @@ from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import log_shown, progress_bar, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
-from tolcontact.vocabulary import KEPT
+from tolcontact.vocabulary import KEPT, MAGNITUDES
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES
 from tolcontact.workflow.run import run as run_model
 
@@ -28,6 +28,9 @@ def run(
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"What to archive of each realization: {or_(KEPT)}.")] = "all",
+    fields: Annotated[
+        str, typer.Option(metavar="all|N|none", help="Realizations, the first ones, in the magnitudes of displacement fields.")
+    ] = str(MAGNITUDES),
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked against the surfaces between contact points.")
     ] = SURFACES,
@@ -49,7 +52,8 @@ def run(
         with log_shown(bar.console, lambda words: bar.update(task, description=words)):
             results = run_model(
                 functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-                overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, progress=show,
+                overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
+                fields=int(fields) if fields.isdigit() else fields, progress=show,
             )  # fmt: skip
     with results:
         print_summary(results)

@@ -1,6 +1,6 @@
 """Summarize: statistics of measures with their intervals, and displacement fields."""
 
-from tolcontact.statistics.fields import FieldMoments
-from tolcontact.statistics.summary import finished, summarize
+from tolcontact.statistics.fields import BlockSums, DisplacementFields
+from tolcontact.statistics.summary import summarize
 
-__all__ = ["FieldMoments", "finished", "summarize"]
+__all__ = ["BlockSums", "DisplacementFields", "summarize"]

@@ -1,10 +1,43 @@
-"""The innermost loop of displacement fields, compiled."""
+"""The innermost loops of displacement fields, compiled: sums over realizations, in their order."""
 
 import numpy as np
 
 from tolcontact.compiled import compiled
 
 CHUNK = 256  # points that are summed up together
+
+
+@compiled
+def affine_parts(poses, centre, A):  # type: ignore[no-untyped-def]
+    """A (n, 3, 4) of the displacements u = A (x - centre, 1) of points x at poses (n, 12).
+
+    Turning about the part's middle keeps the sums free of cancellation.
+    """
+    for k in range(A.shape[0]):
+        for i in range(3):
+            A[k, i, 3] = poses[k, 9 + i]
+            for j in range(3):
+                A[k, i, j] = poses[k, 3 * i + j] - (1.0 if i == j else 0.0)
+                A[k, i, 3] += A[k, i, j] * centre[j]
+
+
+@compiled
+def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
+    """Write the mean (3, 4) of A (n, 3, 4), and add to scatter (3, 4, 4) the products of each row's deviations from it."""
+    for i in range(3):
+        for a in range(4):
+            total = 0.0
+            for k in range(A.shape[0]):
+                total += A[k, i, a]
+            mean[i, a] = total / A.shape[0]
+        for k in range(A.shape[0]):
+            for a in range(4):
+                rest = A[k, i, a] - mean[i, a]
+                for b in range(a + 1):
+                    scatter[i, a, b] += rest * (A[k, i, b] - mean[i, b])
+        for a in range(4):
+            for b in range(a):
+                scatter[i, b, a] = scatter[i, a, b]
 
 
 @compiled

@@ -1,19 +1,18 @@
 """What a run says about each measure, each part and the contact, read from its archive alone, piece by piece."""
 
 from collections import Counter
-from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
 from tolcontact.errors import ArchiveError
+from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
 
 LEAST = 2
-PIECE = 24 * words.BLOCK_ROWS  # realizations that are read at once
 
 
 def summarize(results: xr.DataTree) -> xr.Dataset:
@@ -31,7 +30,8 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     surfaces_checked              number of these realizations
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
-    field_realizations                                   number of realizations in the displacement fields
+    field_realizations                                   number of realizations in the displacement fields,
+    magnitude_realizations                               and in their magnitudes
 
     The attribute `realizations` is the number of those that are finished, `samples` of those that the run was begun for.
     Raises ArchiveError where fewer than LEAST realizations are finished.
@@ -44,7 +44,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
     values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
     changes = np.array([_change(raw, corrected) for raw, corrected in samples])
-    by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in _statuses(rows)], axis=0)
+    by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total = int(by_status.sum())
     parts = rows[words.PART].values
     return xr.Dataset(
@@ -57,7 +57,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
                 (words.INTERVAL,),
                 np.array(intervals.share_of(by_status[words.Status.NOT_ASSEMBLABLE], total)),
             ),
-            "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in _pieces(rows)], axis=0)),
+            "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0)),
             "iterations": ((words.OF_ITERATIONS,), _iterations(rows)),
             "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
             **_checked(results),
@@ -67,6 +67,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
                 {"units": "mm"},
             ),
             "field_realizations": ((), min(_summed(results, str(part)) for part in parts), {"units": "1"}),
+            "magnitude_realizations": ((), min(_magnitudes(results, str(part)) for part in parts), {"units": "1"}),
         },
         coords={
             words.MEASURE: rows[words.MEASURE].values,
@@ -102,28 +103,15 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
 
 
-def _pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
-    for start in range(0, rows.sizes[words.REALIZATION], PIECE):
-        yield rows.isel({words.REALIZATION: slice(start, start + PIECE)})
-
-
-def _statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
-    for piece in _pieces(rows[[words.STATUS.name]]):
-        status = piece[words.STATUS.name].values
-        if status.min(initial=0) < words.UNFINISHED or status.max(initial=0) >= len(words.STATUS_MEANINGS):
-            raise ArchiveError("the archive is damaged: some statuses have no meaning; run the model again")
-        yield status
-
-
 def _sample(rows: xr.Dataset, name: str, state: str, measure: int) -> Sample:
     of = rows[[name]].sel({words.STATE: state}).isel({words.MEASURE: measure})
-    return Sample(lambda: (np.asarray(piece[name].values) for piece in _pieces(of)))
+    return Sample(lambda: (np.asarray(piece[name].values) for piece in pieces(of)))
 
 
 def _penetration(rows: xr.Dataset) -> np.ndarray:
     if not rows[words.GAP_MIN.name].size:
         return np.zeros(len(words.STATES))
-    least = [piece[words.GAP_MIN.name].min([words.REALIZATION, words.PAIR]).values for piece in _pieces(rows)]
+    least = [piece[words.GAP_MIN.name].min([words.REALIZATION, words.PAIR]).values for piece in pieces(rows)]
     return np.asarray(np.maximum(-np.min(least, axis=0), 0))
 
 
@@ -144,7 +132,7 @@ def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str
 def _iterations(rows: xr.Dataset) -> list[float]:
     """Median and largest number of linear steps of the realizations that contact touched: those that took any."""
     counts: Counter[int] = Counter()
-    for piece in _pieces(rows[[words.ITERATIONS.name]]):
+    for piece in pieces(rows[[words.ITERATIONS.name]]):
         steps, times = np.unique(piece[words.ITERATIONS.name].values, return_counts=True)
         counts.update(dict(zip(steps.tolist(), times.tolist(), strict=True)))
     taken = sorted(steps for steps in counts if steps > 0)
@@ -162,17 +150,6 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
         [locators, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
     )
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
-
-
-def finished(results: xr.DataTree) -> int:
-    """How many rows, from the first on, were written completely."""
-    rows = 0
-    for piece in _statuses(results.to_dataset()):
-        unfinished = np.flatnonzero(piece == words.UNFINISHED)
-        if unfinished.size:
-            return rows + int(unfinished[0])
-        rows += len(piece)
-    return rows
 
 
 def _begun_for(results: xr.DataTree, done: int) -> int:
@@ -220,6 +197,13 @@ def _summed(results: xr.DataTree, part: str) -> int:
         return results.to_dataset().sizes[words.REALIZATION]
     whole = int(field[words.GROUP_CHECKSUM.name]) != words.UNFINISHED
     return int(field[words.FIELD_REALIZATIONS.name]) if whole else 0
+
+
+def _magnitudes(results: xr.DataTree, part: str) -> int:
+    """How many realizations are in the magnitude of a part's field: before format 3 all of the field's."""
+    field, summed = _field(results, part), _summed(results, part)
+    known = words.MAGNITUDE_REALIZATIONS.name in field
+    return min(int(field[words.MAGNITUDE_REALIZATIONS.name]), summed) if known else summed
 
 
 def _field(results: xr.DataTree, part: str) -> xr.Dataset:

@@ -191,7 +191,14 @@ FIELD_INTERVAL = Variable(
     "mm",
 )
 FIELD_REALIZATIONS = Variable("realizations", (), "i8", "number of realizations in the displacement field", "1")
-FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS)
+MAGNITUDE_REALIZATIONS = Variable(
+    "magnitude_realizations",
+    (),
+    "i8",
+    "number of realizations, the first ones, in the magnitude of the displacement field",
+    "1",
+)
+FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)
 CHECKED_REALIZATION = Variable(
     "realization_checked", (CHECKED,), "i8", "number of a realization that was checked; -1: none", "1"
 )
@@ -236,3 +243,8 @@ def group_of(part: str) -> str:
     """
     name = unicodedata.normalize("NFC", part)  # as the netCDF library stores it
     return f"{name}_" if name.rstrip("_") in {coordinate.name for coordinate in COORDINATES} else name
+
+
+def field_of(part: str) -> str:
+    """The path of a part's displacement field."""
+    return f"field/{group_of(part)}"

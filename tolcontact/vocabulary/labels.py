@@ -3,7 +3,7 @@
 import enum
 
 CONVENTIONS = "CF-1.11"
-FORMAT = 2  # of the archive; archives of format 1, which do not say it, can be read
+FORMAT = 3  # of the archive; those of earlier ones can be read; those of format 1 do not say it
 STATES = ("raw", "corrected")
 RAW, CORRECTED = 0, 1  # their positions
 AXES = ("x", "y", "z")
@@ -16,9 +16,12 @@ CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
 BLOCK, ROW_VARIABLE = "block", "row_variable"
 FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
+PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
+MAGNITUDES = 4 * BLOCK_ROWS  # realizations that are summed up in the magnitude of displacement fields, if nobody says otherwise
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
+FIELD_CHOICES = ("all", "none")  # besides a number
 
 UNFINISHED = -1
 CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once

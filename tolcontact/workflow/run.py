@@ -1,6 +1,8 @@
 """From a declared assembly to an archive: the whole flow in one call."""
 
+import math
 import tempfile
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -8,21 +10,24 @@ from typing import Any
 
 import xarray as xr
 
-from tolcontact.archive import ArchiveWriter, check_rows, open_archive, opened, taken
+from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, opened, stored, taken
+from tolcontact.archive.stored import StoredBlock
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import Block, map_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
+from tolcontact.statistics import BlockSums, DisplacementFields
 from tolcontact.statistics import summarize as statistics_of
-from tolcontact.vocabulary import KEPT
+from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MAGNITUDES
 from tolcontact.workflow.forecast import announce
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
+CHECKPOINT_EVERY, FIELDS_EVERY = 0.25, 2.0  # s: how much of a killed run is simulated again, how old its fields may be
 Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
 Choice = Method | Mapping[str, Any]  # a method, or some of its words, the others as the model says
@@ -84,6 +89,7 @@ def run(
     resume: bool = False,
     keep: str = "all",
     surfaces: int = SURFACES,
+    fields: int | str = MAGNITUDES,
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
@@ -92,6 +98,8 @@ def run(
     model's own method).
     Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
+    `fields` says over how many realizations, the first ones, the magnitudes of displacements are summed up: a number, "all" or
+    "none"; their components are always exact, over all realizations.
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
@@ -101,6 +109,8 @@ def run(
     check_counts(samples=samples, seed=seed, surfaces=surfaces)
     if keep not in KEPT:
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
+    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
+        raise OptionError(f"fields is {fields!r}; expected a whole number, 2 or above, or one of: {', '.join(FIELD_CHOICES)}")
     if isinstance(model, Program) and not (solver is None and method is None):
         raise OptionError(
             "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
@@ -108,10 +118,15 @@ def run(
 
     def write(path: Path) -> None:
         program = model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
-        start = ArchiveWriter.resume if resume and path.exists() else ArchiveWriter
-        with start(path, program, seed=seed, samples=samples, keep=keep, surfaces=surfaces) as writer:
+        asked = Run(seed, samples, keep, surfaces, str(fields))
+        of_fields = DisplacementFields(program.nominal, asked.magnitudes)
+        with (
+            ArchiveWriter.resume(path, program, asked)
+            if resume and path.exists()
+            else ArchiveWriter(path, program, asked, of_fields.sizes)
+        ) as writer:
             announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-            _simulate(program, writer, seed, progress)
+            _simulate(program, writer, of_fields, seed, progress)
 
     if out is None:
         for word, value in {"overwrite": overwrite, "resume": resume}.items():
@@ -127,22 +142,40 @@ def run(
     return opened(path)
 
 
-def _simulate(program: Program, writer: ArchiveWriter, seed: int, progress: Progress | None) -> None:
+def _simulate(
+    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, progress: Progress | None
+) -> None:
+    fields.go_on_from(writer.take_up())
+
+    def prepared(block: Block) -> tuple[StoredBlock, BlockSums]:
+        return stored(block, writer.kept), fields.sums(block.poses, block.start)
+
+    checked = written = -math.inf
     try:
-        for done in simulate_blocks(program, samples=writer.samples, seed=seed, start=writer.rows):
-            writer.append(done)
-            if len(done) == writer.block_rows:
-                writer.check_point()
+        for rows, sums in map_blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
+            writer.append(rows)
+            fields.merge(sums)
+            now = time.monotonic()
+            if writer.is_at_checkpoint() and now > checked + CHECKPOINT_EVERY:
+                writer.check_point(fields.numbers)
+                if now > written + FIELDS_EVERY:
+                    writer.write_fields(fields.fields())
+                    written = now
+                checked = now
             if progress:
                 progress(writer.rows)
-        writer.write_fields()
+        writer.write_fields(fields.fields())
     except KeyboardInterrupt:
-        writer.write_fields_of_checkpoint()
+        # It came at whatever instant: what is sure are the sums of the last checkpoint.
+        if sums_there := writer.take_up():
+            fields.go_on_from(sums_there)
+            writer.write_fields(fields.fields())
         raise
-    rows = writer.chosen(seed)
-    if rows.size:
-        kept = writer.poses(rows)
-        writer.write_checked(rows, *check_surfaces(program, simulated_poses(program, rows, seed) if kept is None else kept))
+    chosen_rows = writer.chosen(seed)
+    if chosen_rows.size:
+        kept = writer.poses(chosen_rows)
+        poses = simulated_poses(program, chosen_rows, seed) if kept is None else kept
+        writer.write_checked(chosen_rows, *check_surfaces(program, poses))
 
 
 def summarize(results: xr.DataTree | str | Path) -> xr.Dataset:

@@ -35,8 +35,8 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text("Estimates with their 95 % confidence intervals; changes from the same draws.")
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
-    fields = int(summary["field_realizations"])
-    of = "" if fields == count else f", of {grouped(fields)} realizations"
+    magnitudes = int(summary["magnitude_realizations"])
+    of = "" if magnitudes == count else f", of the first {grouped(magnitudes)} realizations"
     yield Text(f"\n6 sigma of the displacement magnitude over the surface of each part (mm){of}", style="bold")
     yield _field_table(summary)
     yield Text("\ncontact", style="bold")
