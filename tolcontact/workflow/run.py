@@ -1,6 +1,5 @@
 """From a declared assembly to an archive: the whole flow in one call."""
 
-import math
 import tempfile
 import time
 from collections.abc import Callable, Mapping
@@ -27,7 +26,7 @@ from tolcontact.workflow.forecast import announce
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
-CHECKPOINT_EVERY, FIELDS_EVERY = 0.25, 2.0  # s: how much of a killed run is simulated again, how old its fields may be
+FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be
 Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
 Choice = Method | Mapping[str, Any]  # a method, or some of its words, the others as the model says
@@ -150,18 +149,16 @@ def _simulate(
     def prepared(block: Block) -> tuple[StoredBlock, BlockSums]:
         return stored(block, writer.kept), fields.sums(block.poses, block.start)
 
-    checked = written = -math.inf
+    written = time.monotonic()
     try:
         for rows, sums in map_blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
             writer.append(rows)
             fields.merge(sums)
-            now = time.monotonic()
-            if writer.is_at_checkpoint() and now > checked + CHECKPOINT_EVERY:
+            if writer.is_at_checkpoint():
                 writer.check_point(fields.numbers)
-                if now > written + FIELDS_EVERY:
+                if time.monotonic() > written + FIELDS_EVERY:
                     writer.write_fields(fields.fields())
-                    written = now
-                checked = now
+                    written = time.monotonic()
             if progress:
                 progress(writer.rows)
         writer.write_fields(fields.fields())
