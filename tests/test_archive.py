@@ -1,20 +1,16 @@
 """The archive alone: what it holds, recomputes, rebuilds, and survives."""
 
-import signal
-import subprocess
-import sys
+from dataclasses import replace
 
 import cf_xarray  # noqa: F401
 import netCDF4
 import numpy as np
 import pytest
-import trimesh
 import xarray as xr
-from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.test_seating import table
+from tests.helpers import ALL_POINTS, EXACT, SEATED, contents, finish, run, script, start
 from tolcontact import vocabulary
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
@@ -90,27 +86,8 @@ def test_fields_are_those_of_the_archived_poses(archive):
         assert np.abs(field.six_sigma.sel(state=state).values[:7] - 6 * u.std(axis=0, ddof=1)).max() < 1e-11
 
 
-def with_everything(tmp_path):
-    """A model that uses every way to declare a thing."""
-    wedge = trimesh.creation.box(bounds=[[0, 0, 0], [30, 20, 8]])
-    wedge.export(tmp_path / "block.stl")
-    a = tc.Assembly("everything")
-    base = a.part("base part", tc.Mesh(trimesh.creation.box(bounds=[[0, 0, 0], [60, 40, 10]])), fixed=True)
-    block = a.part("block", tc.Mesh(tmp_path / "block.stl"), at=(10, 10, 10), rotation=(0, 0, 0.1))
-    frozen = {"Z": stats.gamma(2, scale=0.02, loc=-0.04), "Y2": stats.norm(0, 0.1)}
-    scheme = [tc.Locator(one.name, one.point, one.direction, frozen.get(one.name, 0.5)) for one in cases.translating(0)]
-    a.locate(block, scheme)
-    upward = base.face(lambda centres, normals: (normals[:, 2] > 0.9) & (centres[:, 2] > 9))
-    a.contact("joint", moving=block.face("-z"), reference=upward, spacing=6.0, within=2.0)
-    a.contact("corners", moving=block.face([*range(12)]), reference=base.face("+z"), points="vertices", within=1.0)
-    a.measure("height", block.point(0, 0, 8), along=(0, 0.6, 0.8), tolerance=1)
-    a.measure("gap", base.point(0, 0, 10), to=block.point(0, 0, 0), along="z")
-    a.measure("tilt", lambda poses: poses.rotation(block)[2, 0] * 2 + 1, units="rad")
-    return a
-
-
 def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
-    tc.run(with_everything(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
+    tc.run(cases.everything_of_meshes(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
     (tmp_path / "block.stl").unlink()
     with tc.open_archive(tmp_path / "first.nc") as archive:
         first = archive.load()
@@ -122,18 +99,18 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
 
 
 def test_faces_of_step_files_are_rebuilt_without_the_files():
-    method = tc.Method(resolution="exact", objective="all points")
-    first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=method)
+    first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=ALL_POINTS)
     rebuilt = tc.model_of(first)
-    second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=method)
+    second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=ALL_POINTS)
     for name in (*DATA, "carrying", "iterations"):
         assert (first[name].values == second[name].values).all(), name
     assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
 
 
 def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
-    path, method = tmp_path / "table.nc", tc.Method(resolution="exact", objective="seating", search="iterated")
-    first = tc.run(table(), samples=100, seed=2, solver="daqp", method=method, out=path).load()
+    path, method = tmp_path / "table.nc", replace(SEATED, search="iterated")
+    with tc.run(cases.table(), samples=100, seed=2, solver="daqp", method=method, out=path) as results:
+        first = results.load()
     second = tc.run(tc.model_of(first), samples=100, seed=2, solver="daqp", method=method)
     for name in (*DATA, "carrying", "reaction", "iterations"):
         assert (first[name].values == second[name].values).all(), name
@@ -149,17 +126,7 @@ def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomput
 
 def test_it_may_be_read_while_its_results_are_open(tmp_path):
     """The netCDF library crashed on that while labels were text of variable length."""
-    path = tmp_path / "open.nc"
-    code = f"""
-import sys, xarray as xr, tolcontact as tc
-from tests import cases
-held = tc.run(cases.stack(), samples=20, out={str(path)!r})
-for _ in range(3):
-    for group in (None, "contact", "sample"):
-        xr.load_dataset({str(path)!r}, group=group)
-assert list(held["part"].values) == ["bottom", "middle", "upper"]
-"""
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+    assert run(script("read_while_open", tmp_path / "open.nc")).returncode == 0
 
 
 def test_a_run_in_memory_is_the_same_as_its_archive(archive):
@@ -175,98 +142,34 @@ def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path
     for samples in (300, 5000, 5000, 9000):
         tc.run(cases.stack(), samples=samples, seed=3, solver=solver, out=paths[0], resume=True, keep=keep).close()
     tc.run(cases.stack(), samples=9000, seed=3, solver=solver, out=paths[1], keep=keep).close()
-    grown, whole = (xr.open_datatree(path) for path in paths)
-    for name, values in {**grown.data_vars, **grown["sample"].data_vars}.items():
-        if name != "summed_rows":  # the two checkpoints may have changed places
-            assert values.identical(whole.get(name, whole["sample"].get(name))), name
-    for part in ("bottom", "middle", "upper"):
-        one, other = (tree[f"field/{part}"].to_dataset().drop_vars("sums") for tree in (grown, whole))
-        assert one.identical(other)
-    assert grown.attrs["history"].count("resumed after 4096") == 2
-
-
-SCRIPT = """
-import sys
-from tests import cases
-import tolcontact as tc
-tc.run(cases.stack(), samples=40000, seed=3, solver="daqp", out=sys.argv[1], keep=sys.argv[2],
-       progress=lambda rows: print(rows, flush=True))
-"""
+    for group in (None, "sample", "field/bottom", "field/middle", "field/upper"):
+        grown, whole = (contents(path, group) for path in paths)
+        assert grown.identical(whole), group
+    assert xr.load_dataset(paths[0]).attrs["history"].count("resumed after 4096") == 2
 
 
 @pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
 def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     path = tmp_path / "killed.nc"
-    with subprocess.Popen([sys.executable, "-c", SCRIPT, path, keep], stdout=subprocess.PIPE, text=True) as run:
-        for line in run.stdout:
+    with start(script("run_stack", path, 40_000, "--keep", keep)) as begun:
+        for line in begun.stdout:
             if int(line) >= after:
                 break
-        run.send_signal(signal.SIGKILL)
+        begun.kill()
     with netCDF4.Dataset(path) as file:
         written = int((file["status"][:] != -1).sum())
     assert after <= written < 40_000
     tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=path, keep=keep, resume=True).close()
     whole = tmp_path / "whole.nc"
     tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=whole, keep=keep).close()
-    for group in (None, "sample"):
-        one, other = (xr.load_dataset(p, group=group).drop_vars("summed_rows", errors="ignore") for p in (path, whole))
-        assert one.drop_attrs().identical(other.drop_attrs())
-    fields = [xr.load_dataset(p, group="field/middle").drop_vars("sums") for p in (path, whole)]
-    assert fields[0].identical(fields[1])
-
-
-KILLS = """
-import os, sys
-import netCDF4
-import xarray as xr
-from tests import cases
-import tolcontact as tc
-from tolcontact.archive import writer
-
-folder, before = sys.argv[1], sys.argv[2] == "before"
-program = tc.build(cases.stack(), solver="daqp")
-run = lambda path, **options: tc.run(program, samples=9000, seed=3, out=path, keep="measures", surfaces=4, **options).close()
-run(f"{folder}/whole.nc")
-
-class Dying(netCDF4.Dataset):
-    left = 0
-    def sync(self):
-        Dying.left -= 1
-        if before and Dying.left == 0:
-            os._exit(9)
-        super().sync()
-        if Dying.left == 0:
-            os._exit(9)
-
-killed = 0
-while True:
-    path = f"{folder}/{killed}.nc"
-    child = os.fork()
-    if child == 0:
-        Dying.left, netCDF4.Dataset = killed + 1, Dying
-        run(path)
-        os._exit(0)
-    if os.waitpid(child, 0)[1] == 0:
-        break
-    killed += 1
-    with tc.open_archive(path) as left, tc.open_archive(f"{folder}/whole.nc") as whole:
-        done = left["status"].values != -1
-        assert (left["measured"].values[done] == whole["measured"].values[done]).all(), f"rows after kill {killed}"
-    first = []
-    run(path, resume=True, progress=first.append)
-    assert first[0] > 4096 or killed <= 5, f"kill {killed}: began at {first[0]}"
-    with tc.open_archive(path) as resumed, tc.open_archive(f"{folder}/whole.nc") as whole:
-        for group in ("/", "/field/middle", "/field/upper"):
-            both = [tree[group].to_dataset().drop_attrs() for tree in (resumed, whole)]
-            one, other = (each.drop_vars(["summed_rows", "sums"], errors="ignore") for each in both)
-            assert one.identical(other), f"{group} after kill {killed}"
-assert killed == 18, killed
-"""
+    for group in (None, "sample", "field/middle"):
+        assert contents(path, group).identical(contents(whole, group)), group
 
 
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_a_run_may_be_killed_at_any_of_its_writes(when, tmp_path):
-    subprocess.run([sys.executable, "-c", KILLS, tmp_path, when], check=True)
+    done = run(script("kill_at_each_write", tmp_path, when), timeout=600)
+    assert done.returncode == 0, done.stderr
 
 
 def test_resuming_with_fewer_realizations_completes_what_was_begun(archive, tmp_path):
@@ -288,45 +191,22 @@ def test_resuming_is_refused_where_contact_points_were_others(archive, tmp_path)
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, resume=True)
 
 
-LONG = """
-import sys
-from tests import cases
-import tolcontact as tc
-tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=sys.argv[1],
-       progress=lambda rows: (print(rows, flush=True), sys.stdin.readline()))
-"""
-
-
 @pytest.mark.parametrize("how", ["resume", "overwrite"])
 def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
     path = tmp_path / "live.nc"
-    with subprocess.Popen([sys.executable, "-c", LONG, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as run:
-        run.stdout.readline()
+    with start(script("run_stack", path, 1000, "--step")) as begun:
+        begun.stdout.readline()
         with pytest.raises(ArchiveError, match="being written by another run"):
             tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=path, **{how: True})
-        run.communicate("go on\n")
-    assert run.returncode == 0
+        done = finish(begun, "go on\n")
+    assert done.returncode == 0
     with tc.open_archive(path) as tree:
         assert (tree["status"].values != -1).all()
     assert [p.name for p in tmp_path.iterdir()] == ["live.nc"]
 
 
-FULL = """
-import resource, sys
-from tests import cases
-import tolcontact as tc
-from tolcontact.errors import ArchiveError
-resource.setrlimit(resource.RLIMIT_FSIZE, (1_000_000, 1_000_000))
-try:
-    tc.run(cases.stack(), samples=20_000, seed=3, solver="daqp", out=sys.argv[1])
-except ArchiveError as error:
-    assert "cannot be written" in str(error), error
-    sys.exit(7)
-"""
-
-
 def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path):
-    assert subprocess.run([sys.executable, "-c", FULL, tmp_path / "full.nc"], check=False).returncode == 7
+    assert run(script("run_on_a_full_disk", tmp_path / "full.nc")).returncode == 7
     assert not list(tmp_path.iterdir())
 
 
@@ -363,8 +243,7 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
     with pytest.raises(ArchiveError, match="another model"):
         tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
     with pytest.raises(ArchiveError, match="resolution = linearized, now it is exact"):
-        method = tc.Method(resolution="exact")
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=method, out=archive, resume=True)
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=EXACT, out=archive, resume=True)
     with pytest.raises(ArchiveError, match="exists"):
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
     assert archive.read_bytes() == before

@@ -1,17 +1,13 @@
 """Each mistake gets one message that names the thing at fault, exit code 2, and leaves files alone."""
 
-import contextlib
-import io
-import subprocess
 import sys
-from dataclasses import dataclass
 
 import pytest
 import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.cli import command_line
+from tests.helpers import SCRIPTS, call, run
 
 HEADER = """
 import math
@@ -36,7 +32,7 @@ COLLINEAR = (
     "    a.locate(top, [tc.Locator(f'L{k}', p, n, 1) for k, (p, n) in enumerate(zip(points, 'zzzyyx'))])\n"
 )
 
-MODELS = {
+MISTAKES = {
     "locators that do not fix the part": ({"top": COLLINEAR}, ['part "top"', "do not fix it", "condition number"]),
     "five locators": ({"top": COLLINEAR.replace(", (0, 10, 5)", "")}, ['part "top"', "5 locators", "exactly 6"]),
     "negative tolerance": ({"top": GOOD["top"].replace("10", "-10")}, ['part "top"', "-10", "0 or above"]),
@@ -164,27 +160,9 @@ def script(folder, changes):
     return path
 
 
-@dataclass
-class Done:
-    returncode: int
-    stdout: str
-    stderr: str
-
-
-def call(folder, *arguments):
-    """The command line in this process, started in `folder`."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            command_line([str(argument) for argument in arguments])
-        except SystemExit as ended:
-            return Done(ended.code, out.getvalue(), err.getvalue())
-    raise AssertionError("the command line ended without an exit code")
-
-
-@pytest.mark.parametrize("mistake", MODELS)
+@pytest.mark.parametrize("mistake", MISTAKES)
 def test_a_wrong_model_is_refused(mistake, tmp_path):
-    changes, expected = MODELS[mistake]
+    changes, expected = MISTAKES[mistake]
     for verb in ("check", "run"):
         out = () if verb == "check" else ("--out", "out.nc")
         done = call(tmp_path, verb, script(tmp_path, changes), *out)
@@ -210,8 +188,8 @@ def test_a_doubtful_size_is_a_warning_on_stderr(tmp_path):
 
 
 def test_all_faults_of_a_model_are_reported_at_once(tmp_path):
-    changes = {name: MODELS[mistake][0][name] for mistake, name in [("five locators", "top"), ("unknown face", "contact")]}
-    done = call(tmp_path, "check", script(tmp_path, changes | MODELS["measure on an unknown part"][0]))
+    changes = {name: MISTAKES[mistake][0][name] for mistake, name in [("five locators", "top"), ("unknown face", "contact")]}
+    done = call(tmp_path, "check", script(tmp_path, changes | MISTAKES["measure on an unknown part"][0]))
     assert "3 faults" in done.stderr
     for words in ("exactly 6", '"up"', '"lid"'):
         assert words in done.stderr
@@ -286,20 +264,7 @@ def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
 
 def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
     """A tab wider than its slot."""
-    model = script(tmp_path, {"whole": """
-import tolcontact as tc
-
-def assembly():
-    a = tc.Assembly("slot")
-    left = a.part("left", tc.Box(10, 10, 10), at=(-10, 0, 0), fixed=True)
-    right = a.part("right", tc.Box(10, 10, 10), at=(9.9, 0, 0), fixed=True)
-    tab = a.part("tab", tc.Box(10, 10, 10))
-    a.locate(tab, tc.three_two_one(tab.face("-z"), tab.face("-y"), tab.face("-x"), inset=1), tolerance=0.01)
-    a.contact("left side", moving=tab.face("-x"), reference=left.face("+x"), points=9)
-    a.contact("right side", moving=tab.face("+x"), reference=right.face("-x"), points=9)
-    a.measure("side", tab.point(5, 5, 5), along="x")
-    return a
-"""})  # fmt: skip
+    model = SCRIPTS / "model_tab.py"
     done = call(tmp_path, "run", model, "--samples", "50")
     assert done.returncode == 1
     assert "50 realizations" in done.stderr
@@ -314,7 +279,7 @@ def assembly():
 def test_a_model_script_runs_by_itself(tmp_path):
     model = script(tmp_path, {})
     model.write_text(model.read_text() + "\nif __name__ == '__main__':\n    tc.main(assembly)\n")
-    done = subprocess.run([sys.executable, model, "--samples", "50"], capture_output=True, text=True, check=False)
+    done = run([sys.executable, model, "--samples", "50"])
     assert done.returncode == 0 and "height" in done.stdout
 
 

@@ -1,6 +1,7 @@
 """What a certificate says holds for bodies, near the raw pose, and does not hang on luck."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import tolcontact as tc
 from studies.certificates.judge import contradictions
 from studies.certificates.scenes import scene
 from tests import cases
-from tests.test_contact import R_t, simulate
+from tests.helpers import ALL_POINTS, EXACT, SEATED, R_t, simulate
 from tolcontact import poses as pose
 from tolcontact.compilation import plugins, usable_plugins
 from tolcontact.compilation.plugins import PLUGINS, Plugin
@@ -21,11 +22,10 @@ from tolcontact.discretization.shapes import shape
 from tolcontact.errors import ContactWarning, OptionError
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
-SEATED = tc.Method(objective="seating", resolution="exact")
 SOLVERS = ("daqp", "qpoases")
 
 
-def turned(run):
+def largest_turn(run):
     """Largest turn (realization,) of a part between both states."""
     return pose.turn(run["poses"][:, RAW], run["poses"][:, CORRECTED]).max(axis=1)
 
@@ -39,7 +39,7 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
     assert 40 < (excess > 0).sum() < 120
     assert ((run["status"] == Status.NOT_ASSEMBLABLE) == (excess > 0)).all()
     assert ((run["status"] == Status.RESOLVED) == (excess <= 0)).all()
-    assert turned(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() < SEATED.near_turn
     left = -run["gap_min"][excess > 0, CORRECTED].min(axis=1)
     # The rim of the faces is 40 mm from the axis, the excess is told at 30.
     assert (left <= excess[excess > 0] * 40 / 30 * 1.01 + 1e-4).all() and (left > 0).all()
@@ -52,7 +52,7 @@ def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_
     for run in runs:
         assert (run["status"] == runs[0]["status"]).all()
         assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
-        assert turned(run).max() < 0.01
+        assert largest_turn(run).max() < 0.01
     assert (runs[0]["status"] == Status.NOT_ASSEMBLABLE).sum() > 50
     assert np.abs(runs[0]["poses"] - runs[1]["poses"]).max() < 1e-6
 
@@ -61,10 +61,9 @@ def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
     """CASES C8, in two frames and in blocks of two sizes: the same status in every row."""
-    method = tc.Method(resolution="exact")
-    _, still = simulate(cases.model("channel"), samples=3000, seed=seed, block=4096, solver=solver, method=method)
+    _, still = simulate(cases.model("channel"), samples=3000, seed=seed, block=4096, solver=solver, method=EXACT)
     assert (still["status"] == Status.RESOLVED).all()
-    _, small = simulate(cases.model("channel"), samples=1000, seed=seed, block=37, solver=solver, method=method)
+    _, small = simulate(cases.model("channel"), samples=1000, seed=seed, block=37, solver=solver, method=EXACT)
     assert (small["status"] == still["status"][:1000]).all()
     assert np.abs(small["poses"] - still["poses"][:1000]).max() < 1e-6
 
@@ -99,15 +98,14 @@ def test_what_a_solver_misses_another_one_answers(monkeypatch):
 
 def test_far_answers_are_not_certified():
     """The limit is the method's: at half a degree hardly any answer of a tower is near."""
-    near = tc.Method(resolution="exact", objective="all points")
-    strict = tc.Method(resolution="exact", objective="all points", near_turn=np.radians(0.5))
-    _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=near)
+    strict = replace(ALL_POINTS, near_turn=np.radians(0.5))
+    _, free = simulate(cases.model("tower"), samples=50, solver="daqp", method=ALL_POINTS)
     _, run = simulate(cases.model("tower"), samples=50, solver="daqp", method=strict)
-    far = turned(free) > strict.near_turn
+    far = largest_turn(free) > strict.near_turn
     assert far.sum() > 5
     assert (run["status"][far] == Status.DOUBTFUL).all() and (run["starts"][far] == 3).all()
     assert (run["status"][~far] == free["status"][~far]).all()
-    assert turned(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
+    assert largest_turn(run)[run["status"] == Status.RESOLVED].max() <= strict.near_turn
 
 
 @pytest.mark.parametrize("option", [{"near_turn": 0.0}, {"near_turn": 4.0}, {"near_travel": 0.0}, {"near_travel": np.inf}])
@@ -169,14 +167,13 @@ def test_a_ball_rests_in_a_cone():
 
 def test_surfaces_are_checked_between_contact_points(tmp_path):
     """A shaft on few points sinks into the walls; the archive says how deep, and the true answer agrees."""
-    method = SEATED
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ContactWarning)
         model = cases.shaft_in_a_v(720, points=200)
-        with tc.run(model, samples=60, solver="daqp", method=method, out=tmp_path / "v.nc", surfaces=20) as results:
+        with tc.run(model, samples=60, solver="daqp", method=SEATED, out=tmp_path / "v.nc", surfaces=20) as results:
             surface, summary = results["surface"].to_dataset().load(), tc.summarize(results)
-        _, run = simulate(model, samples=60, solver="daqp", method=method)
-        again = tc.run(model, samples=60, solver="daqp", method=method, keep="measures", surfaces=20)
+        _, run = simulate(model, samples=60, solver="daqp", method=SEATED)
+        again = tc.run(model, samples=60, solver="daqp", method=SEATED, keep="measures", surfaces=20)
     rows = surface["realization_checked"].values
     assert len(set(rows)) == 20 and (np.diff(rows) > 0).all() and rows.min() >= 0 and rows.max() < 60
     # The round shaft, from the poses: how deep its ends lie under the planes of the walls.
@@ -238,11 +235,11 @@ def test_flat_faces_have_points_where_their_rims_cross():
     corners = {(45.0, 45.0, 0.0), (45.0, 55.0, 0.0), (55.0, 45.0, 0.0), (55.0, 55.0, 0.0)}
     assert corners <= {tuple(p) for p in across.P_m.round(9)}
     assert not corners <= {tuple(p) for p in said.P_m.round(9)}  # points that were asked for are left as they are
-    below = overlap_corners(_placed(beam, "-z"), _placed(foot, "+z"))
+    below = overlap_corners(_patch_of(beam, "-z"), _patch_of(foot, "+z"))
     assert {tuple(p) for p in below.round(9)} == {(x, y, -10.0) for x in (80.0, 83.0) for y in (48.0, 51.0)}
 
 
-def _placed(part, direction):
+def _patch_of(part, direction):
     mesh = shape(part.geometry).mesh
     return patch(part.face(direction), {part: mesh}).placed(np.eye(3), np.array(part.at))
 

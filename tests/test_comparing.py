@@ -8,7 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.test_bad_input import call
+from tests.helpers import call
 from tolcontact.workflow.compare import compare
 
 

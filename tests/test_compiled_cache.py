@@ -2,23 +2,13 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
 import tolcontact
-
-SCRIPT = """
-import numpy as np
-from tolcontact.statistics import kernel
-powers = np.zeros((4, 3))
-kernel.add_magnitudes(np.ones((2, 3, 4)), np.ones((3, 3)), np.zeros(3), powers)
-assert np.allclose(powers[1], 96), powers
-found = kernel.add_magnitudes.stats
-print(sum(found.cache_hits.values()), sum(found.cache_misses.values()))
-"""
+from tests.helpers import finish, run, script, start
 
 
 @pytest.fixture(scope="module")
@@ -26,7 +16,7 @@ def warm(tmp_path_factory):
     """A copy of the package of its own, whose compiled functions are in its cache."""
     copy = tmp_path_factory.mktemp("warm") / "site"
     shutil.copytree(Path(tolcontact.__file__).parent, copy / "tolcontact", ignore=shutil.ignore_patterns("__pycache__"))
-    assert call(copy) == (0, 1)
+    assert count(copy) == (0, 1)
     return copy
 
 
@@ -35,22 +25,25 @@ def installed(warm, tmp_path):
     return shutil.copytree(warm, tmp_path / "site")
 
 
-def call(site, *options, **environment):
+def count(site, *options, **environment):
     """Hits and misses of the cache in a process of its own that imports the package from `site`."""
-    begun = start(site, *options, **environment)
-    return finish(begun)
+    return counted(started(site, *options, **environment))
 
 
-def start(site, *options, **environment):
-    known = {**os.environ, "PYTHONPATH": str(site), "NUMBA_CACHE_DIR": "", **environment}
-    command = [sys.executable, *options, "-c", SCRIPT]
-    return subprocess.Popen(command, env=known, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=site)
+def started(site, *options, **environment):
+    python, *named = script("count_compiled")
+    return begin([python, *options, *named], site, {**os.environ, "NUMBA_CACHE_DIR": "", **environment})
 
 
-def finish(begun):
-    out, err = begun.communicate(timeout=120)
-    assert begun.returncode == 0, err
-    hits, misses = out.split()
+def begin(command, site, environment):
+    known = {**environment, "PYTHONPATH": str(site)}
+    return start(command, env=known, cwd=site)
+
+
+def counted(begun):
+    done = finish(begun)
+    assert done.returncode == 0, done.stderr
+    hits, misses = done.stdout.split()
     return int(hits), int(misses)
 
 
@@ -60,8 +53,8 @@ def cached(site, kind):
 
 
 def test_a_second_process_finds_it_compiled(installed):
-    assert call(installed) == (1, 0)
-    assert call(installed, "-O") == (1, 0)
+    assert count(installed) == (1, 0)
+    assert count(installed, "-O") == (1, 0)
 
 
 @pytest.mark.parametrize("kind", ["nbi", "nbc"])
@@ -73,8 +66,8 @@ def test_a_damaged_file_is_replaced(kind, left, installed):
         "nothing": b"", "half": whole[: len(whole) // 2], "all but a byte": whole[:-1], "zeros": bytes(len(whole)),
         "garbage": b"\x80\x05garbage" * 50, "another pickle": b"\x80\x04K\x05.",
     }[left])  # fmt: skip
-    assert call(installed) == (0, 1)
-    assert call(installed) == (1, 0)
+    assert count(installed) == (0, 1)
+    assert count(installed) == (1, 0)
 
 
 def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(installed, tmp_path):
@@ -83,21 +76,21 @@ def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(installed, tmp_pa
         file = cached(installed, kind)
         file.unlink()
         file.mkdir()
-        assert call(installed) == (0, 1)
+        assert count(installed) == (0, 1)
         file.rmdir()
 
 
 def test_without_a_place_to_write_it_compiles_anew(installed):
     shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
     (installed / "tolcontact/statistics/__pycache__").write_text("in the way")
-    assert call(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
+    assert count(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
 
 
 def test_several_processes_may_begin_at_once(installed):
     shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
-    begun = [start(installed) for _ in range(4)]
-    assert all(sum(finish(one)) == 1 for one in begun)
-    assert call(installed) == (1, 0)
+    begun = [started(installed) for _ in range(4)]
+    assert all(sum(counted(one)) == 1 for one in begun)
+    assert count(installed) == (1, 0)
 
 
 READ = "-all,+dac_read_search"  # everything may be read
@@ -108,7 +101,7 @@ AS_NOBODY += [f"--bounding-set={READ}", f"--inh-caps={READ}", f"--ambient-caps={
 @pytest.fixture
 def nobody():
     """The command that makes one run as a user who can write nowhere."""
-    done = shutil.which("setpriv") and subprocess.run([*AS_NOBODY, sys.executable, "-c", ""], check=False, capture_output=True)
+    done = shutil.which("setpriv") and run([*AS_NOBODY, sys.executable, "-c", ""])
     if not done or done.returncode:
         pytest.skip("only root may become another user")
     return AS_NOBODY
@@ -121,12 +114,8 @@ def test_another_user_may_use_it(home, installed, nobody, tmp_path):
     if home != "missing":
         folder.mkdir()
         folder.chmod(0o777 if home == "writable" else 0o755)
-    known = {**os.environ, "PYTHONPATH": str(installed), "HOME": str(folder)}
+    known = {**os.environ, "HOME": str(folder)}
     for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
         known.pop(name, None)
-    found = []
-    for _ in range(2):
-        command = [*nobody, sys.executable, "-c", SCRIPT]
-        begun = subprocess.Popen(command, env=known, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=installed)
-        found.append(finish(begun))
+    found = [counted(begin([*nobody, *script("count_compiled")], installed, known)) for _ in range(2)]
     assert found == [(0, 1), (1, 0) if home == "writable" else (0, 1)]

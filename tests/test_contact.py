@@ -5,21 +5,9 @@ import pytest
 
 import tolcontact as tc
 from tests import cases, referee
+from tests.helpers import R_t, placed, simulate
 from tolcontact.compilation import usable_plugins
-from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
-
-
-def simulate(assembly, samples=200, seed=1, block=1000, **options):
-    """Blocks joined to one: arrays by name, and the program."""
-    program = tc.build(assembly, **options)
-    blocks = list(simulate_blocks(program, samples=samples, seed=seed, block=block))
-    names = [name for name in Block.__dataclass_fields__ if name != "start"]
-    return program, {name: np.concatenate([getattr(b, name) for b in blocks]) for name in names}
-
-
-def R_t(poses):
-    return poses[..., :9].reshape(*poses.shape[:-1], 3, 3), poses[..., 9:]
 
 
 @pytest.mark.parametrize("case", [cases.ra1, cases.stack], ids=["ra1", "stack"])
@@ -208,15 +196,7 @@ def test_the_order_of_parts_and_pairs_changes_nothing(method):
 
 def test_rows_that_contradict_each_other_are_reported_and_nothing_is_dropped():
     """A tab wider than its slot: no increment opens both sides."""
-    a = tc.Assembly("slot")
-    left = a.part("left", tc.Box(10, 10, 10), at=(-10, 0, 0), fixed=True)
-    right = a.part("right", tc.Box(10, 10, 10), at=(9.9, 0, 0), fixed=True)
-    tab = a.part("tab", tc.Box(10, 10, 10))
-    a.locate(tab, tc.three_two_one(tab.face("-z"), tab.face("-y"), tab.face("-x"), inset=1), tolerance=0.01)
-    a.contact("left side", moving=tab.face("-x"), reference=left.face("+x"), points=9)
-    a.contact("right side", moving=tab.face("+x"), reference=right.face("-x"), points=9)
-    a.measure("side", tab.point(5, 5, 5), along="x")
-    _, run = simulate(a, samples=50)
+    _, run = simulate(cases.tab(tolerance=0.01, floor=False), samples=50)
     assert (run["status"] == Status.NOT_CONVERGED).all()
     assert np.isfinite(run["poses"]).all()
     # The least-penetrating pose shares the excess of 0.1 mm between both sides.
@@ -249,8 +229,7 @@ def test_a_single_stop_holds(stops, method):
     (pair,) = program.nominal.pairs
     gaps = {}
     for state in (RAW, CORRECTED):
-        R, t = R_t(run["poses"][:, state, 1])
-        places = pair.P_m @ R.swapaxes(1, 2) + t[:, None]
+        places = placed(pair.P_m, run["poses"][:, state, 1])
         gaps[state] = ((places - pair.P_r) * pair.n_r).sum(axis=2) - run["deviations"][:, pair.offsets.columns]
     assert (run["active"][:, 0] == (gaps[RAW] < 0).sum(axis=1)).all()
     assert (gaps[RAW] < -0.1).any() and gaps[CORRECTED].min() > -1e-9

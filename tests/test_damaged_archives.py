@@ -1,8 +1,5 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import subprocess
-import sys
-
 import netCDF4
 import numpy as np
 import pytest
@@ -11,8 +8,8 @@ import xarray as xr
 
 import tolcontact as tc
 from models import ra1
+from tests.helpers import COMMAND, model_in, run, script
 from tests.hostile import HOSTILE, make
-from tests.test_taking import COMMAND
 from tolcontact import vocabulary
 from tolcontact.archive import inspection
 from tolcontact.errors import ArchiveError
@@ -46,7 +43,7 @@ def test_an_archive_with_a_lie_is_refused_in_one_line(name, good, program, tmp_p
     path = tmp_path / "hostile.nc"
     make(good, path, name)
     before, refused = path.read_bytes(), []
-    for use in (lambda: tc.summarize(path), lambda: tc.model_of(tc.open_archive(path)), lambda: resume(program, path)):
+    for use in (lambda: tc.summarize(path), lambda: model_in(path), lambda: resume(program, path)):
         try:
             use()
         except ArchiveError as error:
@@ -64,9 +61,7 @@ def resume(program, path):
 def test_the_command_refuses_with_code_2(name, good, tmp_path):
     path = tmp_path / "hostile.nc"
     make(good, path, name)
-    code = "import sys, tolcontact as tc; tc.model_of(tc.open_archive(sys.argv[1]))"
-    done = subprocess.run([*COMMAND, "summary", path], capture_output=True, text=True, check=False, timeout=30)
-    model = subprocess.run([sys.executable, "-c", code, path], capture_output=True, text=True, check=False, timeout=30)
+    done, model = (run(command, timeout=30) for command in ([*COMMAND, "summary", path], script("model_of", path)))
     assert "Traceback" not in done.stderr and "\x1b" not in done.stdout + done.stderr
     assert done.returncode == (0 if name in ("runs tests",) else 2), done.stderr
     assert "ArchiveError" in model.stderr.splitlines()[-1]
@@ -82,7 +77,7 @@ def test_a_damaged_file_is_refused_or_says_what_it_said(seed, good, program, tmp
     for place in rng.integers(0, where, rng.choice([1, 4, 32])):
         content[place] ^= int(rng.integers(1, 256))
     path.write_bytes(content if seed % 4 else content[: rng.integers(len(content))])
-    for use in (lambda: tc.summarize(path), lambda: xr.Dataset({"model": str(tc.model_of(tc.open_archive(path)))})):
+    for use in (lambda: tc.summarize(path), lambda: xr.Dataset({"model": str(model_in(path))})):
         try:
             found = use()
         except ArchiveError:
@@ -134,7 +129,7 @@ def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):
     found, expected = tc.summarize(path), tc.summarize(good)
     for name in ("statistic_value", "by_status", "field_extreme"):
         assert found[name].identical(expected[name])
-    assert str(tc.model_of(tc.open_archive(path))) == str(ra1.assembly())
+    assert str(model_in(path)) == str(ra1.assembly())
     with pytest.raises(ArchiveError, match="earlier version"):
         tc.run(ra1.assembly, samples=5000, solver="daqp", out=path, resume=True)
 
@@ -162,5 +157,5 @@ def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
     with xr.open_datatree(path) as tree:  # without us
         groups = {str(group.attrs["part"]): key for key, group in tree["field"].children.items()}
         assert set(groups) == {name, f"{name}_"} and len(set(groups.values())) == 2
-    assert str(tc.model_of(tc.open_archive(path))) == str(a)
+    assert str(model_in(path)) == str(a)
     tc.run(a, samples=200, solver="daqp", out=path, resume=True).close()

@@ -22,10 +22,10 @@ from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import RAW, Status
 
 RNG = np.random.default_rng(5)
-MODELS = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}
+PLANAR = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}
 
 
-@pytest.mark.parametrize("make", MODELS.values(), ids=MODELS)
+@pytest.mark.parametrize("make", PLANAR.values(), ids=PLANAR)
 @pytest.mark.parametrize("method", [tc.Method(), tc.Method(resolution="exact", objective="locator stiffness")], ids=str)
 def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(make, method):
     nominal = discretize(make())

@@ -5,9 +5,8 @@ import pytest
 
 import tolcontact as tc
 from tests import cases, referee
+from tests.helpers import EXACT, SEATED, R_t, moved_at_locators, simulate
 from tests.nonlinear import TrueProblem
-from tests.test_contact import R_t, simulate
-from tests.test_seating import table
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status
@@ -17,7 +16,7 @@ JUDGED = {
     "stack": (cases.stack, "all points"),
     "jaws": (cases.jaws, "locator stiffness"),
     "ring": (cases.ring, "all points"),
-    "table": (table, "seating"),
+    "table": (cases.table, "seating"),
 }
 
 
@@ -71,8 +70,7 @@ def test_many_bodies_are_resolved(make, objective):
 def test_opposed_faces_without_clearance(solver):
     """CASES C8: one linear step cannot open all gaps, repeated ones always do. The pose there is a slide along y."""
     samples = 10_000 if solver == "daqp" else 1000
-    method = tc.Method(resolution="exact")
-    program, run = simulate(cases.model("channel"), samples=samples, solver=solver, method=method)
+    program, run = simulate(cases.model("channel"), samples=samples, solver=solver, method=EXACT)
     assert (run["status"] == Status.RESOLVED).all()
     assert run["gap_min"][:, CORRECTED].min() > -1e-6
     R, t = R_t(run["poses"][:, CORRECTED, program.nominal.assembly.parts.index(program.nominal.parts[1].part)])
@@ -85,21 +83,20 @@ def test_opposed_faces_without_clearance(solver):
 
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
-    _, run = simulate(cases.tab(), samples=100, solver=solver, method=tc.Method(resolution="exact"))
+    _, run = simulate(cases.tab(), samples=100, solver=solver, method=EXACT)
     assert (run["status"] == Status.NOT_ASSEMBLABLE).all()
     # The excess of 0.1 mm is shared by both sides, and the floor has no part in it.
     sides, floor = run["gap_min"][:, CORRECTED, :2], run["gap_min"][:, CORRECTED, 2]
     assert np.abs(sides + 0.05).max() < 1e-6
     assert floor.min() > -1e-8
-    _, fits = simulate(cases.tab(slot=10.0), samples=100, solver=solver, method=tc.Method(resolution="exact"))
+    _, fits = simulate(cases.tab(slot=10.0), samples=100, solver=solver, method=EXACT)
     assert (fits["status"] == Status.RESOLVED).all()
 
 
 def test_share_of_square_pins_that_do_not_fit():
     """CASES C6: 0.049133 of the draws cannot be assembled."""
     samples = 20_000
-    method = tc.Method(resolution="exact", objective="seating")
-    _, run = simulate(cases.square_pins(), samples=samples, method=method)
+    _, run = simulate(cases.square_pins(), samples=samples, method=SEATED)
     assert np.isin(run["status"], [Status.RESOLVED, Status.NOT_ASSEMBLABLE]).all()
     share = (run["status"] == Status.NOT_ASSEMBLABLE).mean()
     assert abs(share - 0.049133) < 3.3 * np.sqrt(0.049133 * (1 - 0.049133) / samples)
@@ -107,14 +104,12 @@ def test_share_of_square_pins_that_do_not_fit():
 
 def test_conflicts_do_not_loosen_two_sided_locators():
     """Also with a solver that finds no rest there: poses of least penetration are poses that the locators allow."""
-    program = tc.build(cases.square_pins(), solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    program = tc.build(cases.square_pins(), solver="daqp", method=SEATED)
     block = simulate_block(program, draw(program.nominal, seed=8, start=0, stop=4000))
     stuck = block.status == Status.NOT_ASSEMBLABLE
     assert stuck.sum() > 100 and stuck[2217]
     plate = program.nominal.parts[0]
-    R, t = R_t(block.poses[:, CORRECTED, 0])
-    places = plate.locators.points @ R.swapaxes(1, 2) + t[:, None]
-    moved = ((places - plate.locators.points) * plate.locators.directions).sum(axis=2)[:, ~plate.locators.one_sided]
+    moved = moved_at_locators(plate, block.poses[:, CORRECTED, 0])[:, ~plate.locators.one_sided]
     assert np.abs(moved[stuck | (block.status == Status.RESOLVED)]).max() < 1e-8
 
 
@@ -163,14 +158,14 @@ def test_a_small_contact_may_be_far_from_where_it_comes_to_rest():
     a.contact("tip", moving=pin.face("+x"), reference=wall.face("-x"), points=9, within=10)
     a.force("push", at=pin.point(0, 0.1, 0.1), vector=(5, 0, 0))
     a.measure("slide", pin.point(0, 0, 0), along="x", tolerance=1)
-    _, run = simulate(a, samples=5, solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    _, run = simulate(a, samples=5, solver="daqp", method=SEATED)
     assert (run["status"] == Status.RESOLVED).all()
     assert np.abs(run["measured"][:, CORRECTED] - 8).max() < 1e-9
 
 
 def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_not():
     _, linear = simulate(cases.stack(), samples=1000, solver="daqp")
-    _, exact = simulate(cases.stack(), samples=1000, solver="daqp", method=tc.Method(resolution="exact"))
+    _, exact = simulate(cases.stack(), samples=1000, solver="daqp", method=EXACT)
     assert linear["gap_min"][:, CORRECTED].min() < -1e-3
     assert exact["gap_min"][:, CORRECTED].min() > -1e-9
     assert (linear["iterations"] <= 1).all()
@@ -179,9 +174,8 @@ def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_no
 @pytest.mark.parametrize("solver", ["qpoases", "proxqp"])
 @pytest.mark.parametrize("make", [cases.ra1, cases.stack, cases.jaws], ids=["ra1", "stack", "jaws"])
 def test_solvers_come_to_the_same_exact_poses(make, solver):
-    method = tc.Method(resolution="exact")
-    _, reference = simulate(make(), samples=100, solver="daqp", method=method)
-    _, run = simulate(make(), samples=100, solver=solver, method=method)
+    _, reference = simulate(make(), samples=100, solver="daqp", method=EXACT)
+    _, run = simulate(make(), samples=100, solver=solver, method=EXACT)
     assert (run["status"] == reference["status"]).all()
     # The steps end when they are as small as the solver is accurate.
     assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-6)

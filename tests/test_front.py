@@ -8,10 +8,8 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.test_bad_input import call
+from tests.helpers import ALL_POINTS, call
 from tolcontact.errors import OptionError
-
-EXACT = tc.Method(resolution="exact", objective="all points")
 
 
 def test_every_public_name_is_there_and_the_version_is_the_projects(tmp_path):
@@ -50,16 +48,16 @@ def test_faults_are_listed_without_a_run():
 
 def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tmp_path):
     model = cases.model("tower", 2)
-    assert model.method == EXACT
+    assert model.method == ALL_POINTS
     for given, expected, whose in (
-        (None, EXACT, "model"),
+        (None, ALL_POINTS, "model"),
         ({"resolution": "linearized"}, tc.Method(objective="all points"), "options"),
         (tc.Method(), tc.Method(), "options"),
     ):
         with tc.run(model, samples=20, solver="daqp", method=given) as run:
             assert (run.attrs["resolution"], run.attrs["objective"]) == (expected.resolution, expected.objective)
             assert run.attrs["method_from"] == whose
-            assert tc.model_of(run).method == EXACT
+            assert tc.model_of(run).method == ALL_POINTS
     with tc.run(cases.stack(), samples=20, solver="daqp") as run:
         assert run.attrs["method_from"] == "defaults" and tc.model_of(run).method is None
     (tmp_path / "tower.py").write_text((cases.MODELS / "tower.py").read_text())

@@ -1,6 +1,7 @@
 """Shapes from files, their units, and the faces that are picked from them."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.test_contact import simulate
+from tests.helpers import ALL_POINTS, simulate
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.fault import GeometryFault
@@ -348,7 +349,7 @@ def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
 
 
 def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_interval():
-    method = tc.Method(resolution="exact", objective="all points", search="iterated")
+    method = replace(ALL_POINTS, search="iterated")
     runs = [simulate(cases.bar_in_a_half_pipe(spacing), samples=300, solver="daqp", method=method) for spacing in (6, 3)]
     few, many = (len(program.nominal.pairs[0].P_m) for program, _ in runs)
     assert many > 3 * few

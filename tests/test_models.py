@@ -6,27 +6,26 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases, referee
-from tests.test_contact import R_t, simulate
+from tests.helpers import ALL_POINTS, EXACT, R_t, joined, simulate
 from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
-EXACT = tc.Method(resolution="exact", objective="all points")
-MODELS = {
-    "cells": EXACT,
-    "channel": tc.Method(resolution="exact"),
-    "cover": EXACT,
+METHODS = {
+    "cells": ALL_POINTS,
+    "channel": EXACT,
+    "cover": ALL_POINTS,
     "door": tc.Method(),
     "ra1": tc.Method(),
     "ra2": tc.Method(),
-    "tower": EXACT,
+    "tower": ALL_POINTS,
 }
 # Table 1: mean, 6 sigma, variance.
 RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", METHODS)
 def test_every_model_resolves_all_its_contacts(name):
-    program, run = simulate(cases.model(name), samples=100, solver="daqp", method=MODELS[name])
+    program, run = simulate(cases.model(name), samples=100, solver="daqp", method=METHODS[name])
     assert np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
     assert (run["status"] == Status.RESOLVED).mean() > 0.5
     assert run["gap_min"][:, RAW].min() < -0.1
@@ -38,7 +37,7 @@ def test_every_model_resolves_all_its_contacts(name):
 
 def spreads(name, samples=2000):
     """Mean and standard deviation (measure, state) by measure, on one set of draws."""
-    program, run = simulate(cases.model(name), samples=samples, solver="daqp", method=MODELS[name])
+    program, run = simulate(cases.model(name), samples=samples, solver="daqp", method=METHODS[name])
     x = run["measured"]
     return {m.name: (x[:, :, k].mean(axis=0), x[:, :, k].std(axis=0, ddof=1)) for k, m in enumerate(program.nominal.measures)}
 
@@ -60,7 +59,7 @@ def test_cells_give_way_most_in_the_middle_and_their_pitch_varies_less():
 
 
 def test_blocks_of_a_tower_only_push_each_other_up():
-    _, run = simulate(cases.model("tower"), samples=1000, solver="daqp", method=MODELS["tower"])
+    _, run = simulate(cases.model("tower"), samples=1000, solver="daqp", method=METHODS["tower"])
     top = run["measured"][..., 0]
     assert top[:, CORRECTED].mean() > 0.05
     assert top[:, CORRECTED].std() < 0.5 * top[:, RAW].std()
@@ -70,7 +69,7 @@ def test_blocks_of_a_tower_only_push_each_other_up():
 
 def test_a_cover_stays_within_the_clearance_of_its_pins():
     """The hole stays within half the clearance of its pin, wherever the pin stands."""
-    program, run = simulate(cases.model("cover"), samples=300, solver="daqp", method=EXACT)
+    program, run = simulate(cases.model("cover"), samples=300, solver="daqp", method=ALL_POINTS)
     names = [part.name for part in program.nominal.parts]
     R, t = R_t(run["poses"][:, CORRECTED])
     hole, pin = names.index("cover"), names.index("round pin")
@@ -100,9 +99,9 @@ def test_ra2_comes_to_the_papers_figures(ra2):
     """As for RA1: inside the 95 % prediction interval for one more run of N = 1000, all six figures together."""
     runs = []
     for seed in range(1, 11):
-        blocks = list(simulate_blocks(ra2, samples=1000, seed=seed))
-        assert np.concatenate([block.status for block in blocks]).max() == Status.RESOLVED
-        runs.append(np.concatenate([block.measured[..., 0] for block in blocks]))
+        run = joined(simulate_blocks(ra2, samples=1000, seed=seed))
+        assert run["status"].max() == Status.RESOLVED
+        runs.append(run["measured"][..., 0])
     figures = np.array([[(x.mean(), 6 * x.std(ddof=1), x.var(ddof=1)) for x in run.T] for run in runs])
     reach = stats.t.ppf(1 - 0.025 / 6, len(runs) - 1) * np.sqrt(1 + 1 / len(runs)) * figures.std(axis=0, ddof=1)
     for state, paper in RA2.items():

@@ -1,7 +1,6 @@
 """Solvers print nothing, whatever becomes of their problems, and what users print is not lost."""
 
 import io
-import subprocess
 import sys
 import threading
 from contextlib import redirect_stdout
@@ -10,6 +9,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import SEATED, run, script
 from tolcontact.compilation import usable_plugins
 from tolcontact.mechanics.quiet import quiet
 
@@ -18,8 +18,7 @@ from tolcontact.mechanics.quiet import quiet
 @pytest.mark.parametrize("case", ["block on six", "parked"])
 def test_solvers_print_nothing(solver, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
-    method = tc.Method(resolution="exact", objective="seating")
-    tc.run(a, samples=300 if solver == "qpoases" else 20, seed=1, solver=solver, method=method, surfaces=0)
+    tc.run(a, samples=300 if solver == "qpoases" else 20, seed=1, solver=solver, method=SEATED, surfaces=0)
     assert capfd.readouterr() == ("", "")
 
 
@@ -70,29 +69,10 @@ def test_what_a_users_measure_prints_is_not_lost(capsys):
 
 
 def test_it_runs_without_streams():
-    code = "import sys; sys.stdout = sys.stderr = None; import tolcontact as tc; from tests import cases; "
-    code += "tc.run(cases.ra1(points=9), samples=20)"
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-PRINTING = """
-import threading
-from tolcontact.mechanics.quiet import quiet
-done = threading.Event()
-def muffle():
-    while not done.is_set():
-        with quiet():
-            pass
-workers = [threading.Thread(target=muffle) for _ in range(2)]
-for worker in workers:
-    worker.start()
-for k in range(20_000):
-    print(k, flush=True)
-done.set()
-"""
+    assert run(script("run_without_streams")).returncode == 0
 
 
 def test_printing_goes_on_while_other_threads_come_and_go():
-    done = subprocess.run([sys.executable, "-c", PRINTING], check=False, capture_output=True, text=True)
+    done = run(script("print_while_muffled"))
     assert done.returncode == 0
     assert done.stdout.split() == [str(k) for k in range(20_000)]

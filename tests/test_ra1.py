@@ -6,8 +6,8 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.simulation import simulate_blocks
-from tolcontact.vocabulary import CORRECTED, RAW
+from tests.helpers import simulate
+from tolcontact.vocabulary import BLOCK_ROWS, CORRECTED, RAW
 
 SIGMA2 = (10 / 6) ** 2
 # Table 1: mean, 6 sigma, variance.
@@ -18,12 +18,10 @@ MEASURED = (100, 12.5)
 
 def heights(samples, seed, solver="daqp"):
     """Measured corner height (realization, state), and the deviations of the A locators (realization, 6)."""
-    program = tc.build(cases.model("ra1"), solver=solver)
-    blocks = list(simulate_blocks(program, samples=samples, seed=seed))
+    program, run = simulate(cases.model("ra1"), samples=samples, seed=seed, solver=solver, block=BLOCK_ROWS)
     labels = [f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]
     columns = [program.nominal.locators.labels.index(label) for label in labels]
-    d = np.concatenate([b.deviations for b in blocks])[:, columns]
-    return np.concatenate([b.measured[..., 0] for b in blocks]), d
+    return run["measured"][..., 0], run["deviations"][:, columns]
 
 
 def plane_weights(triangle, x):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import tolcontact as tc
 from tests import referee
-from tests.test_contact import R_t, simulate
+from tests.helpers import R_t, simulate
 from tolcontact.compilation import ACCURACY
 from tolcontact.method import OBJECTIVES
 from tolcontact.vocabulary import CORRECTED, RAW, Status

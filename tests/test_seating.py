@@ -7,57 +7,30 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.test_contact import R_t, simulate
+from tests.cases.tables import LEGS, WEIGHT, table
+from tests.helpers import EXACT, SEATED, R_t, moved_at_locators, placed, simulate
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
-LEGS = np.array([(5, 5), (95, 5), (95, 55), (5, 55)], dtype=float)
-WEIGHT = np.array([52.0, 31.0])
 
-
-def table(frame=cases.STILL, *, weight=100.0, legs=LEGS, tolerance=2.0) -> tc.Assembly:
-    """A plate on one-sided supports of uneven height, guided sideways, under its weight."""
-    s = frame.scale
-    a = tc.Assembly("table")
-    plate = a.part("plate", frame.box(100, 60, 5), **frame.place(0, 0, 40))
-    supports = [
-        tc.Locator(f"leg{k}", (s * x, s * y, -40 * s), "z", tolerance * s, one_sided=True) for k, (x, y) in enumerate(legs)
-    ]
-    guides = [
-        tc.Locator("B1", (20 * s, 0, 2 * s), "y", 0),
-        tc.Locator("B2", (80 * s, 0, 2 * s), "y", 0),
-        tc.Locator("C", (0, 30 * s, 2 * s), "x", 0),
-    ]
-    a.locate(plate, [*supports, *guides])
-    down = -weight * np.array(frame.along(0, 0, 1))
-    a.force("weight", at=plate.point(s * WEIGHT[0], s * WEIGHT[1], 2 * s), vector=tuple(down))
-    a.measure("corner", plate.point(100 * s, 60 * s, 0), along=frame.along(0, 0, 1))
-    a.measure("centre", plate.point(50 * s, 30 * s, 0), along=frame.along(0, 0, 1))
-    return a
-
-
-SEATED = tc.Method(objective="seating", resolution="exact")
-
-
-def heights(run, program, state):
+def heights_over_supports(run, program, state):
     """How far each leg's foot is above its support, (realization, leg): from the poses and deviations alone."""
     (part,) = program.nominal.parts
-    R, t = R_t(run["poses"][:, state, 0])
-    foot = part.locators.points[:4] @ R.swapaxes(1, 2) + t[:, None]
-    return foot[..., 2] - run["deviations"][:, :4]
+    feet = placed(part.locators.points[:4], run["poses"][:, state, 0])
+    return feet[..., 2] - run["deviations"][:, :4]
 
 
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_a_table_rocks_onto_the_three_legs_that_can_carry_its_weight(solver):
     program, run = simulate(table(), samples=500, solver=solver, method=SEATED)
     assert (run["status"] == Status.RESOLVED).all()
-    apart = heights(run, program, CORRECTED)
+    apart = heights_over_supports(run, program, CORRECTED)
     assert apart.min() > -1e-9
     assert ((np.abs(apart) < 1e-8).sum(axis=1) == 3).all()
     assert (run["carrying"] == 3).all()
     # The weight's line of action goes through the triangle of the legs that carry.
     (part,) = program.nominal.parts
     R, t = R_t(run["poses"][:, CORRECTED, 0])
-    feet = part.locators.points[:4] @ R.swapaxes(1, 2) + t[:, None]
+    feet = placed(part.locators.points[:4], run["poses"][:, CORRECTED, 0])
     weight = R @ [*WEIGHT, 42] + t
     for k in range(500):
         down = np.flatnonzero(np.abs(apart[k]) < 1e-8)
@@ -84,20 +57,16 @@ def test_the_seat_is_the_one_that_trying_all_triples_finds():
 
 def test_the_raw_pose_fits_more_than_six_locators_by_least_squares():
     program, run = simulate(table(), samples=50)
-    apart = heights(run, program, RAW)
+    apart = heights_over_supports(run, program, RAW)
     # With four legs at the corners of a rectangle the residuals of the best plane alternate.
     assert np.abs(apart @ [1, -1, 1, -1] / 4 - apart[:, 0]).max() < 1e-2
-    R, t = R_t(run["poses"][:, RAW, 0])
-    part = program.nominal.parts[0]
-    guided = (
-        (part.locators.points[4:] @ R.swapaxes(1, 2) + t[:, None] - part.locators.points[4:]) * part.locators.directions[4:]
-    ).sum(2)
+    guided = moved_at_locators(program.nominal.parts[0], run["poses"][:, RAW, 0])[:, 4:]
     assert np.abs(guided).max() < 2e-2  # two-sided locators are kept exactly, to first order
 
 
 def test_without_a_force_a_part_is_lifted_off_supports_that_it_sinks_into():
-    program, run = simulate(table(), samples=200, method=tc.Method(resolution="exact"))
-    assert heights(run, program, CORRECTED).min() > -1e-9
+    program, run = simulate(table(), samples=200, method=EXACT)
+    assert heights_over_supports(run, program, CORRECTED).min() > -1e-9
     assert (run["status"] != Status.NOT_CONVERGED).all()
 
 
@@ -152,8 +121,7 @@ def test_a_part_pressed_onto_a_base_rests_on_three_points_and_keeps_its_guides()
     assert run["gap_min"][:, CORRECTED].min() > -1e-8
     assert (run["carrying"].sum(axis=1) >= 3).all()
     part, start = program.nominal.parts[1], 6
-    R, t = R_t(run["poses"][:, CORRECTED, 1])
-    moved = ((part.locators.points @ R.swapaxes(1, 2) + t[:, None] - part.locators.points) * part.locators.directions).sum(2)
+    moved = moved_at_locators(part, run["poses"][:, CORRECTED, 1])
     assert np.abs(moved[:, 3:] - run["deviations"][:, start + 3 :]).max() < 1e-8
     assert (moved[:, :3] - run["deviations"][:, start : start + 3]).min() > -1e-8
     # Vertical balance: base and supports together carry the clamp, but for the tilt of the base.

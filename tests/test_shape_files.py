@@ -7,7 +7,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import pytest
 import trimesh
 
 import tolcontact as tc
+from tests.helpers import finish, run, script, start
 from tests.step_files import Step, corners
 from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
@@ -71,29 +71,9 @@ def stalling():
     return re.sub(r"CARTESIAN_POINT\('',\(0.0", "CARTESIAN_POINT('',(NaN", block(), count=1)
 
 
-# What would end or stall this process is tried in another one.
-ALONE = """
-import sys
-import tolcontact as tc
-from tolcontact.discretization import discretize
-from tolcontact.discretization.shape_files import reader
-from tolcontact.errors import ModelError
-reader.SECONDS = 2.0
-a = tc.Assembly("strange")
-for name in sys.argv[1:]:
-    a.part(name, tc.Mesh(name), fixed=True)
-try:
-    discretize(a)
-except ModelError as error:
-    print(error)
-"""
-
-
 def alone(folder, *names):
-    """What is said of an assembly of some files in a folder."""
-    done = subprocess.run(
-        [sys.executable, "-c", ALONE, *names], cwd=folder, capture_output=True, text=True, timeout=60, check=False
-    )
+    """What is said of an assembly of some files in a folder, by another process, which they may end or stall."""
+    done = run(script("read_shapes", 2, *names), cwd=folder, timeout=60)
     assert done.returncode == 0, (done.returncode, done.stderr)
     assert done.stderr == ""
     return done.stdout
@@ -154,18 +134,14 @@ def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeyp
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())
-    code = ALONE.replace("2.0", "50.0")
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, "endless.step"], cwd=tmp_path, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )  # fmt: skip
+    process = start(script("read_shapes", 50, "endless.step"), cwd=tmp_path)
     try:
         end = time.monotonic() + 40
         while not (readers := children(process.pid)) and time.monotonic() < end:
             time.sleep(0.1)
         time.sleep(2)  # it is in the middle of it
         process.send_signal(signal.SIGINT)
-        assert process.wait(timeout=10) != 0
+        assert finish(process, timeout=10).returncode != 0
         assert readers and not any(Path(f"/proc/{reader}").exists() for reader in readers)
     finally:
         process.kill()

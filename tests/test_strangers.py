@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 import tolcontact as tc
+from tests import cases
 from tolcontact.archive.header import declaration
 from tolcontact.declaration import tape
 from tolcontact.declaration.document import from_document
@@ -20,27 +21,9 @@ from tolcontact.mechanics import tape as symbolic_tape
 DAMAGED = "^the declared model in the archive is damaged: "
 
 
-def with_everything() -> tc.Assembly:
-    a = tc.Assembly("everything")
-    base = a.part("base", tc.Box(100, 50, 10))
-    top = a.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
-    a.locate(base, tc.three_two_one(base.face("-z"), base.face("-y"), base.face("-x"), inset=5), tolerance=10)
-    places = {"A1": ((5, 5, 0), "z"), "A2": ((45, 5, 0), "z"), "A3": ((25, 20, 0), "z"), "B1": ((5, 0, 5), "y")}
-    places |= {"B2": ((45, 0, 5), "y"), "C": ((0, 10, 5), "x")}
-    six = [tc.Locator(name, *place) for name, place in places.items()]
-    a.locate(top, six, tolerance=stats.beta(2, b=3, loc=-0.5, scale=1), on=base)
-    upper = base.face("+z", tc.Inside((0, 0, 9), (90, 50, 11)))
-    a.contact("interface", moving=top.face(range(12)), reference=upper, points="vertices", within=2)
-    a.measure("height", top.point(50, 0, 10), along="z", tolerance=1)
-    a.measure("gap", base.point(0, 0, 10), to=top.point(0, 0, 0), along=(0, 0.6, 0.8))
-    a.measure("tilt", lambda poses: poses.rotation(top)[2, 0] * 2 + 1, units="rad")
-    a.force("push", at=top.point(0, 0, 0), vector=(1, 0, -2))
-    return a
-
-
 @pytest.fixture(scope="module")
 def document():
-    return json.loads(declaration(tc.build(with_everything(), solver="daqp")))
+    return json.loads(declaration(tc.build(cases.everything_of_boxes(), solver="daqp")))
 
 
 def places(value, path=()):
@@ -177,7 +160,7 @@ def test_a_tape_may_not_be_endless(document, monkeypatch):
         from_document(changed(document, ("measures", 2, "tape"), rows), {})
     monkeypatch.setattr(symbolic_tape, "LONGEST", 3)
     with pytest.raises(ValueError, match="cannot be archived"):
-        tc.build(with_everything(), solver="daqp")
+        tc.build(cases.everything_of_boxes(), solver="daqp")
 
 
 def test_every_operation_of_a_tape_can_be_replayed():
@@ -201,7 +184,7 @@ class Own(stats.rv_continuous):
     ids=["own", "own with a known name", "histogram", "several at once", "array"],
 )
 def test_a_distribution_that_no_archive_can_hold_is_a_fault(own):
-    a = with_everything()
+    a = cases.everything_of_boxes()
     a.locate(a.part("extra", tc.Box(1, 1, 1)), [], tolerance=own)
     with pytest.raises(ModelError, match=r"which an archive cannot hold|expected finite numbers"):
         tc.build(a)
@@ -210,6 +193,6 @@ def test_a_distribution_that_no_archive_can_hold_is_a_fault(own):
 def test_all_of_scipys_continuous_distributions_are_rebuilt():
     for name in ("norm", "beta", "expon", "t", "truncnorm", "weibull_min", "triang"):
         distribution = getattr(stats, name)
-        a = with_everything()
+        a = cases.everything_of_boxes()
         a.locate(a.part("extra", tc.Box(1, 1, 1)), [], tolerance=distribution(*[0.5] * distribution.numargs, scale=0.1))
         assert not [fault for fault in a.faults() if "archive" in fault], name

@@ -3,8 +3,6 @@
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import time
 
 import numpy as np
@@ -13,31 +11,15 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import CHECKPOINTS, COMMAND, SCRIPTS, contents, finish, run, start
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
 
-COMMAND = [sys.executable, "-m", "tolcontact"]
-MODEL = """
-import sys
-sys.path.insert(0, {root!r})
-from tests import cases
-assembly = cases.stack
-"""
 
-
-@pytest.fixture
-def model(tmp_path):
-    path = tmp_path / "model.py"
-    path.write_text(MODEL.format(root=str(cases.__file__).rsplit("/tests", 1)[0]))
-    return path
-
-
-def start(model, *options):
-    return subprocess.Popen(
-        [*COMMAND, "run", model, "--solver", "daqp", *map(str, options)],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=model.parent,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # jobs in the background begin without
-    )  # fmt: skip
+def begin(folder, *options):
+    """A run of the stack, in a folder."""
+    command = [*COMMAND, "run", SCRIPTS / "model_stack.py", "--solver", "daqp", *map(str, options)]
+    return start(command, cwd=folder)
 
 
 def finished(path):
@@ -52,22 +34,22 @@ def finished(path):
 
 
 def left_in(folder):
-    return sorted(p.name for p in folder.iterdir() if p.name not in ("model.py", "__pycache__"))
+    return sorted(p.name for p in folder.iterdir())
 
 
 @pytest.mark.parametrize("apart", [0.0, 0.5])
-def test_of_two_runs_on_one_new_name_one_is_refused_and_the_others_rows_are_whole(apart, model):
-    runs = [start(model, "--samples", 30_000, "--out", "new.nc", "--seed", 1)]
+def test_of_two_runs_on_one_new_name_one_is_refused_and_the_others_rows_are_whole(apart, tmp_path):
+    begun = [begin(tmp_path, "--samples", 30_000, "--out", "new.nc", "--seed", 1)]
     time.sleep(apart)
-    runs.append(start(model, "--samples", 30_000, "--out", "new.nc", "--seed", 2))
-    told = [run.communicate()[1] for run in runs]
-    assert sorted(run.returncode for run in runs) == [0, 2], told
-    seed = 1 + [run.returncode for run in runs].index(0)
-    assert "is being written by another run" in told[2 - seed]
-    with tc.open_archive(model.parent / "new.nc") as found:
+    begun.append(begin(tmp_path, "--samples", 30_000, "--out", "new.nc", "--seed", 2))
+    done = [finish(process) for process in begun]
+    assert sorted(one.returncode for one in done) == [0, 2], done
+    seed = 1 + [one.returncode for one in done].index(0)
+    assert "is being written by another run" in done[2 - seed].stderr
+    with tc.open_archive(tmp_path / "new.nc") as found:
         assert found.attrs["seed"] == seed
         assert (found["status"].values != -1).all()
-    assert left_in(model.parent) == ["new.nc"]
+    assert left_in(tmp_path) == ["new.nc"]
 
 
 def test_the_target_of_a_link_is_overwritten_and_the_link_stays(tmp_path):
@@ -77,7 +59,7 @@ def test_the_target_of_a_link_is_overwritten_and_the_link_stays(tmp_path):
         link.unlink(missing_ok=True)
         link.symlink_to(target)
         tc.run(cases.stack(), samples=samples, solver="daqp", out=link, overwrite=True).close()
-        assert link.is_symlink() and xr.open_dataset(target).sizes["realization"] == samples
+        assert link.is_symlink() and xr.load_dataset(target).sizes["realization"] == samples
 
 
 def test_what_a_killed_run_left_is_taken_over(tmp_path):
@@ -128,35 +110,34 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
     tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=paths[0], resume=True).close()
     tc.run(cases.stack(), samples=60_000, seed=3, solver="daqp", out=paths[1]).close()
     for group in (None, "sample", "field/middle"):
-        one, other = (xr.load_dataset(path, group=group).drop_attrs() for path in paths[:2])
-        assert one.drop_vars(["summed_rows", "sums", "sums_checksum"], errors="ignore").identical(
-            other.drop_vars(["summed_rows", "sums", "sums_checksum"], errors="ignore")
-        )
+        one, other = (contents(path, group, (*CHECKPOINTS, "sums_checksum")) for path in paths[:2])
+        assert one.identical(other), group
 
 
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by, code, model):
-    run = start(model, "--samples", 10_000_000, "--out", "stopped.nc", "--keep", "measures")
-    while run.poll() is None and not finished(model.parent / "stopped.nc"):
+def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by, code, tmp_path):
+    begun = begin(tmp_path, "--samples", 10_000_000, "--out", "stopped.nc", "--keep", "measures")
+    while begun.poll() is None and not finished(tmp_path / "stopped.nc"):
         time.sleep(0.1)
-    run.send_signal(by)
-    _, told = run.communicate(timeout=20)
-    assert run.returncode == code
-    assert "of 10 000 000 done; continue with --resume" in told
-    assert left_in(model.parent) == ["stopped.nc"]
-    done = subprocess.run([*COMMAND, "summary", model.parent / "stopped.nc"], capture_output=True, text=True, check=True)
-    assert "of 10 000 000 realizations are done; continue with --resume" in done.stdout
+    begun.send_signal(by)
+    done = finish(begun, timeout=20)
+    assert done.returncode == code
+    assert "of 10 000 000 done; continue with --resume" in done.stderr
+    assert left_in(tmp_path) == ["stopped.nc"]
+    summary = run([*COMMAND, "summary", tmp_path / "stopped.nc"])
+    assert summary.returncode == 0, summary.stderr
+    assert "of 10 000 000 realizations are done; continue with --resume" in summary.stdout
 
 
-def test_a_run_that_is_stopped_before_it_began_leaves_nothing(model):
-    run = start(model, "--samples", 10_000, "--out", "never.nc")
-    lock = model.parent / ".never.nc.lock"
-    while not lock.exists() and run.poll() is None:
+def test_a_run_that_is_stopped_before_it_began_leaves_nothing(tmp_path):
+    begun = begin(tmp_path, "--samples", 10_000, "--out", "never.nc")
+    lock = tmp_path / ".never.nc.lock"
+    while not lock.exists() and begun.poll() is None:
         time.sleep(0.01)
-    run.send_signal(signal.SIGTERM)
-    _, told = run.communicate(timeout=20)
-    assert run.returncode == 143 and "nothing is kept" in told
-    assert left_in(model.parent) == []
+    begun.send_signal(signal.SIGTERM)
+    done = finish(begun, timeout=20)
+    assert done.returncode == 143 and "nothing is kept" in done.stderr
+    assert left_in(tmp_path) == []
 
 
 def test_a_read_only_archive_is_not_replaced(tmp_path):
@@ -173,4 +154,4 @@ def test_numbers_of_realizations_are_whole_after_growth(tmp_path):
     path = tmp_path / "grown.nc"
     for samples in (5000, 12_000):
         tc.run(cases.stack(), samples=samples, seed=3, solver="daqp", out=path, resume=True).close()
-    assert (xr.open_dataset(path).realization.values == np.arange(12_000)).all()
+    assert (xr.load_dataset(path).realization.values == np.arange(12_000)).all()

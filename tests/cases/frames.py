@@ -1,0 +1,35 @@
+"""Where a whole assembly stands, and the scripts of `models/`."""
+
+import runpy
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+
+MODELS = Path(__file__).resolve().parents[2] / "models"
+
+
+def model(name: str, *choices) -> tc.Assembly:
+    """The assembly of a script in `models/`."""
+    return runpy.run_path(str(MODELS / f"{name}.py"))["assembly"](*choices)
+
+
+class Frame:
+    """A rigid motion, and a stretch, of a whole assembly: what its results must not depend on."""
+
+    def __init__(self, turn=(0.0, 0.0, 0.0), shift=(0.0, 0.0, 0.0), scale=1.0):
+        self.R, self.shift, self.scale = Rotation.from_rotvec(turn), np.array(shift), scale
+
+    def place(self, *at):
+        return {"at": self.R.apply(np.array(at) * self.scale) + self.shift, "rotation": self.R.as_rotvec()}
+
+    def box(self, *size):
+        return tc.Box(*(self.scale * s for s in size))
+
+    def along(self, *direction):
+        return tuple(self.R.apply(direction))
+
+
+STILL = Frame()

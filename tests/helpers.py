@@ -1,0 +1,120 @@
+"""What many tests do: simulate into arrays, call the command line, run a script of `tests/scripts`, compare archives."""
+
+import contextlib
+import io
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import xarray as xr
+
+import tolcontact as tc
+from tolcontact.cli import command_line
+from tolcontact.simulation import Block, simulate_blocks
+
+ROOT = Path(__file__).resolve().parents[1]
+SCRIPTS = ROOT / "tests" / "scripts"
+COMMAND = [sys.executable, "-m", "tolcontact"]
+
+EXACT = tc.Method(resolution="exact")
+ALL_POINTS = tc.Method(resolution="exact", objective="all points")
+SEATED = tc.Method(resolution="exact", objective="seating")
+
+
+def simulate(assembly, samples=200, seed=1, block=1000, **options):
+    """The program, and its blocks joined to one: arrays by name."""
+    program = tc.build(assembly, **options)
+    return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
+
+
+def joined(blocks):
+    """Arrays (realization, ...) by name, of blocks one after the other."""
+    whole = vars(Block.joined(blocks))
+    return {name: values for name, values in whole.items() if name != "start"}
+
+
+def R_t(poses):
+    """R (..., 3, 3) and t (..., 3) [mm] of poses (..., 12)."""
+    return poses[..., :9].reshape(*poses.shape[:-1], 3, 3), poses[..., 9:]
+
+
+def placed(points, poses):
+    """Where points (point, 3) [mm] are at poses (..., 12): (..., point, 3) [mm]."""
+    R, t = R_t(poses)
+    return points @ R.swapaxes(-1, -2) + t[..., None, :]
+
+
+def moved_at_locators(part, poses):
+    """How far (..., locator) [mm] a part at poses (..., 12) has moved at its locators, along their directions."""
+    return ((placed(part.locators.points, poses) - part.locators.points) * part.locators.directions).sum(axis=-1)
+
+
+@dataclass
+class Done:
+    """What a command has printed, and its exit code."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+def call(folder, *arguments):
+    """The command line in this process, started in `folder`."""
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            command_line([str(argument) for argument in arguments])
+        except SystemExit as ended:
+            return Done(ended.code, out.getvalue(), err.getvalue())
+    raise AssertionError("the command line ended without an exit code")
+
+
+def script(name, *arguments):
+    """The command that runs a script of `tests/scripts`."""
+    return [sys.executable, SCRIPTS / f"{name}.py", *map(str, arguments)]
+
+
+def start(command, *, env=None, **options):
+    """A process with this project's modules. It heeds interrupts, also where this one, a job in the background, does not."""
+    env = env or os.environ | {"PYTHONPATH": str(ROOT)}
+    pipes = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    before = signal.signal(signal.SIGINT, signal.SIG_DFL)
+    try:
+        return subprocess.Popen(command, env=env, text=True, **(pipes | options))
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def finish(process, said=None, timeout=120):
+    """What a process has printed in the end, to be told something first; it is ended where it does not end."""
+    try:
+        out, err = process.communicate(said, timeout=timeout)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.communicate()
+        raise
+    return Done(process.returncode, out, err)
+
+
+def run(command, *, timeout=120, **options):
+    """Start a process and wait for its end."""
+    return finish(start(command, **options), timeout=timeout)
+
+
+CHECKPOINTS = ("summed_rows", "sums")  # two of them, which change places
+
+
+def contents(path, group=None, without=CHECKPOINTS):
+    """A group of an archive, but for what two runs to the same rows may differ in: when they began and were interrupted."""
+    found = xr.load_dataset(path, group=group).drop_vars(without, errors="ignore")
+    found.attrs.pop("history", None)
+    return found
+
+
+def model_in(path):
+    """The model of an archive, which is closed again."""
+    with tc.open_archive(path) as archive:
+        return tc.model_of(archive)

@@ -1,0 +1,7 @@
+"""Rebuild the model of an archive: model_of.py ARCHIVE."""
+
+import sys
+
+import tolcontact as tc
+
+tc.model_of(tc.open_archive(sys.argv[1]))
