@@ -135,3 +135,14 @@ def corners(lower, upper):
     """The eight corners of a block, in the order that FACES counts on."""
     (x, y), (u, v) = lower[:2], upper[:2]
     return [(*at, z) for z, at in itertools.product((lower[2], upper[2]), ((x, y), (u, y), (u, v), (x, v)))]
+
+
+def step_of(*items):
+    """A STEP file of one product: `items` are names of methods of Step, and what they are called with."""
+    made = Step()
+    made.product("part", [getattr(made, method)(*arguments) for method, *arguments in items])
+    return str(made)
+
+
+def step_block():
+    return step_of(("solid", (0, 0, 0), (10, 20, 30), "block"))

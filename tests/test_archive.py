@@ -1,6 +1,4 @@
-"""The archive alone: what it holds, recomputes, rebuilds, and survives."""
-
-from dataclasses import replace
+"""What an archive holds, and that it needs nothing else: it recomputes its own numbers."""
 
 import cf_xarray  # noqa: F401
 import netCDF4
@@ -10,19 +8,8 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import ALL_POINTS, EXACT, SEATED, contents, finish, run, script, start
-from tolcontact import vocabulary
-from tolcontact.checksums import crc32
+from tests.helpers import DATA, run, script
 from tolcontact.errors import ArchiveError
-
-DATA = ("measured", "translation", "rotation", "gap_min", "active", "status", "kkt_residual")
-
-
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory):
-    path = tmp_path_factory.mktemp("archive") / "stack.nc"
-    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path).close()
-    return path
 
 
 def rows(path):
@@ -86,44 +73,6 @@ def test_fields_are_those_of_the_archived_poses(archive):
         assert np.abs(field.six_sigma.sel(state=state).values[:7] - 6 * u.std(axis=0, ddof=1)).max() < 1e-11
 
 
-def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
-    tc.run(cases.everything_of_meshes(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
-    (tmp_path / "block.stl").unlink()
-    with tc.open_archive(tmp_path / "first.nc") as archive:
-        first = archive.load()
-    rebuilt = tc.model_of(first)
-    second = tc.run(rebuilt, samples=200, seed=2, solver="daqp")
-    for name in DATA:
-        assert (first[name].values == second[name].values).all(), name
-    assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
-
-
-def test_faces_of_step_files_are_rebuilt_without_the_files():
-    first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=ALL_POINTS)
-    rebuilt = tc.model_of(first)
-    second = tc.run(rebuilt, samples=50, seed=2, solver="daqp", method=ALL_POINTS)
-    for name in (*DATA, "carrying", "iterations"):
-        assert (first[name].values == second[name].values).all(), name
-    assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
-
-
-def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
-    path, method = tmp_path / "table.nc", replace(SEATED, search="iterated")
-    with tc.run(cases.table(), samples=100, seed=2, solver="daqp", method=method, out=path) as results:
-        first = results.load()
-    second = tc.run(tc.model_of(first), samples=100, seed=2, solver="daqp", method=method)
-    for name in (*DATA, "carrying", "reaction", "iterations"):
-        assert (first[name].values == second[name].values).all(), name
-    root, contact, sample = (xr.load_dataset(path, group=group) for group in (None, "contact", "sample"))
-    assert [root.attrs[word] for word in ("resolution", "objective", "search")] == ["exact", "seating", "iterated"]
-    assert root.reaction.attrs["units"] == "N"
-    assert list(contact.reference_part) == [-1]
-    feet = root.rotation.isel(part=0).values @ contact.moving_point.values.T + root.translation.isel(part=0).values[..., None]
-    apart = ((feet.swapaxes(2, 3) - contact.reference_point.values) * contact.reference_normal.values).sum(axis=3)
-    gaps = apart - sample.deviation.values[:, None, contact.locator_of_point.values]
-    assert np.abs(gaps.min(axis=2) - root.gap_min.isel(pair=0).values).max() < 1e-9
-
-
 def test_it_may_be_read_while_its_results_are_open(tmp_path):
     """The netCDF library crashed on that while labels were text of variable length."""
     assert run(script("read_while_open", tmp_path / "open.nc")).returncode == 0
@@ -134,80 +83,6 @@ def test_a_run_in_memory_is_the_same_as_its_archive(archive):
     for name, values in rows(archive).items():
         there = tree["sample"][name] if name == "deviation" else tree[name]
         assert (there.values == values).all()
-
-
-@pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), ("qpoases", "measures")])
-def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path):
-    paths = [tmp_path / "grown.nc", tmp_path / "whole.nc"]
-    for samples in (300, 5000, 5000, 9000):
-        tc.run(cases.stack(), samples=samples, seed=3, solver=solver, out=paths[0], resume=True, keep=keep).close()
-    tc.run(cases.stack(), samples=9000, seed=3, solver=solver, out=paths[1], keep=keep).close()
-    for group in (None, "sample", "field/bottom", "field/middle", "field/upper"):
-        grown, whole = (contents(path, group) for path in paths)
-        assert grown.identical(whole), group
-    assert xr.load_dataset(paths[0]).attrs["history"].count("resumed after 4096") == 2
-
-
-@pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
-def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
-    path = tmp_path / "killed.nc"
-    with start(script("run_stack", path, 40_000, "--keep", keep)) as begun:
-        for line in begun.stdout:
-            if int(line) >= after:
-                break
-        begun.kill()
-    with netCDF4.Dataset(path) as file:
-        written = int((file["status"][:] != -1).sum())
-    assert after <= written < 40_000
-    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=path, keep=keep, resume=True).close()
-    whole = tmp_path / "whole.nc"
-    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=whole, keep=keep).close()
-    for group in (None, "sample", "field/middle"):
-        assert contents(path, group).identical(contents(whole, group)), group
-
-
-@pytest.mark.parametrize("when", ["before", "after"])
-def test_a_run_may_be_killed_at_any_of_its_writes(when, tmp_path):
-    done = run(script("kill_at_each_write", tmp_path, when), timeout=600)
-    assert done.returncode == 0, done.stderr
-
-
-def test_resuming_with_fewer_realizations_completes_what_was_begun(archive, tmp_path):
-    path = tmp_path / "copy.nc"
-    path.write_bytes(archive.read_bytes())
-    tc.run(cases.stack(), samples=100, seed=3, solver="daqp", out=path, resume=True).close()
-    one, other = (xr.load_dataset(p, group="field/upper") for p in (path, archive))
-    assert one.identical(other)
-
-
-def test_resuming_is_refused_where_contact_points_were_others(archive, tmp_path):
-    path = tmp_path / "copy.nc"
-    path.write_bytes(archive.read_bytes())
-    with netCDF4.Dataset(path, "r+") as file:
-        points = file["contact/moving_point"]
-        points[3, 1] += 0.01
-        points.crc32 = crc32(vocabulary.MOVING_POINT, points[:])
-    with pytest.raises(ArchiveError, match="contact points were others"):
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, resume=True)
-
-
-@pytest.mark.parametrize("how", ["resume", "overwrite"])
-def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
-    path = tmp_path / "live.nc"
-    with start(script("run_stack", path, 1000, "--step")) as begun:
-        begun.stdout.readline()
-        with pytest.raises(ArchiveError, match="being written by another run"):
-            tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=path, **{how: True})
-        done = finish(begun, "go on\n")
-    assert done.returncode == 0
-    with tc.open_archive(path) as tree:
-        assert (tree["status"].values != -1).all()
-    assert [p.name for p in tmp_path.iterdir()] == ["live.nc"]
-
-
-def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path):
-    assert run(script("run_on_a_full_disk", tmp_path / "full.nc")).returncode == 7
-    assert not list(tmp_path.iterdir())
 
 
 def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp_path):
@@ -232,18 +107,3 @@ def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path)
     assert tc.summarize(some).identical(tc.summarize(every))
     with pytest.raises(tc.TolcontactError, match="expected one of: measures, poses, all"):
         tc.run(cases.stack(), samples=300, keep="everything")
-
-
-def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(archive):
-    before = archive.read_bytes()
-    with pytest.raises(ArchiveError, match="seed = 3, now it is 4"):
-        tc.run(cases.stack(), samples=300, seed=4, solver="daqp", out=archive, resume=True)
-    with pytest.raises(tc.TolcontactError, match="choose one of the two"):
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive, resume=True, overwrite=True)
-    with pytest.raises(ArchiveError, match="another model"):
-        tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
-    with pytest.raises(ArchiveError, match="resolution = linearized, now it is exact"):
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=EXACT, out=archive, resume=True)
-    with pytest.raises(ArchiveError, match="exists"):
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
-    assert archive.read_bytes() == before

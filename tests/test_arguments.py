@@ -96,3 +96,16 @@ def test_what_a_run_will_take_is_said_before_it_begins(program, tmp_path, caplog
     with pytest.raises(KeyboardInterrupt):
         tc.run(program, samples=2_000_000, keep="measures", out=path, progress=stop)
     assert "contact points: 2000000 realizations will take some" in caplog.text
+
+
+def test_a_method_that_does_not_exist_is_refused():
+    for wrong in (
+        {"regularization": "ridge"},
+        {"active_set": "some"},
+        {"eta": 0.0},
+        {"activity": -1.0},
+        {"search": "often"},
+        {"search": "iterated"},
+    ):
+        with pytest.raises(tc.TolcontactError, match=next(iter(wrong))):
+            tc.Method(**wrong)

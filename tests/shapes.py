@@ -1,0 +1,31 @@
+"""Shapes for tests: a block, a STEP file, and the faces that are picked from them."""
+
+import pytest
+import trimesh
+
+import tolcontact as tc
+from tests import cases
+from tolcontact.discretization.faces import patch
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.shapes import shape
+
+HOUSING = cases.MODELS / "housing.step"
+
+BLOCK = trimesh.creation.box(bounds=[[0, 0, 0], [10, 20, 30]])
+
+
+def face_of(mesh, *selections):
+    part = tc.Assembly("faces").part("part", tc.Mesh(mesh))
+    return patch(part.face(*selections), {part: shape(part.geometry).mesh})
+
+
+def refusal(path, content=None):
+    """What is said of a file, which may be made of some content first."""
+    if content is not None:
+        path.write_bytes(content.encode() if isinstance(content, str) else content)
+    with pytest.raises(GeometryFault) as refused:
+        shape(tc.Mesh(path))
+    said = str(refused.value)
+    assert path.name in said
+    assert len(said) < 2500 and "\n" not in said
+    return said

@@ -1,0 +1,95 @@
+"""The command line: what it prints and returns, which options it refuses, and which files it leaves alone."""
+
+import sys
+
+import pytest
+
+from tests.helpers import SCRIPTS, call, run
+from tests.model_scripts import GOOD, HEADER, write_model
+
+OPTIONS = {
+    "unknown resolution": (["--resolution", "precise"], ["resolution", "precise", "linearized, exact"]),
+    "unknown objective": (["--objective", "least effort"], ["objective", "least effort", "locator stiffness"]),
+    "seating without a force": (["--objective", "seating"], ["force"]),
+    "unknown solver": (["--solver", "simplex"], ["simplex", "qpoases"]),
+    "refused solver": (["--solver", "superscs"], ["refused", "wrong answers", "daqp"]),
+    "too few samples": (["--samples", "0"], ["samples is 0"]),
+    "negative seed": (["--seed", "-1"], ["seed is -1"]),
+    "output in a folder that does not exist": (["--out", "nowhere/out.nc"], ["nowhere", "does not exist"]),
+    "output that is a folder": (["--out", "."], ["not a file"]),
+    "output on a device that is no disk": (["--out", "/proc/out.nc"], ["/proc/out.nc", "cannot be written"]),
+}
+
+
+@pytest.mark.parametrize("mistake", OPTIONS)
+def test_a_wrong_option_is_refused_before_the_run(mistake, tmp_path):
+    options, expected = OPTIONS[mistake]
+    done = call(tmp_path, "run", write_model(tmp_path), *options)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    for words in expected:
+        assert words in done.stderr, done.stderr
+
+
+def test_an_existing_archive_is_not_overwritten_without_being_asked(tmp_path):
+    model, out = write_model(tmp_path), ("--out", "out.nc", "--samples", "20")
+    assert call(tmp_path, "run", model, *out).returncode == 0
+    before = (tmp_path / "out.nc").read_bytes()
+    again = call(tmp_path, "run", model, *out)
+    assert again.returncode == 2 and "exists" in again.stderr
+    assert (tmp_path / "out.nc").read_bytes() == before
+    assert call(tmp_path, "run", model, *out, "--seed", "9", "--overwrite").returncode == 0
+    assert (tmp_path / "out.nc").read_bytes() != before
+
+
+def test_a_comment_in_the_script_does_not_make_another_model(tmp_path):
+    model = write_model(tmp_path)
+    run = ("run", model, "--samples", "50", "--out", "out.nc")
+    first = call(tmp_path, *run)
+    model.write_text("# moved\n" + model.read_text())
+    again = call(tmp_path, *run, "--resume")
+    assert first.returncode == again.returncode == 0, again.stderr
+    assert again.stdout == first.stdout
+
+
+def test_a_file_that_is_no_archive_is_refused(tmp_path):
+    (tmp_path / "notes.nc").write_text("these are notes\n")
+    for name in ("notes.nc", "nowhere.nc"):
+        done = call(tmp_path, "summary", name)
+        assert done.returncode == 2 and name in done.stderr and "Traceback" not in done.stderr
+    done = call(tmp_path, "run", write_model(tmp_path), "--out", "notes.nc", "--resume")
+    assert done.returncode == 2
+    assert (tmp_path / "notes.nc").read_text() == "these are notes\n"
+
+
+def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
+    bracketed = HEADER.replace('"top"', '"top [red]"')  # which is no markup
+    model = write_model(tmp_path, {"whole": bracketed + "".join(GOOD.values())})
+    ran = call(tmp_path, "run", model, "--samples", "200", "--out", "out.nc")
+    told = call(tmp_path, "summary", "out.nc")
+    assert ran.returncode == told.returncode == 0
+    assert ran.stdout.startswith(told.stdout)
+    assert max(map(len, told.stdout.splitlines())) <= 80
+    for words in ("6 sigma", "variance", "outside", "touched by contact", "top [red]"):
+        assert words in told.stdout
+
+
+def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
+    """A tab wider than its slot."""
+    model = SCRIPTS / "model_tab.py"
+    done = call(tmp_path, "run", model, "--samples", "50")
+    assert done.returncode == 1
+    assert "50 realizations" in done.stderr
+    assert "use --resolution exact" in " ".join(done.stdout.split())
+    done = call(tmp_path, "run", model, "--samples", "50", "--resolution", "exact")
+    assert done.returncode == 1
+    told = " ".join(done.stdout.split())
+    for words in ("50 not_assemblable", "pairs in conflict there: left side (50), right side (50)", "resolution: exact"):
+        assert words in told
+
+
+def test_a_model_script_runs_by_itself(tmp_path):
+    model = write_model(tmp_path)
+    model.write_text(model.read_text() + "\nif __name__ == '__main__':\n    tc.main(assembly)\n")
+    done = run([sys.executable, model, "--samples", "50"])
+    assert done.returncode == 0 and "height" in done.stdout

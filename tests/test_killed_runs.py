@@ -1,0 +1,52 @@
+"""What ends a run before its time leaves an archive to go on with, or nothing."""
+
+import netCDF4
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import contents, finish, run, script, start
+from tolcontact.errors import ArchiveError
+
+
+@pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
+def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
+    path = tmp_path / "killed.nc"
+    with start(script("run_stack", path, 40_000, "--keep", keep)) as begun:
+        for line in begun.stdout:
+            if int(line) >= after:
+                break
+        begun.kill()
+    with netCDF4.Dataset(path) as file:
+        written = int((file["status"][:] != -1).sum())
+    assert after <= written < 40_000
+    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=path, keep=keep, resume=True).close()
+    whole = tmp_path / "whole.nc"
+    tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=whole, keep=keep).close()
+    for group in (None, "sample", "field/middle"):
+        assert contents(path, group).identical(contents(whole, group)), group
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_a_run_may_be_killed_at_any_of_its_writes(when, tmp_path):
+    done = run(script("kill_at_each_write", tmp_path, when), timeout=600)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("how", ["resume", "overwrite"])
+def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
+    path = tmp_path / "live.nc"
+    with start(script("run_stack", path, 1000, "--step")) as begun:
+        begun.stdout.readline()
+        with pytest.raises(ArchiveError, match="being written by another run"):
+            tc.run(cases.stack(), samples=1000, seed=3, solver="daqp", out=path, **{how: True})
+        done = finish(begun, "go on\n")
+    assert done.returncode == 0
+    with tc.open_archive(path) as tree:
+        assert (tree["status"].values != -1).all()
+    assert [p.name for p in tmp_path.iterdir()] == ["live.nc"]
+
+
+def test_a_full_disk_is_told_and_leaves_nothing_behind(tmp_path):
+    assert run(script("run_on_a_full_disk", tmp_path / "full.nc")).returncode == 7
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,122 @@
+"""Files of shapes are read by another process: none ends or stalls this one."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+import tolcontact as tc
+from tests.helpers import finish, run, script, start
+from tests.shapes import BLOCK, refusal
+from tests.step_files import step_block
+from tolcontact.discretization import discretize
+from tolcontact.discretization.shapes import shape
+
+
+def crashing():
+    """The direction of an edge is a vertex: its reader runs into memory that is not its own."""
+    return re.sub(r"VECTOR\('',#\d+", "VECTOR('',#15", step_block(), count=1)
+
+
+def stalling():
+    """A coordinate that is no number: its reader goes on for ever."""
+    return re.sub(r"CARTESIAN_POINT\('',\(0.0", "CARTESIAN_POINT('',(NaN", step_block(), count=1)
+
+
+def alone(folder, *names):
+    """What is said of an assembly of some files in a folder, by another process, which they may end or stall."""
+    done = run(script("read_shapes", 2, *names), cwd=folder, timeout=60)
+    assert done.returncode == 0, (done.returncode, done.stderr)
+    assert done.stderr == ""
+    return done.stdout
+
+
+def test_a_file_that_brings_its_reader_down_is_a_fault(tmp_path):
+    (tmp_path / "rotten.step").write_text(crashing())
+    said = alone(tmp_path, "rotten.step")
+    assert "rotten.step" in said and "damaged" in said and "export it again" in said
+
+
+def test_a_file_that_stalls_its_reader_is_a_fault(tmp_path):
+    (tmp_path / "endless.step").write_text(stalling())
+    said = alone(tmp_path, "endless.step")
+    assert "endless.step" in said and "not read within 2 s" in said
+
+
+def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
+    (tmp_path / "rotten.step").write_text(crashing())
+    (tmp_path / "rotten too.step").write_text(crashing())
+    (tmp_path / "empty.stl").touch()
+    (tmp_path / "good.step").write_text(step_block())
+    (tmp_path / "notes.obj").write_bytes(b"these are notes\n")
+    said = alone(tmp_path, "rotten.step", "good.step", "rotten too.step", "empty.stl", "notes.obj")
+    for name in ("rotten.step", "rotten too.step", "empty.stl", "notes.obj"):
+        assert name in said
+    assert "good.step" not in said
+
+
+def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path, monkeypatch):
+    trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
+    monkeypatch.setattr("tolcontact.discretization.shape_files.reader.MEMORY", 350 * 2**20)
+    assert "takes more than 0.342 GiB of memory" in refusal(tmp_path / "fine.obj")
+
+
+def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeypatch):
+    started, popen = [], subprocess.Popen
+
+    def noting(command, **keywords):
+        started.append(json.loads((Path(command[-1]) / "jobs.json").read_text())["files"])
+        return popen(command, **keywords)
+
+    monkeypatch.setattr(subprocess, "Popen", noting)
+    a = tc.Assembly("many")
+    for k, name in enumerate(("a.stl", "b.ply", "a.stl", "c.step")):
+        if name == "c.step":
+            (tmp_path / name).write_text(step_block())
+        else:
+            BLOCK.export(tmp_path / name)
+        a.part(f"part {k}", tc.Mesh(tmp_path / name, units="mm" if name != "c.step" else None), fixed=True)
+    a.measure("height", a.parts[0].point(0, 0, 30), along="z")
+    with contextlib.suppress(tc.TolcontactError):
+        discretize(a)
+    ((*files,),) = started
+    assert [Path(file["path"]).name for file in files] == ["a.stl", "b.ply", "c.step"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_the_reader_ends_with_an_interrupted_process(tmp_path):
+    (tmp_path / "endless.step").write_text(stalling())
+    process = start(script("read_shapes", 50, "endless.step"), cwd=tmp_path)
+    try:
+        end = time.monotonic() + 40
+        while not (readers := children(process.pid)) and time.monotonic() < end:
+            time.sleep(0.1)
+        time.sleep(2)  # it is in the middle of it
+        process.send_signal(signal.SIGINT)
+        assert finish(process, timeout=10).returncode != 0
+        assert readers and not any(Path(f"/proc/{reader}").exists() for reader in readers)
+    finally:
+        process.kill()
+        process.wait()
+
+
+def children(pid):
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    return []
+
+
+def test_nothing_is_printed_and_nothing_left_behind(tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    refusal(tmp_path / "rotten.step", step_block().replace("VERTEX_POINT", "VERTEX_PINT"))
+    assert capfd.readouterr() == ("", "")
+    assert [path.name for path in tmp_path.iterdir()] == ["rotten.step"]
+    assert np.isfinite(shape(tc.Mesh(BLOCK)).mesh.vertices).all()

@@ -1,0 +1,163 @@
+"""STEP files as strangers send them: one body is read, several are listed, what is missing is named."""
+
+import re
+
+import pytest
+
+import tolcontact as tc
+from tests.shapes import refusal
+from tests.step_files import Step, corners, step_block, step_of
+from tolcontact.discretization.faces import patch
+from tolcontact.discretization.shapes import shape
+
+SEVERAL = {
+    "solids apart": (
+        step_of(("solid", (0, 0, 0), (10, 20, 30), r"Geh\X2\00E4\X0\use"), ("solid", (50, 0, 0), (51, 1, 1), "right")),
+        ['1. "Gehäuse", 10 x 20 x 30 mm at (5, 10, 15)', '2. "right", 1 x 1 x 1 mm at (50.5, 0.5, 0.5)'],
+    ),
+    "solids that touch": (
+        step_of(("solid", (0, 0, 0), (10, 10, 10), "left"), ("solid", (10, 0, 0), (20, 10, 10), "right")),
+        ['1. "left", 10 x 10 x 10 mm at (5, 5, 5)', '2. "right", 10 x 10 x 10 mm at (15, 5, 5)'],
+    ),
+    "a solid in the cavity of another one, which it fills": (
+        step_of(
+            ("solid", (0, 0, 0), (30, 30, 30), "around", ((10, 10, 10), (20, 20, 20))),
+            ("solid", (10, 10, 10), (20, 20, 20), "within"),
+        ),
+        ['1. "around", 30 x 30 x 30', '2. "within", 10 x 10 x 10 mm at (15, 15, 15)'],
+    ),
+    "a solid and a sheet": (
+        step_of(("solid", (0, 0, 0), (10, 10, 10)), ("sheet", (20, 0, 0), 10)),
+        ["10 x 10 x 10 mm", "2. open, ", "10 x 10 x 0 mm at (25, 5, 0)"],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", SEVERAL)
+def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path):
+    content, expected = SEVERAL[kind]
+    said = refusal(tmp_path / "many.step", content)
+    assert "holds 2 bodies" in said and "export each as a file of its own" in said
+    for words in expected:
+        assert words in said
+
+
+def test_names_in_a_file_do_not_spoil_a_message(tmp_path):
+    long = "\x1b[31m red\n" + 300 * "long "
+    content = step_of(("solid", (0, 0, 0), (1, 1, 1), long), ("solid", (2, 0, 0), (3, 1, 1), long))
+    said = refusal(tmp_path / "named.step", content)
+    assert "\x1b" not in said and "[31m red long long" in said and len(said) < 500
+
+
+def assembly(*places):
+    made = Step()
+    solids = {
+        "pin": [((0, 0, 0), (5, 5, 5))],
+        "set": [
+            ((0, 0, 0), (10, 10, 10)),
+            ((10, 0, 0), (20, 10, 10)),
+            ((0, 0, 20), (30, 30, 50), "", ((10, 10, 30), (20, 20, 40))),
+        ],
+    }
+    names = dict.fromkeys(name for name, _ in places)
+    products = {name: made.product(name, [made.solid(*solid) for solid in solids[name]]) for name in names}
+    whole = made.product("whole")
+    for k, (name, at) in enumerate(places):
+        made.place(products[name], whole, f"use {k}", at)
+    return str(made)
+
+
+def test_the_bodies_of_an_assembly_stand_in_their_places(tmp_path):
+    said = refusal(tmp_path / "two.step", assembly(("pin", (0, 0, 0)), ("pin", (5, 0, 0))))
+    assert "holds 2 bodies" in said
+    assert '1. "pin", 5 x 5 x 5 mm at (2.5, 2.5, 2.5)' in said and '2. "pin", 5 x 5 x 5 mm at (7.5, 2.5, 2.5)' in said
+
+
+def test_touching_solids_of_one_product_are_told_apart(tmp_path):
+    said = refusal(tmp_path / "four.step", assembly(("set", (0, 0, 0)), ("pin", (50, 0, 0))))
+    assert "holds 4 bodies" in said
+    places = ("10 x 10 x 10 mm at (5, 5, 5)", "10 x 10 x 10 mm at (15, 5, 5)", "30 x 30 x 30 mm at (15, 15, 35)")
+    for place in (*places, "5 x 5 x 5 mm at (52.5, 2.5, 2.5)"):
+        assert place in said
+
+
+def test_many_bodies_are_counted_and_the_first_of_them_listed(tmp_path):
+    said = refusal(tmp_path / "many.step", step_of(*[("solid", (2 * k, 0, 0), (2 * k + 1, 1, 1)) for k in range(15)]))
+    assert "holds 15 bodies" in said and "12. without a name" in said and said.endswith("and 3 more")
+
+
+ONE = {
+    "a solid": (step_block(), 6000, True),
+    "a cavity": (step_of(("solid", (0, 0, 0), (30, 30, 30), "", ((10, 10, 10), (20, 20, 20)))), 26000, True),
+    "a sheet": (step_of(("sheet", (0, 0, 0), 10)), None, False),
+    "sheets that are not sewn": (step_of(("sheet", (0, 0, 0), 10), ("sheet", (20, 0, 0), 10)), None, False),
+    "an assembly of one": (assembly(("pin", (7, 0, 0))), 125, True),
+}
+
+
+@pytest.mark.parametrize("kind", ONE)
+def test_one_body_is_read_whatever_it_consists_of(kind, tmp_path):
+    content, volume, closed = ONE[kind]
+    (tmp_path / "one.step").write_text(content)
+    mesh = shape(tc.Mesh(tmp_path / "one.step")).mesh
+    assert mesh.is_watertight == closed
+    assert volume is None or mesh.volume == pytest.approx(volume)
+
+
+def test_edges_shorter_than_can_be_resolved_do_no_harm(tmp_path):
+    """The corners of a block of 1 m, each cut off by as little as CAD kernels leave by mistake."""
+    made = Step()
+    size, cut = 1000.0, 2e-6
+    cornered, faces = cut_corner(size, cut)
+    made.product("cut", [made.add(f"MANIFOLD_SOLID_BREP('',#{made.shell(cornered, faces=faces)})")])
+    (tmp_path / "cut.step").write_text(str(made))
+    mesh = shape(tc.Mesh(tmp_path / "cut.step")).mesh
+    assert mesh.is_watertight and mesh.volume == pytest.approx(size**3)
+    assert (mesh.area_faces > 0).all()
+
+
+def cut_corner(size, cut):
+    """Corners and faces of a block, whose corner at the top is cut off by a small triangle."""
+    eight = corners((0, 0, 0), (size, size, size))
+    own = [*eight[:6], (size - cut, size, size), eight[7], (size, size - cut, size), (size, size, size - cut)]
+    faces = [(0, 3, 2, 1), (4, 5, 8, 6, 7), (0, 1, 5, 4), (1, 2, 9, 8, 5), (2, 3, 7, 6, 9), (3, 0, 4, 7), (6, 8, 9)]
+    return own, faces
+
+
+def test_a_solid_that_lost_a_face_is_not_taken_for_a_sheet(tmp_path):
+    content = re.sub(r"PLANE\('',#\d+\)", "PLANE('',#1)", step_block(), count=1)
+    said = refusal(tmp_path / "holed.step", content)
+    assert "do not close" in said and "5 of 6 faces" in said
+
+
+def external(name):
+    made = Step()
+    definition, _ = made.product("whole")
+    kind = made.add("DOCUMENT_TYPE('geometry')")
+    document = made.add(f"DOCUMENT_FILE('{name}','','',#{kind},'',$)")
+    made.add(f"APPLIED_DOCUMENT_REFERENCE(#{document},'',(#{definition}))")
+    return made
+
+
+def test_shapes_in_other_files_are_named(tmp_path):
+    said = refusal(tmp_path / "top.step", str(external("lid.stp")))
+    assert '"lid.stp"' in said and "other files" in said
+    part = external("lid.stp")
+    part.product("part", [part.solid((0, 0, 0), (10, 10, 10))])
+    assert '"lid.stp"' in refusal(tmp_path / "top and part.step", str(part))
+    drawing = external("drawing.pdf")
+    drawing.product("part", [drawing.solid((0, 0, 0), (10, 10, 10))])
+    (tmp_path / "drawn.step").write_text(str(drawing))
+    assert shape(tc.Mesh(tmp_path / "drawn.step")).mesh.is_watertight
+
+
+def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
+    made = Step()
+    shell = made.shell(corners((0, 0, 0), (10, 20, 30)))
+    made.product("painted", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
+    made.paint(shell, red=1.0)
+    (tmp_path / "painted.step").write_text(str(made))
+    part = tc.Assembly("painted").part("block", tc.Mesh(tmp_path / "painted.step"))
+    meshes = {part: shape(part.geometry).mesh}
+    for at, area in (((5, 10, 0), 200), ((5, 10, 30), 200), ((0, 10, 15), 600), ((5, 0, 15), 300)):
+        assert patch(part.face(tc.Brep(at)), meshes).mesh.area == pytest.approx(area)
