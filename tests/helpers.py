@@ -104,7 +104,6 @@ def run(command, *, timeout=120, **options):
     return finish(start(command, **options), timeout=timeout)
 
 
-DATA = ("measured", "translation", "rotation", "gap_min", "active", "status", "kkt_residual")
 CHECKPOINTS = ("summed_rows", "sums")  # two of them, which change places
 
 

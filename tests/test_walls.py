@@ -33,7 +33,7 @@ NEVER = {
 ORDER = (
     "version", "errors", "child", "vocabulary", "checksums", "realizations", "method", "poses", "compiled", "declaration",
     "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "workflow",
-    "report", "cli", "__init__", "__main__",
+    "report", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 
