@@ -1,0 +1,80 @@
+"""Archives of every format are read for good; those of earlier formats are not resumed.
+
+The files in `tests/archives` are written once, by the version whose format they have: see `tests/scripts/write_archive.py`.
+"""
+
+import gzip
+import sys
+from pathlib import Path
+
+import netCDF4
+import pytest
+
+import tolcontact as tc
+from tests.helpers import EXACT, SCRIPTS, model_in, run
+from tolcontact.errors import ArchiveError
+from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+from tolcontact.vocabulary import FORMAT
+
+STORED = {int(path.name.split("_")[1].split(".")[0]): path for path in Path(__file__).parent.glob("archives/format_*.nc.gz")}
+# Of the corner, raw and corrected.
+PINNED = {
+    "mean": (0.006953289641898, 0.03176192756255),
+    "6 sigma": (0.7870888491507, 0.3424490287245),
+}
+
+
+@pytest.fixture(params=sorted(STORED), ids=lambda number: f"format {number}")
+def stored(request, tmp_path):
+    """An archive of each format."""
+    path = tmp_path / "bars.nc"
+    path.write_bytes(gzip.decompress(STORED[request.param].read_bytes()))
+    return path
+
+
+def test_there_is_an_archive_of_every_format():
+    assert sorted(STORED) == [*range(1, FORMAT + 1)], "write the missing one with tests/scripts/write_archive.py"
+
+
+def test_it_is_opened_and_summarized(stored):
+    summary = tc.summarize(stored)
+    corner = summary["statistic_value"].sel(measure="corner", interval="estimate")
+    for statistic, expected in PINNED.items():
+        assert corner.sel(statistic=statistic).values == pytest.approx(expected, rel=1e-9)
+    assert summary["by_status"].values.tolist() == [0, 8, 0, 0, 0]
+    largest = summary["field_extreme"].sel(part="block", extreme="largest", interval="estimate")
+    assert largest.values == pytest.approx([0.5591756338771934, 0.45877503188437524], rel=1e-9)
+    assert_resolved(stored)
+    assert_gaps_recompute(stored)
+
+
+def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
+    model = model_in(stored)
+    assert tc.build(model).nominal.locator_labels == tuple(f"block.{name}" for name in ("A1", "A2", "A3", "B1", "B2", "C"))
+    with tc.open_archive(stored) as then:
+        now = tc.run(model, samples=8, seed=1, solver="daqp", method=EXACT, surfaces=4)
+        assert abs(now["measured"] - then["measured"]).max() < 1e-9
+        assert (now["status"].values == then["status"].values).all()
+
+
+def test_it_is_read_without_this_package(stored):
+    done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", stored])
+    assert (done.returncode, done.stdout) == (0, "1 1 1 1 1 1 1 1\n"), done.stderr
+    with netCDF4.Dataset(stored) as file:
+        assert file["measured"].dimensions == ("realization", "state", "measure") and file["measured"].units
+
+
+@pytest.mark.parametrize("stored", range(1, FORMAT), indirect=True, ids=lambda number: f"format {number}")
+def test_an_earlier_format_is_not_resumed_and_the_file_is_left_alone(stored):
+    model, before = model_in(stored), stored.read_bytes()
+    with pytest.raises(ArchiveError) as refused:
+        tc.run(model, samples=16, seed=1, solver="daqp", method=EXACT, surfaces=4, out=stored, resume=True)
+    assert str(refused.value) == f'"{stored}" was begun by an earlier version of tolcontact: it can be read, not resumed'
+    assert stored.read_bytes() == before and [*stored.parent.iterdir()] == [stored]
+
+
+@pytest.mark.parametrize("stored", [FORMAT], indirect=True, ids=lambda number: f"format {number}")
+def test_the_present_format_is_resumed(stored):
+    settings = {"seed": 1, "solver": "daqp", "method": EXACT, "surfaces": 4}
+    tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings).close()
+    assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings), variables=["deviation", "status"])
