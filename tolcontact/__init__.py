@@ -1,12 +1,53 @@
 """Tolerance analysis of rigid assemblies: Monte-Carlo variation simulation in which contact is resolved.
 
-declare       Assembly, Box, Mesh, Locator, three_two_one, Tolerance; and what these return: Part, Face, Point, ContactPair, ...
-faces         Facing, Inside, Near, Brep
-run           check, build, run, compare, simulate_blocks, Method, Program
-look          summarize, open_archive, model_of, Status
-catch         TolcontactError: ModelError, OptionError, ArchiveError, ScriptError; ContactWarning, UnitsWarning
+You declare parts, how they are located and toleranced, which faces may touch, and what is measured. tolcontact draws
+thousands of realizations, places every part, removes interpenetration by a convex QP in each realization, and reports every
+measure with and without contact, each figure with a 95 % confidence interval. Lengths are in mm, angles in rad.
 
-The names are listed in __init__.pyi, and imported when they are first used.
+>>> import tolcontact as tc
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+>>> scheme = tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5)
+>>> location = stand.locate(block, scheme, tolerance=1)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> measure = stand.measure("corner height", block.point(50, 0, 10), along="z", tolerance=1)
+>>> results = tc.run(stand, samples=1000, seed=1)
+>>> results.measured.std("realization").sel(measure="corner height").round(2).values.tolist()  # raw, corrected
+[0.21, 0.04]
+
+## The guide
+
+Each stage of a run is a package, and its documentation is a chapter: read them in this order.
+
+| stage | chapter | subject |
+|---|---|---|
+| declare | `tolcontact.declaration` | parts, faces, locators, tolerances, contact pairs, forces, measures |
+| discretize | `tolcontact.discretization` | meshes and STEP files, contact points, warnings |
+| draw | `tolcontact.variation` | from tolerance ranges to deviations; seeds |
+| equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
+| compile | `tolcontact.compilation` | QP solvers, their accuracy |
+| resolve contact | `tolcontact.contact` | linearized or exact, statuses, what a certificate covers, limits |
+| simulate | `tolcontact.simulation` | blocks, threads, reproducibility |
+| summarize | `tolcontact.statistics` | estimates and their intervals, displacement fields |
+| archive | `tolcontact.archive` | the netCDF file: layout, reading, resuming, checksums |
+| report | `tolcontact.report` | tables for the terminal |
+| all of it | `tolcontact.workflow` | `run`, `build`, `check`, `compare`, `summarize` from Python |
+| all of it | `tolcontact.cli` | the command `tolcontact`, its exit codes |
+
+`python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.
+
+## Names
+
+| purpose | `tc.` |
+|---|---|
+| declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
+| choose faces | `Facing`, `Inside`, `Near`, `Brep` |
+| returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
+| run | `run`, `build`, `check`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
+| read results | `summarize`, `open_archive`, `model_of`, `Status` |
+| catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
+| warnings | `ContactWarning`, `UnitsWarning` |
 """
 
 import lazy_loader

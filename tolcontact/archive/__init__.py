@@ -1,4 +1,113 @@
-"""The netCDF archive: written block by block with the netCDF4 library, read with xarray."""
+"""The archive: a netCDF file that holds a run, its statistics' raw material, and the model. A chapter of the guide.
+
+The file is netCDF-4 with CF attributes. It can be read without tolcontact: with xarray, ncdump, or MATLAB.
+
+>>> import tempfile
+>>> from pathlib import Path
+>>> import numpy as np
+>>> import xarray as xr
+>>> import tolcontact as tc
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+>>> location = stand.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
+>>> folder = tempfile.TemporaryDirectory()
+>>> path = Path(folder.name) / "stand.nc"
+>>> tc.run(stand, samples=200, seed=1, out=path, surfaces=16).close()
+
+## Layout
+
+Each realization is one row and carries its own certificate.
+
+| variable | dimensions | meaning |
+|---|---|---|
+| `measured` | realization, state, measure | values of the measures |
+| `translation`, `rotation` | realization, state, part, axis (, body_axis) | t and R of x = R x0 + t |
+| `gap_min` | realization, state, pair | smallest gap of each pair; negative is penetration |
+| `active` | realization, pair | contact points that penetrate in the raw state |
+| `carrying`, `reaction` | realization, pair | contact points under load, and the sum of their reactions |
+| `status` | realization | see `tolcontact.contact` |
+| `kkt_residual` | realization | residual of the optimality conditions [mm] |
+| `iterations`, `starts` | realization | linear steps, and from how many places they started |
+| `second_answers` | realization | QPs that another solver had to answer |
+| `searched` | realization | 1 if contact points were projected again |
+
+`state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the locators and the drawn
+deviations, `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as JSON.
+A group is called like its part; a part with the name of a dimension gets an underscore behind it (the attribute `part` is the
+name in any case). Attributes state the format number, the versions, the seed, the solver with its options, and the method with
+all its choices; `method_from` states whether the method was the model's, the defaults, or set by options.
+
+## Reading it
+
+>>> run = xr.open_datatree(path)
+>>> run.measured.std("realization").round(2).values.ravel().tolist()  # raw, corrected
+[0.17, 0.04]
+>>> float((run.status == 1).mean())  # share of realizations that contact moved
+0.88
+>>> field = run["field/block"].six_sigma.sel(state="corrected", component="magnitude")
+
+Gaps can be recomputed from poses and contact points, except where `searched` is 1: those points are not archived.
+
+>>> def gaps(run, state):
+...     '''Gaps (realization, point) [mm].'''
+...     contact, R, t = run["contact"], run.rotation.sel(state=state).values, run.translation.sel(state=state).values
+...     moving, reference = (contact[name].values[contact.pair_of_point] for name in ("moving_part", "reference_part"))
+...     x_m = np.einsum("kpij,pj->kpi", R[:, moving], contact.moving_point.values) + t[:, moving]
+...     x_r = np.einsum("kpij,pj->kpi", R[:, reference], contact.reference_point.values) + t[:, reference]
+...     n = np.einsum("kpij,pj->kpi", R[:, reference], contact.reference_normal.values)
+...     return (n * (x_m - x_r)).sum(axis=2)
+>>> bool(np.allclose(gaps(run, "raw").min(axis=1), run.gap_min.sel(state="raw", pair="interface")))
+True
+>>> run.close()
+
+A `reference_part` of -1 is the ground, with R = I and t = 0. For a one-sided locator, subtract the `deviation` of locator
+`locator_of_point` if that is not -1.
+
+`tc.open_archive(path)` opens the file after a check of everything but the rows, and `tc.model_of` rebuilds its model.
+
+>>> with tc.open_archive(path) as results:
+...     print(tc.model_of(results).parts)
+(part table: box 100 x 50 x 10 mm, fixed, part block: box 50 x 25 x 10 mm at (50, 12.5, 10))
+
+## Size
+
+`keep` states what is archived of each realization: "measures" (with gaps, statuses and residuals; 75 bytes for RA1, or 75 MB a
+million), "poses" also those, "all" (default) also the deviations. A run that does not fit on the disk is refused before the
+first byte.
+
+## Stopping and resuming
+
+An archive is not overwritten unless you ask for it (`overwrite=True`, `--overwrite`). Its name is taken from the start: a
+second run that would write to it is refused.
+
+A run may be stopped or killed at any moment, from its first block on. The file then opens, finished rows are in it, the others
+have the status -1 (`unfinished`), the summary states how many are done, and fields cover a recent number of them. (This covers
+a killed process. Writes are not flushed to the physical disk, so a power failure may lose more.) `resume=True`, `--resume`
+continues to the same data as an undisturbed run, up to the original number of realizations or `samples`, whichever is larger.
+
+>>> with tc.run(stand, samples=300, seed=1, out=path, surfaces=16, resume=True) as results:
+...     print(results.sizes["realization"], results.attrs["history"])
+300 ... created
+... resumed after 0 realizations
+
+A resumed run starts after the last full block, here after none. The model, its contact points, the solver and the method must
+be the same as before; otherwise the run is refused. Archives of an earlier format can be read, not resumed.
+
+## Checksums, and archives from others
+
+CRC-32 checksums cover what is written once, each field, and every block of realizations. They are compared when an archive is
+read: `tc.open_archive` checks all but the rows, `tc.summarize` the rows. A damaged archive is refused in one line. Checksums
+detect damage, not forgery.
+
+Before anything in an archive is trusted, a separate process with a limit on time and memory inspects it. Its model is data:
+nothing in it is executed, and a distribution is rebuilt only if its name is that of a continuous one in `scipy.stats` and its
+arguments are numbers.
+
+>>> folder.cleanup()
+"""
 
 from tolcontact.archive.header import Run
 from tolcontact.archive.reader import model_of, open_archive, opened

@@ -1,7 +1,38 @@
-"""The command line, one file for each command. Results on stdout, progress and errors on stderr.
+"""The command line: `tolcontact`, or `python -m tolcontact`. A chapter of the guide.
 
-Exit codes: 0 done; 1 ran, but more realizations failed than FAILED_SHARE; 2 bad input, one message, nothing written;
-130 and 143 stopped by Ctrl-C and by a signal to terminate: what is finished is in the archive.
+    tolcontact check MODEL.py                            list every fault of a model; run nothing
+    tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
+    tolcontact run MODEL.py --out FILE.nc                simulate into an archive
+    tolcontact summary FILE.nc                           print the summary of an archive
+    tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
+    tolcontact compare MODEL.py --resolution linearized,exact
+    tolcontact --version
+
+`tolcontact COMMAND --help` lists the options. A script with `tc.main(assembly)` under its main guard takes those of `run`.
+Results go to stdout; progress, warnings and errors go to stderr. `compare` prints JSON with `--json`, and writes netCDF with
+`--out`.
+
+| option of `run` | |
+|---|---|
+| `--samples`, `--seed` | number of realizations, 1000 by default; the same seed gives the same realizations |
+| `--solver` | QP solver, see `tolcontact.compilation` |
+| `--resolution`, `--objective` | replace the model's own choice, see `tolcontact.contact` and `tolcontact.mechanics` |
+| `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
+| `--keep measures`, `poses` or `all` | what is archived of each realization |
+| `--surfaces` | how many realizations are checked between contact points, 64 by default |
+
+| exit code | meaning |
+|---|---|
+| 0 | done |
+| 1 | ran, but more than 0.1 % of the realizations are not converged, not assemblable, or doubtful |
+| 2 | bad input: one message, nothing written |
+| 130, 143 | stopped by Ctrl-C, or by a signal to terminate; what is finished is in the archive |
+
+>>> from typer.testing import CliRunner
+>>> from tolcontact.cli.app import app
+>>> result = CliRunner().invoke(app, ["--version"])
+>>> result.stdout.startswith("tolcontact "), result.exit_code
+(True, 0)
 """
 
 from tolcontact.cli import check, compare, run, summary

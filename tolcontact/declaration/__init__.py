@@ -1,4 +1,140 @@
-"""Declare: what the user says, frozen, without numerics."""
+"""Declare: parts, how they are located, which faces may touch, and what is measured. A chapter of the guide.
+
+A model is a `tc.Assembly`. Its methods collect what a script declares and return a handle to it; nothing is computed yet.
+Lengths are in mm, angles in rad, forces in N. Points, faces and locators are given in the frame of their own part.
+
+>>> import tolcontact as tc
+>>> clamp = tc.Assembly("clamp")
+
+## Parts and shapes
+
+`part(name, shape, at=..., rotation=...)` places a shape in the nominal assembly: the point p of its own frame lies at
+`rotation * p + at`, where `rotation` is a rotation vector. A shape is a `tc.Box(x, y, z)`, which reaches from the origin of
+its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
+`trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.discretization`).
+
+>>> base = clamp.part("base", tc.Box(100, 50, 10), fixed=True)
+>>> plate = clamp.part("plate", tc.Box(60, 40, 8), at=(20, 5, 10))
+>>> plate
+part plate: box 60 x 40 x 8 mm at (20, 5, 10)
+
+Names of parts, pairs, forces and measures also name groups and labels of the archive. They start with a letter, digit or
+underscore, hold no "/" and no control character, and differ from each other.
+
+## Faces
+
+A face consists of the triangles that meet every criterion you give; without any it is the whole surface.
+
+| criterion | chooses |
+|---|---|
+| `"+x"` to `"-z"` | triangles whose outward normal has this direction, to within 1 degree |
+| `tc.Facing((0, 1, 2), angle)` | triangles whose outward normal is within `angle` of any direction |
+| `tc.Inside(lower, upper)` | what lies inside a box; triangles that cross its sides are cut there |
+| `tc.Near(other, within)` | faces that face another part and come within a distance of it |
+| `tc.Brep((x, y, z))` | the face of a STEP file that passes through a point |
+| `[0, 1, 2]` | triangles by their indices in the mesh |
+| a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
+
+>>> base.face("+z", tc.Inside((0, 0, 9), (50, 50, 11)))
+base +z inside (0, 0, 9) to (50, 50, 11)
+
+## Locators and tolerances
+
+`locate(part, scheme)` states what positions a part: six locators, each a point of the part, a direction into the part, and a
+deviation along it. `tc.three_two_one(primary, secondary, tertiary, inset=...)` derives them from three faces: A1, A2, A3 on
+the primary face, B1, B2 on the secondary one, C1 on the tertiary one, `inset` mm inside the edges. A list of
+`tc.Locator(name, point, direction)` gives them one by one.
+
+A tolerance is the full width of its zone: 0.6 means -0.3 to +0.3. `locate(..., tolerance=...)` applies to every locator
+without one of its own. By default the deviation is normal with 6 sigma equal to the width; `tolcontact.variation` lists the
+other distributions.
+
+>>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
+>>> location = clamp.locate(plate, scheme, tolerance=0.6)
+>>> print(location)
+location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, range 0.6 mm
+>>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
+locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
+
+`locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
+`fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.
+
+A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
+have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
+"locator stiffness" alone.
+
+## Contact pairs
+
+`contact(name, moving=..., reference=...)` keeps points of the `moving` face outside the `reference` face. The points are 200
+spread evenly, and more where the rims of flat faces cross or faces are curved; `points=` sets their number, `spacing=` their
+distance, and `points="vertices"` takes the vertices of the mesh. A point takes part if the reference face lies within
+`within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part).
+
+>>> pair = clamp.contact("seat", moving=plate.face("-z"), reference=base.face("+z"), spacing=5)
+>>> print(pair)
+contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
+
+## What contact may move
+
+Contact can move any part that is the moving side of a pair, or that has one-sided locators; prevent it with `fixed=True`. A
+part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact
+can move are corrected together, each with six degrees of freedom, also those that are located on other parts.
+
+## Forces
+
+`force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Forces enter the objective
+"seating" alone (see `tolcontact.mechanics`): there they press parts onto their supports and neighbours, and decide which of
+the supports carry load.
+
+>>> weight = clamp.force("weight", at=plate.point(30, 20, 4), vector=(0, 0, -100))
+>>> print(weight)
+force weight: (0, 0, -100) N at plate (30, 20, 4)
+
+## Measures
+
+A measure is the displacement of a point along a direction, the distance of two points along a direction (`to=`), or a
+function of the symbolic poses that returns a CasADi expression. `tolerance` is the full width of the allowed zone around the
+nominal value.
+
+>>> height = clamp.measure("height", plate.point(0, 0, 8), along="z", tolerance=0.5)
+>>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z")
+>>> def tilt(poses):
+...     return poses.rotation(plate)[2, 0]
+>>> slope = clamp.measure("slope", tilt, units="rad")
+
+The poses that such a function receives have `position(point)`, `rotation(part)` and `translation(part)`.
+
+## The model's method, and faults
+
+A model states the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells", method=tc.Method(resolution="exact",
+objective="all points"))`. Options of the command line, or `tc.run(..., method={"objective": "seating"})`, replace single
+choices. The archive states which method was used, and whether it was the model's own, the defaults, or set by options.
+
+`tc.check(model)`, or `tolcontact check MODEL.py`, lists every fault of a model at once, each with the line of the script.
+
+>>> tc.check(clamp)
+()
+>>> nothing = tc.Assembly("nothing")
+>>> try:
+...     tc.build(nothing)
+... except tc.ModelError as error:
+...     print(error)
+model "nothing" has 2 faults:
+  - it has no parts; declare at least one with assembly.part(name, geometry)
+  - it measures nothing; declare at least one measure with assembly.measure(...)
+
+## Scripts, and models as data
+
+A model script is a Python file with a function `assembly()` that returns the declared assembly. With `tc.main(assembly)`
+under a main guard it runs by itself, with the options of `tolcontact run`; the files in `models/` are such scripts.
+
+Every archive holds its model as JSON, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the assembly
+without running any code of the script. Functions of poses are kept as lists of elementary operations.
+
+>>> results = tc.run(clamp, samples=10, surfaces=0)
+>>> print(tc.model_of(results).pairs[0])
+contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
+"""
 
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair

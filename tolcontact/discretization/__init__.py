@@ -1,4 +1,75 @@
-"""Discretize: declared shapes become locator points, contact points and surfaces in the nominal assembly frame."""
+"""Discretize: shapes become surfaces, contact points and locator points in the nominal assembly frame. A chapter of the guide.
+
+`tc.build(model)` reads the shapes, finds the faces, and spreads contact points. They are the same in all realizations.
+
+>>> import tolcontact as tc
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(80, 12.5, 10))
+>>> scheme = tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"))
+>>> location = stand.locate(block, scheme, tolerance=1)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = stand.measure("height", block.point(50, 0, 10), along="z")
+>>> points = tc.build(stand).nominal.pairs[0]
+>>> points.P_m.max(axis=0).round(6).tolist()  # the block overhangs the table; its points end at the table's edge
+[100.0, 37.5, 10.0]
+
+## Contact points
+
+Points are spread over the moving face, as far apart as possible, starting from the corners of its rim. They follow `points=`
+or `spacing=`, not the tessellation. Each is projected onto the reference face, and takes part if it does not overhang the rim
+of that face and lies within `within` of it. A point has a place on the moving part, one on the reference part, and the
+outward normal of the reference face there.
+
+If you leave out both `points` and `spacing`, contact points are added. For two flat faces these are the points where their
+rims cross or where a corner of one lies over the other: there they touch first, however the parts tilt. For curved faces they
+follow curvature, so closely that the faces cannot sink into each other between them by more than a two-thousandth of the
+smallest tolerance range; 5000 points at most. The smallest tolerance range is that of any locator or measure in mm. A range
+narrower than a thousandth of the widest one is taken for a constant and does not count.
+
+## Warnings
+
+A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, leave more than that open.
+
+>>> import trimesh, warnings
+>>> ball = tc.Assembly("ball")
+>>> floor = ball.part("floor", tc.Box(40, 40, 5), at=(-20, -20, -5), fixed=True)
+>>> sphere = ball.part("sphere", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=10)), at=(0, 0, 10))
+>>> feet = [tc.Locator("A1", (-5, -5, 0), "z"), tc.Locator("A2", (5, -5, 0), "z"), tc.Locator("A3", (0, 5, 0), "z")]
+>>> sides = [tc.Locator("B1", (-5, 0, 0), "y"), tc.Locator("B2", (5, 0, 0), "y"), tc.Locator("C1", (0, 0, 0), "x")]
+>>> location = ball.locate(sphere, feet + sides, tolerance=1)
+>>> pair = ball.contact("foot", moving=sphere.face(tc.Near(floor, 1)), reference=floor.face("+z"))
+>>> height = ball.measure("height", sphere.point(0, 0, 0), along="z")
+>>> with warnings.catch_warnings(record=True) as caught:
+...     program = tc.build(ball)
+>>> print(caught[0].message)
+contact pair "foot" (...): parts may be off by up to 0.0089 mm between the flat triangles and the round faces ...
+
+A `tc.UnitsWarning` names a mesh whose size is implausible in mm, by itself (below 1 mm, above 10 m) or beside a part that it
+touches, if nobody stated its units; and a mesh from which locators, measures or forces lie farther away than it is large.
+
+## Meshes
+
+`tc.Mesh(source, units=...)` states the units of the source: "um", "mm", "cm", "m", "in" or "ft". Without it, a STEP file
+states its own, a GLB file is in m, `mesh.units` of a Trimesh applies if it is set, and all others are in mm.
+
+Meshes may be open, or hold several bodies. A surface whose outside is undefined is rejected: neighbouring triangles oriented
+inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles,
+and reach 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles; triangles that
+meet at more than 30 degrees form an edge. Curved faces are as round as their triangles.
+
+## STEP files
+
+STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad, and keep their
+boundary representation, which `tc.Brep` refers to. Coordinates pass through single precision: they are rounded to 1e-5 mm at
+100 mm, and 2e-4 mm at 1 m. A STEP file holds one body. If it holds several, the message lists them with names, sizes and
+places, so that you can export each one as a file of its own. References to other files are rejected.
+
+## Files from others
+
+Shape files are read by a separate process with a limit on time (30 s, and 20 s for each MB) and memory (6 GiB). A damaged
+file therefore ends as one message that names the file and what to do.
+"""
 
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.locators import Locators

@@ -1,4 +1,33 @@
-"""Report: what people look at."""
+"""Report: summaries and comparisons as tables for a terminal. A chapter of the guide.
+
+`summary_text` and `comparison_text` turn the datasets of `tc.summarize` and `tc.compare` into something that rich prints. A
+table fits into 80 columns, and output to a file or a pipe is never cut.
+
+>>> import tolcontact as tc
+>>> from rich.console import Console
+>>> from tolcontact.report import summary_text
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+>>> location = stand.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
+>>> results = tc.run(stand, samples=1000, seed=1)
+>>> Console(width=80, highlight=False).print(summary_text(tc.summarize(results)))
+variation simulation of stand: 1000 realizations
+...
+
+How to read it:
+
+- Each figure is `estimate [lower, upper]`, with as many decimals as its 95 % interval deserves.
+- The columns are the raw state, the corrected state, and the change between them. Changes are from the same draws, so their
+  intervals are narrower than a comparison of the two columns suggests.
+- The second table gives, for each part, the smallest and largest 6 sigma of the displacement over its surface.
+- The last lines are about contact: how many realizations it touched, their statuses, the pairs in conflict, the largest
+  penetration at contact points and between surfaces, and advice if the method should be another one.
+
+Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line states it.
+"""
 
 from tolcontact.report.text import comparison_text, grouped, summary_text
 

@@ -1,4 +1,58 @@
-"""Summarize: statistics of measures with their intervals, and displacement fields."""
+"""Summarize: estimates of each measure with their intervals, of contact, and of displacement fields. A chapter of the guide.
+
+`tc.summarize(results)` reads what `tc.run` or `tc.open_archive` returned, or the archive of a path, and gives an
+`xarray.Dataset`. `tolcontact summary FILE.nc` prints it.
+
+>>> import tolcontact as tc
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+>>> location = stand.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
+>>> results = tc.run(stand, samples=1000, seed=1)
+>>> summary = tc.summarize(results)
+>>> spread = summary.statistic_value.sel(measure="height", state="corrected", statistic="6 sigma")
+>>> dict(zip(spread.interval.values.tolist(), spread.values.round(2).tolist()))
+{'estimate': 0.28, 'lower': 0.24, 'upper': 0.33}
+
+## Estimates
+
+Every estimate has a 95 % confidence interval (dimension `interval`: estimate, lower, upper). No interval assumes a normal
+distribution, because contact cuts distributions off.
+
+| estimate | interval |
+|---|---|
+| mean | Student's t |
+| standard deviation, 6 sigma, variance | Bonett's, from the fourth moment |
+| percentiles 0.135, 5, 50, 95, 99.865 | order statistics; a bound is infinite if the sample is too small to have one |
+| share outside the tolerance, of realizations touched by contact, not assemblable | Clopper-Pearson |
+| change: shift of the mean | Student's t on the differences of the same draws |
+| change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
+
+A share outside the tolerance is given only for measures with a tolerance. A measure that evaluates to NaN does not stop the
+run; its statistics are NaN, and the table shows "-". Statistics always cover all finished realizations, whatever their status.
+
+>>> change = summary.change.sel(measure="height", change_of="ratio of 6 sigma")
+>>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence
+True
+
+The summary also holds the number of realizations of each status, the pairs in conflict, the largest penetration at contact
+points and between surfaces, and the number of steps: see `tc.summarize`, or `print(summary)`.
+
+## Displacement fields
+
+The displacement u = (R - I) v + t (14) is taken at surface points v of every part, in both states: its mean and 6 sigma in x,
+y, z and magnitude. Components follow exactly from the mean and covariance of the poses; the magnitude is summed up
+realization by realization, and its 6 sigma has an interval at each point. Fields always cover all realizations of a finished
+run, also those whose poses are not kept.
+
+>>> field = results["field/block"]
+>>> sorted(field.data_vars)[:3]
+['checksum', 'faces', 'magnitude_six_sigma_interval']
+>>> field.six_sigma.sel(state="corrected", component="z").dims
+('vertex',)
+"""
 
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
 from tolcontact.statistics.summary import summarize

@@ -1,4 +1,59 @@
-"""The whole flow in one call: run a model into an archive, compare solvers on it."""
+"""The whole flow from Python: run, build, check, compare, summarize. A chapter of the guide.
+
+All of them accept a model as an assembly, as the function that declares it, or as the path of its script.
+
+>>> import tolcontact as tc
+>>> def assembly():
+...     stand = tc.Assembly("stand")
+...     table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+...     block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+...     scheme = tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"))
+...     stand.locate(block, scheme, tolerance=1)
+...     stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+...     stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
+...     return stand
+
+`tc.check` returns every fault of a model, and nothing if it can be built.
+
+>>> tc.check(assembly)
+()
+
+`tc.run` simulates it, and checks some answers between contact points (`surfaces`, see `tolcontact.contact`). Without `out`
+the results stay in memory. With `out="stand.nc"` they are written to an archive, and the tree that is returned reads from it:
+close it, or use it in a `with` statement.
+
+>>> results = tc.run(assembly, samples=500, seed=1, surfaces=16)
+>>> results.sizes["realization"], results.attrs["solver"], results.attrs["resolution"]
+(500, 'qpoases', 'linearized')
+
+A `tc.Method` replaces the method of the model; a mapping replaces single choices of it. An option that cannot act is refused:
+a `tc.Program` has its solver and method already, and `resume` needs the name of an archive.
+
+>>> exact = tc.run(assembly, samples=100, solver="daqp", method={"resolution": "exact"}, surfaces=0)
+>>> exact.attrs["method_from"]
+'options'
+
+`progress` is called with the number of finished realizations. Ctrl-C leaves an archive that can be read and resumed.
+
+`tc.compare` runs several solvers or methods on the same draws, and reports agreement, failures, residuals and time.
+Differences are from the first one, in the corrected state, over the realizations that both certified.
+
+>>> comparison = tc.compare(assembly, ["daqp", "qpoases"], samples=200)
+>>> float(comparison.pose_difference.sel(solver="qpoases", extent="largest")) < 1e-9  # [mm]
+True
+
+`methods=[{"resolution": "linearized"}, {"resolution": "exact"}]` compares methods in the same way.
+
+`tc.summarize` gives the statistics of results, or of the archive of that path (see `tolcontact.statistics`).
+
+A wrong model, option or path raises a `tc.TolcontactError` before anything is simulated or written. The `faults` of a
+`tc.ModelError` are all that is wrong with a model.
+
+>>> tc.run(assembly, samples=500, method={"resolution": "precise"})
+Traceback (most recent call last):
+    ...
+tolcontact.errors.OptionError: resolution is 'precise'; expected one of: linearized, exact
+"""
 
 from tolcontact.workflow.compare import compare
 from tolcontact.workflow.run import build, check, run, summarize
