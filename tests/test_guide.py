@@ -1,14 +1,19 @@
-"""The guide: its examples run, and the reference is built from docstrings, with every public name and every chapter."""
+"""Guide and README: their examples run; the reference is built from docstrings, with every public name and chapter."""
 
 import doctest
 import importlib
+import io
 import re
+from pathlib import Path
 
 import pdoc
 import pytest
+from rich.console import Console
 
 import tolcontact as tc
+from tolcontact.report import summary_text
 
+README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
     "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive",
     "report", "workflow", "cli",
@@ -34,6 +39,31 @@ def test_front_names_every_chapter_in_order():
 def test_front_names_every_public_name():
     table = tc.__doc__.partition("## Names")[2]
     assert set(re.findall(r"`(\w+)`", table)) == set(tc.__all__) - {"__version__"}
+
+
+def test_python_of_the_readme_runs_and_prints_its_table(tmp_path, monkeypatch, capsys):
+    readme = README.read_text(encoding="utf-8")
+    script, reading = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
+    table = re.search(r"^```\n(corner height.*?)^```", readme, re.MULTILINE | re.DOTALL)[1]
+    monkeypatch.chdir(tmp_path)
+    Path("ra1.py").write_text(script)
+    with tc.run("ra1.py", samples=1000, seed=1, out="ra1.nc") as results:
+        console = Console(width=80, highlight=False, file=io.StringIO())
+        console.print(summary_text(tc.summarize(results)))
+    printed = {line.rstrip() for line in console.file.getvalue().splitlines()}
+    assert set(table.splitlines()) <= printed
+    exec(compile(reading, "README.md", "exec"), {})
+    assert "corner height" in capsys.readouterr().out
+
+
+def test_readme_is_a_front():
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 100
+
+
+def test_links_of_the_readme_exist():
+    links = re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8"))
+    assert links
+    assert not [link for link in links if not (README.parent / link).exists()]
 
 
 @pytest.mark.filterwarnings("error")
