@@ -1,8 +1,8 @@
 """Battery cells in a row between two end plates: do their terminals stay in pitch for the busbar?
 
-Each cell is set into a tray, off its place by the tolerance of its pocket and askew as that lets it; two neighbours are
+Each cell is set into a tray, off its place by the tolerance of its pocket, and tilted accordingly; two neighbours are
 nominally 0.2 mm apart. Without contact they pass through each other; with contact they push each other along, the plates hold
-the row, and there is always room, since the clearances add up. Expected: a terminal's spread along the row falls, least in
+the row, and there is always room, since the clearances add up. Expected: a terminal varies less along the row, but least so in
 the middle, where cells have most room to give way; a pitch varies much less. All cells move together, so the model asks for
 the exact resolution and all points. Dimensions are those of a prismatic cell of a car's battery; tolerances are guesses.
 

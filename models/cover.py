@@ -1,7 +1,7 @@
-"""A cover on a housing with two dowel pins, a round hole and a slot: how far may its edges stand off the housing's?
+"""A cover on a housing with two dowel pins, a round hole and a slot: how far may its edges be off the housing's?
 
-The pins stand off their places by the tolerance of the holes that they are pressed into; the cover is set down by hand, up to
-half a millimetre off, and the pins bring it to where its hole (clearance 0.1 on the diameter) and its slot let it be.
+The pins are off their places by the tolerance of the holes that they are pressed into; the cover is set down by hand, up to
+half a millimetre off, and the pins move it to where its hole (clearance 0.1 on the diameter) and its slot fit over them.
 Expected: an edge is off as the nearest pin is, and by half the clearance more; without contact the cover passes through its
 pins. Pins are round, so one linear step is not enough, and the model asks for the exact resolution. Dimensions were chosen for
 this model; cover_cad.py makes both STEP files from them.
@@ -19,7 +19,7 @@ HERE = Path(__file__).parent
 LENGTH, WIDTH, TOP, COVER = 120.0, 80.0, 40.0, 8.0
 PINS = {"round": (15.0, 15.0), "slotted": (105.0, 65.0)}
 PIN, HOLE = 8.0, 8.1  # diameters
-INSERTED, PLACED = 0.1, 1.0  # tolerances: where a pin stands, where the cover is set down
+INSERTED, PLACED = 0.1, 1.0  # tolerances of the place of a pin, and of the place where the cover is set down
 
 
 def six(x: float, y: float, length: float, width: float) -> list[tc.Locator]:

@@ -1,10 +1,10 @@
-"""A car door in its opening: are gap and flush to the body even, once the bump stops carry?
+"""A car door in its opening: are gap and flush to the body even, once the bump stops are loaded?
 
-The door hangs on two hinges and a striker, whose places on the body vary; four bump stops stand on the body's flange, each as
-high as its own tolerance lets it be, and the door cannot go through them. Expected: without contact flush varies as hinges and
-striker do; with contact the door is pushed outwards where a stop is in its way, so that flush shifts outwards and spreads less.
-Gaps lie along the faces of the stops and hardly change. Dimensions are those of a mid-size car's front door, rounded;
-tolerances are usual ones of bodywork.
+The door hangs on two hinges and a striker, whose places on the body vary; four bump stops are fixed to the body's flange, each
+with a height that varies by its own tolerance, and the door cannot go through them. Expected: without contact flush varies as
+hinges and striker do; with contact the door is pushed outwards by a stop that is in its way, so that flush shifts outwards and
+varies less. Gaps lie along the faces of the stops and hardly change. Dimensions are those of a mid-size car's front door,
+rounded; tolerances are usual in bodywork.
 
 x backward, y outward, z up. Lengths in mm. A tolerance is the full width of its zone.
 """
@@ -45,7 +45,7 @@ def opening() -> trimesh.Trimesh:
 
 
 def upright() -> list[tc.Locator]:
-    """Locators of a stop that let its height alone vary: what holds its turns stands elsewhere, and holds exactly."""
+    """Locators of a stop of which only the height varies; the five others are exact."""
     rest = [((0, 0, 0), "z"), ((0, 2, 0), "z"), ((STOP, 0, 0), "z"), ((0, 0, 0), "x"), ((0, 2, 0), "x")]
     exact = [tc.Locator(f"held {k + 1}", point, along) for k, (point, along) in enumerate(rest)]
     return [tc.Locator("height", (STOP / 2, 0, STOP / 2), "y", STOP_Y), *exact]

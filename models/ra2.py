@@ -69,7 +69,7 @@ def assembly() -> tc.Assembly:
         ],
         tolerance=5,
     )
-    floor = tc.Inside((0, -WIDTH, -1), (LENGTH, WIDTH, 1))  # not the rims of the flanges, which look upwards, too
+    floor = tc.Inside((0, -WIDTH, -1), (LENGTH, WIDTH, 1))  # not the rims of the flanges, which face upwards, too
     ra2.contact("web", moving=inner.face("-z"), reference=outer.face("+z", floor), points=1480)
     for name, normal in {"left": (NARROW, -1, -LEAN), "right": (NARROW, 1, -LEAN)}.items():
         facing = outer.face(tc.Facing([-component for component in normal]))

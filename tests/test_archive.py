@@ -77,7 +77,7 @@ def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp
     path.write_bytes(archive.read_bytes())
     with netCDF4.Dataset(path, "r+") as file:
         file["status"][:] = -1
-    with tc.open_archive(path) as tree, pytest.raises(ArchiveError, match="go on with --resume"):
+    with tc.open_archive(path) as tree, pytest.raises(ArchiveError, match="continue with --resume"):
         tc.summarize(tree)
 
 

@@ -23,7 +23,7 @@ def test_a_program_is_not_run_with_another_solver_or_method(option, program):
 
 @pytest.mark.parametrize("option", ["resume", "overwrite"])
 def test_what_speaks_of_an_archive_needs_one(option, program, tmp_path):
-    with pytest.raises(OptionError, match=rf"{option} speaks of an archive, and none is named; name it: out="):
+    with pytest.raises(OptionError, match=rf"{option} needs an archive, and none is named; name one: out="):
         tc.run(program, samples=10, **{option: True})
     (tmp_path / "m.py").write_text("")
     done = call(tmp_path, "run", "m.py", f"--{option}")
@@ -95,7 +95,7 @@ def test_what_a_run_will_take_is_said_before_it_begins(program, tmp_path, caplog
 
     with pytest.raises(KeyboardInterrupt):
         tc.run(program, samples=2_000_000, keep="measures", out=path, progress=stop)
-    assert "contact points: 2000000 realizations will take some" in caplog.text
+    assert "contact points: 2000000 realizations will take about" in caplog.text
 
 
 def test_a_method_that_does_not_exist_is_refused():

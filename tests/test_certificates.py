@@ -135,7 +135,7 @@ def test_a_shaft_in_a_v_rests_where_it_should():
     assert np.abs(errors_of_the_v(program, run)).max() < 1e-3 * 0.12
     program, run, warned = told(cases.shaft_in_a_v(64), samples=100, solver="daqp", method=SEATED)
     assert np.abs(errors_of_the_v(program, run)).max() < 0.02
-    assert len(warned) == 2 and "0.012 mm between the flat triangles" in warned[0] and 'contact pair "left wall"' in warned[0]
+    assert len(warned) == 2 and "0.012 mm between flat triangles" in warned[0] and 'contact pair "left wall"' in warned[0]
     program, run, warned = told(cases.shaft_in_a_v(1000, points=200), samples=100, solver="daqp", method=SEATED)
     assert np.abs(errors_of_the_v(program, run)).max() > 0.01
     assert len(warned) == 2 and "between its contact points" in warned[0]

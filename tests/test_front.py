@@ -72,5 +72,5 @@ def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tm
 def test_what_is_no_method_is_refused():
     with pytest.raises(TypeError, match=r'assembly "x": method is a str; expected tc.Method'):
         tc.Assembly("x", method="exact")
-    with pytest.raises(OptionError, match="a method has no 'resolutoin'; expected some of: resolution, objective"):
+    with pytest.raises(OptionError, match="a method has no choice 'resolutoin'; expected some of: resolution, objective"):
         tc.run(cases.stack(), samples=20, method={"resolutoin": "exact"})

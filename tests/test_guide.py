@@ -52,7 +52,9 @@ def test_python_of_the_readme_runs_and_prints_its_table(tmp_path, monkeypatch, c
         console.print(summary_text(tc.summarize(results)))
     printed = {line.rstrip() for line in console.file.getvalue().splitlines()}
     assert set(table.splitlines()) <= printed
-    exec(compile(reading, "README.md", "exec"), {})
+    names = {}
+    exec(compile(reading, "README.md", "exec"), names)
+    names["run"].close()
     assert "corner height" in capsys.readouterr().out
 
 

@@ -56,7 +56,7 @@ def test_what_steers_a_terminal_is_refused(word):
             tc.build(model(**{word: f"a{bad}b"}))
         message = str(refused.value)
         assert "control character" in message and message.translate({9: " ", 10: " "}).isprintable(), repr(bad)
-        assert word == "units" or f"{KINDS[word]} {f'a{bad}b'!r}: a name must be a text" in message
+        assert word == "units" or f"{KINDS[word]} {f'a{bad}b'!r}: a name must be text" in message
 
 
 @pytest.mark.parametrize("word", [*KINDS, "units"])
@@ -67,7 +67,7 @@ def test_everything_else_may_be_said(word):
 
 @pytest.mark.parametrize("word", ["name", "locator", "part"])
 def test_a_name_is_a_text(word):
-    with pytest.raises(ModelError, match="a name must be a text"):
+    with pytest.raises(ModelError, match="a name must be text"):
         tc.build(model(**{word: 3}))
 
 

@@ -39,7 +39,7 @@ def test_resuming_is_refused_where_contact_points_were_others(archive, tmp_path)
         points = file["contact/moving_point"]
         points[3, 1] += 0.01
         points.crc32 = crc32(vocabulary.MOVING_POINT, points[:])
-    with pytest.raises(ArchiveError, match="contact points were others"):
+    with pytest.raises(ArchiveError, match="contact points differ"):
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, resume=True)
 
 

@@ -43,15 +43,15 @@ def box(path, factor):
 @pytest.mark.parametrize(("unit", "length"), [("in", 25.4), ("cm", 10.0), ("m", 1000.0), ("ft", 304.8)])
 def test_the_unit_that_explains_it_is_named(unit, length, tmp_path):
     (told,) = warned(lid(box(tmp_path / "lid.stl", 1 / length)))
-    assert "mm away from it; if its file counts otherwise" in told
-    assert f'units="{unit}") makes it 250.8 mm' in told
+    assert "mm away from it; if the file is in other units" in told
+    assert f'units="{unit}") it would be 250.8 mm' in told
 
 
 def test_metres_of_a_glb_that_are_mm(tmp_path):
     places = [((x * 1000, y * 1000, z * 1000), along) for (x, y, z), along in PLACES]
     assert not warned(lid(box(tmp_path / "lid.glb", 1e-3)))
     told = warned(lid(box(tmp_path / "mm.stl", 1.0), "um"))
-    assert len(told) == 1 and 'units="mm") makes it 250.8 mm' in told[0]
+    assert len(told) == 1 and 'units="mm") it would be 250.8 mm' in told[0]
     assert "check the coordinates" in warned(lid(box(tmp_path / "far.stl", 1.0), None, places[:1] + PLACES[1:]))[0]
 
 

@@ -11,7 +11,7 @@ from tolcontact.vocabulary import Variable
 def crc32(variable: Variable, values: Any, after: int = 0) -> int:
     """CRC-32 of the values of a variable, `after` that of others before them.
 
-    Numbers count as little-endian bytes of the variable's kind, texts as UTF-8 with a zero byte behind each.
+    Numbers are taken as little-endian bytes of the variable's kind, texts as UTF-8 with a zero byte behind each.
     """
     if variable.kind is str:
         data = "".join(f"{text}\0" for text in np.ravel(np.array(values, dtype=str))).encode("utf-8", "surrogateescape")

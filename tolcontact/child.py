@@ -1,4 +1,4 @@
-"""Work on strangers' files in a process of its own: whatever such a file does to a library, it ends there."""
+"""Work on files of unknown origin in a process of its own: whatever such a file does to a library, it ends there."""
 
 import contextlib
 import os
@@ -13,13 +13,13 @@ except ImportError:  # not on Windows, where memory is not limited
 
 
 class ChildDiedError(Exception):
-    """The process did not come to its end; the message says how it died."""
+    """The process did not finish; the message states why."""
 
 
 def run_child(script: Path, *arguments: str, seconds: float) -> str:
     """Standard output of a Python file, which should begin with `limit_memory`.
 
-    Raises ChildDiedError where it takes too long, or ends by a signal or an error.
+    Raises ChildDiedError if it takes too long, or ends by a signal or an error.
     """
     environment = {
         **os.environ,
@@ -37,7 +37,7 @@ def run_child(script: Path, *arguments: str, seconds: float) -> str:
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise ChildDiedError(f"it was not read within {seconds:.0f} s") from error
+        raise ChildDiedError(f"reading it took longer than {seconds:.0f} s") from error
     if ended.returncode:
         raise ChildDiedError(_how(ended))
     return ended.stdout.decode("utf-8", "surrogateescape")
@@ -53,6 +53,8 @@ def limit_memory(size: int) -> None:
 
 def _how(ended: subprocess.CompletedProcess) -> str:
     if ended.returncode < 0:
-        return f"the library that reads it fails on it (signal {-ended.returncode})"
+        return f"the library that reads it crashed (signal {-ended.returncode})"
     last = (ended.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
-    return "it takes too much memory" if last.startswith("MemoryError") else f"the library that reads it fails on it ({last})"
+    if last.startswith("MemoryError"):
+        return "reading it takes too much memory"
+    return f"the library that reads it failed ({last})"

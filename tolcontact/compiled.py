@@ -1,7 +1,7 @@
-"""Functions compiled by Numba and kept on disk between runs, where that can be done: a cache only saves time.
+"""Functions compiled by Numba and kept on disk between runs, if that can be done: a cache only saves time.
 
 Compiled functions lie in the package's own `__pycache__`, else in the user's cache folder. Numba alone refuses to import
-where neither can be written, and to go on once a file there has been cut off.
+if neither can be written, and to continue once a file there has been cut off.
 """
 
 import contextlib

@@ -1,13 +1,13 @@
 """Every error that tolcontact raises on purpose, under one base class.
 
-A message says what was expected, what was got (naming the part, locator, pair, option or file) and what to do.
+A message states what was expected, what was got (naming the part, locator, pair, option or file) and what to do.
 """
 
 import re
 from collections.abc import Sequence
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
-# surrogate pairs (bytes of a file name that are no text): they steer a terminal, or cannot be written to it.
+# surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
 STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
@@ -17,7 +17,7 @@ def shown(text: str) -> str:
 
 
 class TolcontactError(Exception):
-    """Base of all errors that a user can cause and mend."""
+    """Base of all errors that a user can cause and fix."""
 
     def __init__(self, message: str) -> None:
         super().__init__(shown(message))
@@ -42,12 +42,12 @@ class OptionError(TolcontactError):
 
 
 class ArchiveError(TolcontactError):
-    """An archive cannot be written, or a file is not an archive of tolcontact."""
+    """An archive cannot be written, is damaged, or is not an archive of tolcontact."""
 
 
 class ContactWarning(UserWarning):
-    """The contact points or the triangles of a pair of curved faces are coarse beside the tolerances."""
+    """The contact points or the triangles of a pair of curved faces are coarse compared with the tolerances."""
 
 
 class UnitsWarning(UserWarning):
-    """A part has a strange size, and nobody said in which units its file counts."""
+    """A part has an implausible size, and no units were given for its file."""

@@ -43,25 +43,27 @@ OBJECTIVES = {
 class Method:
     """How contact is resolved: paper (9) to (12), with its free choices named.
 
-    resolution      "linearized": one linear step (12), as in the paper; "exact": steps are repeated, with proper rotations,
-                    until the true gaps (5) are open and the objective is least
-    objective       what the corrected pose minimizes. "active points": half the sum of squared displacements, from the raw
-                    state, of the contact points that are active there (the paper's); "all points": of all contact points;
-                    "locator stiffness": the energy of the two-sided locators, each a spring; "seating": the potential of
-                    the declared forces, with two-sided locators held
-    regularization  what holds the freedoms that the objective leaves open. "points": eta times the squared displacements of
-                    all contact points, the same in every frame; "identity": the paper's eta I, which mixes mm and
-                    rad and so depends on where the origin is
-    eta             weight of the regularization, dimensionless (with "identity": mm^2 per rad^2, 1 per mm^2)
-    active_set      "initial": only points below `activity` in the raw state are constrained (the paper's set);
-                    "closed": points that the correction itself drives into contact are constrained too
-    activity        a contact point counts as active below this gap [mm]
-    search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected again
-                    at the corrected pose until they stay (paper, 2.2)
-    near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other starts,
-                    and never certified
-    near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
-                    their raw places, is doubted, too, and certified only if the faces themselves are free of penetration
+        resolution      "linearized": one linear step (12), as in the paper; "exact": steps are repeated, with proper
+                        rotations, until the true gaps (5) are open and the objective is least
+        objective       what the corrected pose minimizes. "active points": half the sum of squared displacements, from the
+                        raw state, of the contact points that are active there (the paper's); "all points": of all contact
+                        points; "locator stiffness": the energy of the two-sided locators as springs; "seating": the
+                        potential energy of the declared forces, with two-sided locators exact
+        regularization  what holds the degrees of freedom that the objective leaves open. "points": eta times the squared
+                        displacements of all contact points, the same in every frame; "identity": the paper's eta I, which
+                        mixes mm and rad and so depends on the origin
+        eta             weight of the regularization, dimensionless (with "identity": mm^2 per rad^2, 1 per mm^2)
+        active_set      "initial": only points below `activity` in the raw state are constrained (the paper's set);
+                        "closed": points that the correction itself drives into contact are constrained too
+        activity        a contact point is active below this gap [mm]
+        search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected
+                        again at the corrected pose until they no longer move (paper, 2.2)
+        near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other
+                        starts, and never certified
+        near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
+                        their raw places, is doubted, too, and certified only if the faces are free of penetration
+
+    Every archive states all of these choices.
     """
 
     resolution: str = "linearized"

@@ -20,7 +20,7 @@ def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
     for piece in pieces(rows[[words.STATUS.name]]):
         status = piece[words.STATUS.name].values
         if status.min(initial=0) < words.UNFINISHED or status.max(initial=0) >= len(words.STATUS_MEANINGS):
-            raise ArchiveError("the archive is damaged: some statuses have no meaning; run the model again")
+            raise ArchiveError("the archive is damaged: some statuses are unknown; run the model again")
         yield status
 
 

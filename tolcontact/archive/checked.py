@@ -52,7 +52,7 @@ class _Largest:
 
 
 def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None:
-    """Corrected poses (row, part, 12) of some rows; None where the archive does not keep poses."""
+    """Corrected poses (row, part, 12) of some rows; None if the archive does not keep poses."""
     if words.ROTATION.name not in file.variables:
         return None
     R, t = (

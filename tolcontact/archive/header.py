@@ -74,7 +74,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
 
 
 def _whose(program: Program) -> str:
-    """Where the method came from: the model, the defaults, or whoever ran it."""
+    """Where the method came from: the model, the defaults, or the options of the run."""
     own = program.nominal.assembly.method
     if program.method == (own or Method()):
         return "defaults" if own is None else "model"

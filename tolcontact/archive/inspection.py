@@ -52,11 +52,11 @@ ONCE = {  # by group
 
 
 def check_name(path: Path) -> None:
-    """Raise ArchiveError where the netCDF library could not take a file's name."""
+    """Raise ArchiveError if the netCDF library could not take a file's name."""
     try:
         os.fsencode(path).decode(sys.getfilesystemencoding())
     except UnicodeError as error:
-        raise ArchiveError(f'"{path}": its name is no text, and netCDF cannot take it; rename the file') from error
+        raise ArchiveError(f'"{path}": its name is not text, so netCDF cannot use it; rename the file') from error
 
 
 class DamagedError(Exception):
@@ -64,19 +64,19 @@ class DamagedError(Exception):
 
 
 def inspect(path: Path) -> None:
-    """Raise ArchiveError where a file is not an archive, is damaged, or claims what it cannot hold."""
+    """Raise ArchiveError if a file is not an archive, is damaged, or claims what it cannot hold."""
     check_name(path)
     gigabytes = path.stat().st_size / 1e9
     try:
         found = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
     except ChildDiedError as error:
-        raise ArchiveError(f'"{path}" is damaged, or no archive of tolcontact: {error}') from error
+        raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
     if found:
         raise ArchiveError(f'"{path}" {found}')
 
 
 def _look(path: Path) -> str:
-    """What is wrong with a file; nothing where it is an archive."""
+    """What is wrong with a file; nothing if it is an archive."""
     try:
         file = netCDF4.Dataset(path)
     except (OSError, RuntimeError, ValueError, AttributeError) as error:
@@ -109,7 +109,7 @@ def _check_format(file: netCDF4.Dataset) -> None:
 
 def _groups(group: netCDF4.Dataset, depth: int = 0) -> Iterator[netCDF4.Dataset]:
     if depth > 4 or len(group.groups) > 2 * len(_top(group).dimensions.get(words.PART, ())) + 64:
-        raise DamagedError("is no archive of tolcontact: its groups lie too deep, or are too many")
+        raise DamagedError("is not an archive of tolcontact: its groups are nested too deeply, or too many")
     yield group
     for child in group.groups.values():
         yield from _groups(child, depth + 1)
@@ -127,7 +127,7 @@ def _check_group(group: netCDF4.Dataset, size: int) -> None:
         where = f"{group.path.rstrip('/')}/{name}"
         own = isinstance(variable.datatype, netCDF4.VLType | netCDF4.CompoundType | netCDF4.EnumType)
         if own or not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
-            raise DamagedError(f"is no archive of tolcontact: {where} holds neither numbers nor text")
+            raise DamagedError(f"is not an archive of tolcontact: {where} holds neither numbers nor text")
         least = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
         packed = any((variable.filters() or {}).get(word) for word in ("zlib", "szip", "zstd", "bzip2", "blosc"))
         if math.prod(variable.shape) * least > size * (DEFLATED if packed else 1):
@@ -146,12 +146,12 @@ def _check_attributes(thing: Any) -> None:
         if isinstance(value, str):
             _check_text(name, value)
         if name in CHANGES_VALUES:
-            raise DamagedError(f"is no archive of tolcontact: attribute {name} of {thing.name} would change values")
+            raise DamagedError(f"is not an archive of tolcontact: attribute {name} of {thing.name} would change values")
 
 
 def _check_text(name: str, text: str) -> None:
     if len(text) > TEXT:
-        raise DamagedError(f"is damaged: {name} has {len(text)} letters")
+        raise DamagedError(f"is damaged: {name} has {len(text)} characters")
     if shown(text) != text:
         raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
 
@@ -166,7 +166,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
         raise DamagedError(f"is not an archive of tolcontact: it has no {', '.join(missing)}")
     accuracy, samples = getattr(file, "solver_accuracy", None), getattr(file, "samples", None)
     if not (isinstance(accuracy, float | np.floating) and isinstance(samples, int | np.integer) and 0 <= samples < 2**63):
-        raise DamagedError("is damaged: its attributes solver_accuracy and samples are no numbers")
+        raise DamagedError("is damaged: its attributes solver_accuracy and samples are not numbers")
     for name, known in ONCE.items():
         parent = file.groups.get(name) if name else file
         for group in [] if parent is None else (parent.groups.values() if name == "field" else [parent]):
@@ -180,7 +180,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
         if name in file.variables:
             labels = _texts(file[name])
             if len(set(labels)) < len(labels) or "" in labels:
-                raise DamagedError(f"is damaged: its names of each {name} are not different, or empty")
+                raise DamagedError(f"is damaged: its {name} names are empty, or not unique")
     rows = getattr(file, "block_rows", words.BLOCK_ROWS)
     if not (isinstance(rows, int | np.integer) and 0 < rows <= words.BLOCK_ROWS):
         raise DamagedError(f"is damaged: its blocks have {rows!r} realizations")
@@ -194,12 +194,12 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
     text = stored.dtype is str or np.dtype(stored.dtype).kind == "S"
     dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
     if dims != variable.dims or text != (variable.kind is str):
-        raise DamagedError(f"is damaged: {where} has not the dimensions and the type of an archive")
+        raise DamagedError(f"is damaged: {where} does not have the dimensions and the type that it has in an archive")
     if text or variable is words.NUMBERS:
         return
     wrong = [d for d, size in zip(dims, stored.shape, strict=True) if SIZES.get(d, size) != size]
     if wrong:
-        raise DamagedError(f"is damaged: dimension {wrong[0]} of {where} has a wrong size")
+        raise DamagedError(f"is damaged: dimension {wrong[0]} of {where} has the wrong size")
 
 
 def _check_needed(file: netCDF4.Dataset) -> None:
@@ -212,13 +212,13 @@ def _check_needed(file: netCDF4.Dataset) -> None:
         summed = np.ma.getdata(file[words.SUMMED_ROWS.name][...])
         most = len(file.dimensions[words.BLOCK]) * int(file.block_rows)
         if (summed < words.UNFINISHED).any() or (summed > most).any():
-            raise DamagedError("is damaged: its checkpoints are of more realizations than it holds")
+            raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
     if tuple(_texts(file[words.STATE])) != words.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
     for part in _texts(file[words.PART]):
         name = words.group_of(part)
         if name not in file["field"].groups:
-            raise DamagedError(f'is damaged: it has no field of part "{part}"')
+            raise DamagedError(f'is damaged: it has no field for part "{part}"')
         _need(file["field"][name], OF_FIELD)
 
 
@@ -277,9 +277,9 @@ def _check_declaration(file: netCDF4.Dataset) -> None:
     try:
         declared = json.loads(_declaration(file["model"][words.DECLARATION.name]))
     except (ValueError, RecursionError) as error:
-        raise DamagedError(f"is damaged: its declared model is no JSON ({error})") from error
+        raise DamagedError(f"is damaged: its declared model is not JSON ({error})") from error
     if not isinstance(declared, dict):
-        raise DamagedError("is damaged: its declared model is no JSON object")
+        raise DamagedError("is damaged: its declared model is not a JSON object")
 
 
 if __name__ == "__main__":

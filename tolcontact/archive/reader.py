@@ -17,7 +17,7 @@ from tolcontact.errors import ArchiveError
 def open_archive(path: str | Path) -> xr.DataTree:
     """An archive as a tree of labelled datasets, read on demand.
 
-    Raises ArchiveError where the file is missing, is no archive of tolcontact, or is damaged: all but the realizations is
+    Raises ArchiveError if the file is missing, is not an archive of tolcontact, or is damaged: all but the realizations is
     read and compared with its checksums; those of the realizations are looked at by `summarize`.
     """
     path = Path(path)

@@ -17,19 +17,19 @@ SAME = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 
 def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
-    """Raise ArchiveError where the archive `there`, in the file `path`, is of another model or another run."""
+    """Raise ArchiveError if the archive `there`, in the file `path`, is of another model or another run."""
     if getattr(there, "format", 1) != words.FORMAT:
         raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
     if not there.dimensions[words.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
     if _comparable(str(there["model"][words.DECLARATION.name][...])) != _comparable(declaration(program)):
-        raise ArchiveError(f'"{path}" holds another model than the one to be resumed; write to a new file')
+        raise ArchiveError(f'"{path}" contains another model than the one to be resumed; write to a new file')
     for part in program.nominal.parts:
         if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program.nominal).items():
         if not _same(there["contact"][variable.name], values):
-            raise ArchiveError(f'"{path}": contact points were others (by {there.versions}); write to a new file')
+            raise ArchiveError(f'"{path}": its contact points differ (it was written by {there.versions}); write to a new file')
     for word, value in settings.items():
         was = getattr(there, word, None)
         if word != "samples" and was != value:

@@ -19,18 +19,18 @@ AT_ONCE = 50 * ROW_CHUNK  # rows that are laid out at once
 
 
 def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: int) -> None:
-    """Raise ArchiveError where the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
+    """Raise ArchiveError if the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
     needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
     if needed > free:
-        less = "; or keep less of each realization (measures)" if words.ROTATION in rows else ""
+        less = ", or keep less of each realization (measures)" if words.ROTATION in rows else ""
         raise ArchiveError(
             f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
-            f"{size_in_words(free)} free; ask for fewer, or write to another disk{less}"
+            f"{size_in_words(free)} free; ask for fewer, write to another disk{less}"
         )
 
 
 def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
-    """How many bytes `samples` realizations take in an archive that keeps what `keep` says."""
+    """How many bytes `samples` realizations take in an archive that keeps what `keep` names."""
     return samples * bytes_of_row(nominal, kept_rows(keep))
 
 

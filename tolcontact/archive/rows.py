@@ -13,9 +13,9 @@ from tolcontact.vocabulary import Variable
 
 
 def check_rows(results: xr.DataTree) -> None:
-    """Raise ArchiveError where finished realizations are not what was written.
+    """Raise ArchiveError if finished realizations are not what was written.
 
-    Archives of format 1 have no checksums; nor are there any of the rows that somebody took from an archive.
+    Archives of format 1 have no checksums; nor are there any for rows that were taken from an archive.
     """
     stored = results.to_dataset()
     count, rows = stored.sizes[words.REALIZATION], int(stored.attrs.get("block_rows", words.BLOCK_ROWS))

@@ -13,17 +13,17 @@ from tolcontact.errors import ArchiveError, OptionError
 
 @contextlib.contextmanager
 def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
-    """The file that `path` stands for (the target, where it is a link), kept from all other runs meanwhile.
+    """The file that `path` stands for (the target, if it is a link), kept from all other runs meanwhile.
 
     A run that was killed holds nothing: the system releases what it had taken.
-    Raises ArchiveError, and changes nothing, where the file cannot become an archive, or another run writes to it.
+    Raises ArchiveError, and changes nothing, if the file cannot become an archive, or another run writes to it.
     """
     if overwrite and resume:
         raise OptionError("an archive cannot be overwritten and resumed; choose one of the two")
     real = Path(os.path.realpath(path))
     check_name(real)
     if not real.parent.is_dir():
-        raise ArchiveError(f'archive "{path}" cannot be written: folder "{real.parent}" does not exist; make it first')
+        raise ArchiveError(f'archive "{path}" cannot be written: folder "{real.parent}" does not exist; create it first')
     if real.exists() and not real.is_file():
         raise ArchiveError(f'archive "{path}" cannot be written: it is not a file')
     lock = real.with_name(f".{real.name}.lock")
@@ -43,7 +43,7 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
 
 def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
     try:
-        lock.touch()  # says what is wrong where it cannot be made
+        lock.touch()  # fails with a reason if it cannot be made
         holding.acquire()
     except Timeout as error:
         raise ArchiveError(f'archive "{path}" is being written by another run; wait, or write to a new file') from error

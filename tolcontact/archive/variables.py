@@ -70,7 +70,7 @@ def overwrite(file: netCDF4.Dataset, values: Mapping[str, Mapping[Variable, Any]
 
 
 def _write_text(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
-    """Text as characters. The netCDF library crashes where text of variable length is read through two open handles."""
+    """Text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
     text = np.char.encode(np.array(values, dtype=str), "utf-8")
     length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
     created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))

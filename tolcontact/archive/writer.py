@@ -55,7 +55,7 @@ class ArchiveWriter:
     def resume(cls, path: Path, program: Program, run: Run) -> "ArchiveWriter":
         """Open an archive to go on after its last checkpoint, up to the run's samples, or to its own number if that is larger.
 
-        Raises ArchiveError if the file is no archive, or holds another model or another run.
+        Raises ArchiveError if the file is not an archive, or contains another model or another run.
         """
         inspect(path)
         writer = cls.__new__(cls)
@@ -153,7 +153,7 @@ class ArchiveWriter:
         return choose(self._file, len(self._file["surface"].dimensions[words.CHECKED]), seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
-        """Corrected poses (row, part, 12) of some rows; None where they are not kept."""
+        """Corrected poses (row, part, 12) of some rows; None if they are not kept."""
         return archived_poses(self._file, rows)
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:

@@ -49,11 +49,11 @@ Samples = Annotated[int, typer.Option(help="Number of realizations.")]
 Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
 Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
 Resolution = Annotated[
-    str | None, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}; else the model's own choice.")
+    str | None, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}. Default: the model's.")
 ]
 Objective = Annotated[
     str | None,
-    typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}; else the model's own choice."),
+    typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
 
 
@@ -72,7 +72,7 @@ def command_line(arguments: list[str] | None = None) -> None:
     """The console script: `app`, with errors as one message and exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a terminal that knows few letters is no reason to stop
+            stream.reconfigure(errors="backslashreplace")  # a terminal with few characters is no reason to stop
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
@@ -82,7 +82,7 @@ def command_line(arguments: list[str] | None = None) -> None:
         sys.exit(2)
     except OSError as error:
         refused = shown(str(error))
-        typer.echo(f"error: the system refused: {refused}; an archive that was begun goes on with --resume", err=True)
+        typer.echo(f"error: the operating system reports: {refused}; continue an unfinished archive with --resume", err=True)
         sys.exit(2)
 
 

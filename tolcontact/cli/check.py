@@ -14,7 +14,7 @@ def check(
     resolution: Resolution = None,
     objective: Objective = None,
 ) -> None:
-    """Say what is wrong with a model, or with running it so; run nothing."""
+    """Check a model, and these options, and list every fault; runs nothing."""
     program = build(load_model(model), solver=solver, method=chosen(resolution=resolution, objective=objective))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:

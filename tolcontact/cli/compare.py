@@ -17,14 +17,14 @@ from tolcontact.report import comparison_text
 from tolcontact.workflow.compare import compare as compare_solvers
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
-_ONE_OR_MORE = "One or more of {}; else the model's own."
+_ONE_OR_MORE = "One or more of {}. Default: the model's."
 
 
 @app.command()
 def compare(
     model: Model,
     solvers: Annotated[
-        str, typer.Option(help="Names of solvers, with commas between; the first one is the reference.")
+        str, typer.Option(help="Names of solvers, separated by commas; the first one is the reference.")
     ] = DEFAULT_SOLVER,
     samples: Samples = 1000,
     seed: Seed = 1,
@@ -42,7 +42,7 @@ def compare(
             texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
             found.to_netcdf(path, engine="netcdf4", encoding=texts)
     if as_json:
-        # JSON has no NaN: where no realization can be compared a difference is null.
+        # JSON has no NaN: if no realization can be compared, a difference is null.
         readable = found.astype(object).where(found.notnull(), None)
         typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
     else:

@@ -11,16 +11,16 @@ from tolcontact.vocabulary import UNRESOLVED
 from tolcontact.workflow.run import summarize
 
 FAILED_SHARE = 0.001
-UNBOUNDED = 10_000  # columns of what is no terminal
+UNBOUNDED = 10_000  # columns of what is not a terminal
 
 
 def console() -> Console:
-    """Standard output; what is no terminal is never cut."""
+    """Standard output; what is not a terminal is never cut."""
     return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
 
 
 def print_summary(results: xr.DataTree) -> None:
-    """Print the summary of a run. Ends with exit code 1 where too many realizations were not resolved."""
+    """Print the summary of a run. Ends with exit code 1 if too many realizations were not resolved."""
     found = summarize(results)
     console().print(summary_text(found))
     failed = sum(int(found["by_status"][status]) for status in UNRESOLVED)

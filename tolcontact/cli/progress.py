@@ -1,4 +1,4 @@
-"""Progress on standard error, and what is said to somebody who stops a run."""
+"""Progress on standard error, and the message to a user who stops a run."""
 
 import contextlib
 import logging
@@ -17,7 +17,7 @@ from tolcontact.report import grouped
 
 
 def progress_bar() -> Progress:
-    """A bar of realizations; nothing where standard error is no terminal."""
+    """A bar of realizations; nothing if standard error is not a terminal."""
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     console = Console(stderr=True)
     return Progress(*columns, TimeRemainingColumn(), console=console, transient=True, disable=not console.is_terminal)
@@ -25,7 +25,7 @@ def progress_bar() -> Progress:
 
 @contextlib.contextmanager
 def log_shown(console: Console, show: Callable[[str], None]) -> Iterator[None]:
-    """Show what the package is at, and print what it announces."""
+    """Show what the package is doing, and print what it announces."""
 
     class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
@@ -48,7 +48,7 @@ def log_shown(console: Console, show: Callable[[str], None]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def stopped(out: Path | None, done: list[int]) -> Iterator[None]:
-    """Say how far a run came that somebody stops; `done` is how far, and of how many."""
+    """Report how far a run came if it is stopped; `done` is how far, and of how many."""
     stopped_by = [signal.SIGINT]
 
     def terminate(number: int, _: object) -> None:

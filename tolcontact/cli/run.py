@@ -26,21 +26,21 @@ def run(
     objective: Objective = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the archive if it exists.")] = False,
-    keep: Annotated[str, typer.Option(help=f"What to archive of each realization: {or_(KEPT)}.")] = "all",
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
+    keep: Annotated[str, typer.Option(help=f"What to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
-        str, typer.Option(metavar="all|N|none", help="Realizations, the first ones, in the magnitudes of displacement fields.")
+        str, typer.Option(metavar="all|N|none", help="How many realizations the magnitudes of displacement fields cover.")
     ] = str(MAGNITUDES),
     surfaces: Annotated[
-        int, typer.Option(help="Number of realizations that are checked against the surfaces between contact points.")
+        int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
-    Exit code 1 where more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
+    Exit code 1 if more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
     """
     if out is None and (overwrite or resume):
-        raise OptionError("--overwrite and --resume speak of an archive, and none is named; name it: --out FILE.nc")
+        raise OptionError("--overwrite and --resume need an archive, and none is named; name one: --out FILE.nc")
     method = chosen(resolution=resolution, objective=objective)
     with stopped(out, done := [0, samples]), progress_bar() as bar:  # who stops it gets the cursor back first
         task = bar.add_task(shown(model.stem), total=samples)

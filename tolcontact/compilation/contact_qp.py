@@ -6,7 +6,7 @@ The increments z = (dt, L w) of a mover, all in mm (L is a length of the group's
 mover's own block of (11): H then has unit blocks on its diagonal, and the few freedoms that only the regularization holds
 are as well conditioned as the others. s_k, one for each pair k, make the problem solvable whatever the gaps are; their
 price is so high that they stay zero unless the rows contradict each other (an exact penalty). f, the pull of the
-objective at the present poses, is zero in the raw state but for forces; h are the two-sided locators, where the
+objective at the present poses, is zero in the raw state but for forces; h are the two-sided locators, if the
 objective holds them.
 """
 
@@ -42,8 +42,8 @@ class ContactProgram:
 
     energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
     slacks       how many of the QP's last variables are slacks: they are not negative
-    equations    how many of its last rows are equations: two-sided locators, where the objective holds them
-    standing     for each pair of the group the contact points that always have a row, None where slots hold changing points
+    equations    how many of its last rows are equations: two-sided locators, if the objective holds them
+    standing     for each pair of the group the contact points that always have a row, None if slots hold changing points
     """
 
     assemble: ca.Function
@@ -79,11 +79,11 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
     caution              where points are projected anew: weight of the step itself, in all contact points, beside the objective
-    reactions (k)        where it counts: the reaction that a row's point had before
-    bend (12 v)          where it counts: the sum, over the points that slots held before, of reaction times the gap's gradient
+    reactions (k)        if `newton`: the reaction that a row's point had before
+    bend (12 v)          if `newton`: the sum, over the points that slots held before, of reaction times the gap's gradient
                          by the entries of X_RM
     P_m, P_r, n_r (3, m) the contact points in the slots
-    filled (m)           1 where a slot holds a point, 0 where it is empty
+    filled (m)           1 if a slot holds a point, 0 if it is empty
 
     corrected (12 p)     poses after the correction; in an exact resolution after as much of it as `stride` allows
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
@@ -94,7 +94,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
     step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|; of
                          the whole correction
-    astray               how far two-sided locators, where they hold, are from their place at `corrected` [mm]
+    astray               how far two-sided locators, if they are held, are from their place at `corrected` [mm]
     """
     standing = tuple(standing_points(gaps[index], method) for index in group.pairs)
     inputs = _inputs(nominal, group, standing)

@@ -14,7 +14,7 @@ from tolcontact.mechanics.quiet import MAKING, quiet
 QP = ("h", "g", "a", "lba", "uba")  # what `assemble` gives a solver
 TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
 ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished, and
-NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, where the step is so small that noise would be seen
+NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, if the step is so small that noise would be seen
 
 Arrays = dict[str, np.ndarray]  # by name, (realization, entry)
 
@@ -44,7 +44,7 @@ class ContactSolver:
         """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
-        others, without curvature. `residual` is infinite, and other outputs may be NaN, where all gave up.
+        others, without curvature. `residual` is infinite, and other outputs may be NaN, if all gave up.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
         answer = self._solved(self._first, inputs)
@@ -126,7 +126,7 @@ class _PluginSolver:
             self._solve = InterpretedFunction(qp, given)
 
     def __call__(self, problem: Arrays, before: np.ndarray) -> tuple[Arrays, np.ndarray]:
-        """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) where the solver gave up.
+        """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
 
         A solver that starts from the previous problem's rows has less to change where problems alike follow each other:
         those in which the same rows probably carry, that did `before` (realization, row), or in a first step are violated.

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact.errors import OptionError
 
-ACCURACY = 1e-8  # mm: KKT residual up to which a QP counts as solved, whichever plugin solved it
+ACCURACY = 1e-8  # mm: KKT residual up to which a QP is taken as solved, whichever plugin solved it
 
 
 @dataclass(frozen=True)
@@ -16,7 +16,7 @@ class Plugin:
     """A conic plugin of CasADi.
 
     options     what we ask of it
-    second      names of the plugins that answer in its place, one after the other, where its own answer misses ACCURACY
+    second      names of the plugins that answer in its place, one after the other, if its own answer misses ACCURACY
     remembers   whether it starts each problem from the answer to the previous one
     """
 
@@ -48,13 +48,13 @@ PLUGINS = {
     )
 }
 REFUSED = {
-    "ipqp": "its answers can be off by some 0.01 mm with residuals that pass as solved",
+    "ipqp": "its answers can be off by about 0.01 mm, with residuals that pass as solved",
     "superscs": "it reports success with wrong answers",
     "fatrop": "its cost output is always 0 and it fails assertions of its own",
-    "hpipm": "it takes problems with the structure of optimal control only",
-    "qrqp": "it gives wrong answers, or hangs, beyond some tens of rows",
-    "clp": "it solves linear programs only",
-    "cbc": "it solves linear programs only",
+    "hpipm": "it only takes problems with the structure of optimal control",
+    "qrqp": "it gives wrong answers, or hangs, with more than some tens of rows",
+    "clp": "it only solves linear programs",
+    "cbc": "it only solves linear programs",
     "nlpsol": "it is an adapter for nonlinear solvers, too slow to be of use here",
 }
 

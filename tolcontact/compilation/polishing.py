@@ -18,9 +18,9 @@ def polished(
     """x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba, with the last rows equations and the last x >= 0.
 
     problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
-    answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 where a row carries
+    answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
 
-    Where the conditions have no solution it is no number.
+    NaN if the conditions have no solution.
     """
     H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
     x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
@@ -55,7 +55,7 @@ def polished(
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:
-    """Inverses (QP, n, n), NaN where there is none: one such matrix must not spoil the others."""
+    """Inverses (QP, n, n), NaN if there is none: one such matrix must not spoil the others."""
     try:
         return np.linalg.inv(matrices)
     except np.linalg.LinAlgError:

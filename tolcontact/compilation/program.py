@@ -61,8 +61,8 @@ class Program:
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     """Build all Functions of a model.
 
-    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or where the objective
-    is seating for forces that are missing or move nothing.
+    Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or, if the objective
+    is seating, for forces that are missing or move nothing.
     """
     with MAKING:  # which also calls users' functions, that may print
         with quiet():
@@ -109,12 +109,12 @@ def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
     moved = {part for group in groups for part, carried in zip(group.parts, group.carried, strict=True) if carried.movers}
     faults = [
         f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
-        "leave the force out, or declare the part free and its contacts"
+        "leave the force out, or declare the part free, with its contacts"
         for force in nominal.assembly.forces
         if nominal.part_index(force.at.part) not in moved
     ]
     if not nominal.assembly.forces:
-        faults = ['nothing presses its parts, but the objective is "seating"; declare a force with assembly.force(...)']
+        faults = ['objective "seating" needs a force, and none is declared; declare one with assembly.force(...)']
     if faults:
         raise ModelError(nominal.assembly.name, faults)
 

@@ -58,7 +58,7 @@ class Candidates:
         self._reaches = {k: reach(self._every[k]) for k in (range(len(self._pairs)) if is_iterated else self.round)}
 
     def scans(self, relative: np.ndarray, *, anew: bool = False) -> list[PairScan]:
-        """Scans of the points that may carry; projected again if the method says so.
+        """Scans of the points that may carry; projected again if the method requires it.
 
         `anew`: those against curved faces are projected again in any case.
         """

@@ -1,6 +1,6 @@
 """Doubt: an answer far from the raw pose may obey half-spaces that no face fills there.
 
-Contact points are kept on one side of planes, which stand for the reference face as long as the parts stay near. Farther away
+Contact points are kept on one side of planes, which represent the reference face as long as the parts stay near. Farther away
 a point may be held by a plane beside the face, or a part may have turned over into another pose that locators allow.
 """
 
@@ -56,7 +56,7 @@ class Doubt:
     def remains(self, task: Task, state: State, candidates: Candidates) -> np.ndarray:
         """(n,): whether the doubt remains once the faces themselves were looked at.
 
-        It does where a part turned too far. If it only travelled, the faces must be free of penetration, and hold the points
+        It does if a part turned too far. If it only travelled, the faces must be free of penetration, and hold the points
         that carry.
         """
         doubtful = self._turned(task, state)

@@ -1,6 +1,6 @@
 """Iterated search: linear steps, each about contact points that were projected anew, until the poses stay.
 
-More than one step about the same points would let a round part roll on the planes that stand for its counterpart. Linear
+More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
 rows do not know how the surfaces curve: steps that neither shrink nor gain are taken with more caution.
 """
 

@@ -179,7 +179,7 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
 
     points      Points
     clusters    (cluster + 1,): the first branch of each cluster, and the end
-    may_carry   (n, point), only these points are looked at; all where it is (n, 0)
+    may_carry   (n, point), only these points are considered; all if it is (n, 0)
     """
     leaves, branches = points.leaves, points.branches
     of = np.empty(points.coordinates.shape[0])

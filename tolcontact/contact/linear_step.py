@@ -151,7 +151,7 @@ class LinearStep:
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
-    """Multipliers (n, row of the QP), zero where they are nothing beside the largest of their pair."""
+    """Multipliers (n, row of the QP), zero if they are negligible beside the largest of their pair."""
     of_pairs = (multipliers[:, span] for span in spans)
     return np.concatenate([np.where(m > NOTHING * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 

@@ -41,7 +41,7 @@ class FoundScan(PairScan):
 
 
 def reach(scan: PairScan) -> float:
-    """How far a contact point stands for its surroundings [mm]: half the usual distance of two of them."""
+    """How far a contact point represents its surroundings [mm]: half the usual distance of two of them."""
     if len(scan.P_m) < 2:
         return 0.0
     distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)

@@ -34,7 +34,7 @@ STEPS = (
 
 
 def repeat(step: LinearStep, doubt: Doubt, task: Task, state: State, stride: float) -> None:
-    """Take the steps of `state` to their end. Without rest there is an answer only where the parts contradict each other."""
+    """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     left, best = Unsettled(task, state), None
     for kind in STEPS:
         last = step.take(left.task, left.state, stride=stride, firmness=kind.firmness, newton=kind.newton)

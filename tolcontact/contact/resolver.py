@@ -38,7 +38,7 @@ class Start(NamedTuple):
     stride: float = STRIDE
 
 
-FLAT = (Start(at_nominal=True), Start(stride=CAREFUL))  # where it is tried again, if no face is curved, and
+FLAT = (Start(at_nominal=True), Start(stride=CAREFUL))  # how it is tried again, if no face is curved, and
 ROUND = (Start(anew=True), Start(anew=True, at_nominal=True))  # if one is
 
 
@@ -104,7 +104,7 @@ class ContactResolver:
         """Go from where `state` is to an answer, and say what it is worth."""
         anew = start.anew or self._method.is_iterated
         if anew:
-            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far where nothing holds
+            caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._doubt, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
             repeat(self._step, self._doubt, task, state, start.stride)

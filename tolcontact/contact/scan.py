@@ -96,9 +96,9 @@ class PairScan:
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        """The deepest point of each cluster; depth 0 where none is inside.
+        """The deepest point of each cluster; depth 0 if none is inside.
 
-        Only points where `may_carry` (realization, point) holds are looked at, if it is given.
+        Only points for which `may_carry` (realization, point) holds are considered, if it is given.
         """
         gaps = np.minimum(self.gaps(relative, deviations), 0)
         if may_carry is not None:

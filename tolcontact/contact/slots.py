@@ -34,7 +34,7 @@ class Slots:
         self.points[some], self.filled[some], self.reactions[some] = other.points, other.filled, other.reactions
 
     def reactions_of(self, points: np.ndarray) -> np.ndarray:
-        """The reactions of some contact points (n, slot), 0 where they have none here."""
+        """The reactions of some contact points (n, slot), 0 if they have none here."""
         same = (points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]
         return np.asarray(np.where(same, self.reactions[:, None, :], 0.0).max(axis=2))
 

@@ -23,11 +23,11 @@ CONSTANT = 1e-3
 class Assembly:
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
-    The methods only note what is said; `faults()` lists what is wrong with it, all at once.
+    The methods only record what is declared; `faults()` lists everything that is wrong with it.
     """
 
     def __init__(self, name: str, *, method: Method | None = None) -> None:
-        """`method` is how contact in this model has to be resolved, unless whoever runs it says otherwise."""
+        """`method` is how contact in this model is resolved, unless a run states another one."""
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         self.name = name
         self.method = method
@@ -49,7 +49,7 @@ class Assembly:
         measures: Iterable[Measure],
         forces: Iterable[Force],
     ) -> "Assembly":
-        """An assembly of things that are declared already."""
+        """An assembly of things that have been declared already."""
         made = cls(name, method=method)
         made._parts.extend(parts)
         made._locations.extend(locations)
@@ -89,7 +89,7 @@ class Assembly:
     ) -> Part:
         """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
         _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
-        _expect(f'part "{name}": fixed', fixed, bool | None, "True, False, or nothing")
+        _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         part = Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line())
         self._parts.append(part)
         return part
@@ -103,7 +103,7 @@ class Assembly:
         a frozen scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
-        _expect(f'locate "{part.name}": on', on, Part | None, "a part, or nothing for the ground")
+        _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
         scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
         for locator in scheme if isinstance(scheme, tuple) else ():
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
@@ -149,14 +149,14 @@ class Assembly:
         return self._measures[-1]
 
     def location_of(self, part: Part) -> Location | None:
-        """How `part` is located; None where it is not."""
+        """How `part` is located; None if it is not."""
         return next((location for location in self._locations if location.part is part), None)
 
     def finest(self) -> float:
-        """The smallest width of a zone [mm] that any locator or measure is given; infinite where none is.
+        """The smallest width of a tolerance zone [mm] of any locator or measure; infinite if there is none.
 
-        A distribution of its own counts with six standard deviations. What is narrower than a thousandth of the widest is no
-        tolerance but a way to say a constant.
+        The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one is
+        taken for a constant, and does not count.
         """
         said = []
         for location in self._locations:
@@ -233,7 +233,7 @@ class Assembly:
 
 
 def _expect(what: str, value: Any, kind: Any, wanted: str) -> None:
-    """Raise TypeError at the script's own line where an argument is of a kind that no other check could read."""
+    """Raise TypeError at the script's own line if an argument has a type that no other check could handle."""
     if not isinstance(value, kind):
         raise TypeError(f"{what} is a {type(value).__name__}; expected {wanted}")
 

@@ -162,7 +162,7 @@ def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
         parts[new.name] = new
     assembly = Assembly.of(
         whole["name"].text(),
-        _optional(whole["method"], _method_of) if "method" in whole else None,  # which the first format does not say
+        _optional(whole["method"], _method_of) if "method" in whole else None,  # which the first format does not have
         parts=parts.values(),
         locations=map(location, whole["locations"]),
         pairs=map(pair, whole["pairs"]),

@@ -9,7 +9,7 @@ from tolcontact.declaration.vectors import Vector, is_finite
 
 @dataclass(frozen=True, eq=False)
 class Force:
-    """A force `vector` [N] at a point of a part, constant in the assembly frame. It counts in the objective "seating"."""
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
 
     name: str
     at: Point
@@ -19,7 +19,7 @@ class Force:
     def faults(self) -> Iterator[str]:
         yield from self.at.faults()
         if not (is_finite(self.vector) and any(self.vector)):
-            yield "vector is not three finite numbers [N] other than zero"
+            yield "vector is not a nonzero vector of three finite numbers [N]"
 
     def __str__(self) -> str:
         return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

@@ -35,9 +35,9 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  
 class Mesh:
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
-    `units` ("mm", "in", ...) says in what the source counts. Without it the source's own word holds: that of a STEP
-    file, metres of a GLB, `mesh.units` of a Trimesh; the others count in mm. STEP faces are triangulated to within
-    2 um and what single precision leaves of their coordinates, and keep their boundary representation for `tc.Brep`;
+    `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m,
+    `mesh.units` of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within
+    2 um, beside the rounding of their coordinates to single precision, and keep their boundary representation for `tc.Brep`;
     that needs the extra `tolcontact[step]`. A STEP file holds one body.
     """
 
@@ -48,7 +48,7 @@ class Mesh:
         if self.units is not None and self.units not in UNITS:
             yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
         if self.units is not None and isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP:
-            yield f'"{self.source}" is a STEP file, which says its units itself; leave units out'
+            yield f'"{self.source}" is a STEP file, which states its own units; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
             if path.is_dir():

@@ -19,7 +19,7 @@ class Locator:
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, and may not pass through it.
-    `stiffness` [N/mm] counts in the objective "locator stiffness".
+    `stiffness` [N/mm] is used by the objective "locator stiffness".
     """
 
     name: str
@@ -50,7 +50,7 @@ class Locator:
         if not is_finite(self.point):
             yield "point is not three finite numbers"
         if not is_finite(self.direction):
-            yield 'direction is neither "+x" to "-z" nor a vector of three finite numbers other than zero'
+            yield 'direction is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
         if self.tolerance is not None:
             yield from self.tolerance.faults()
         if not isinstance(self.one_sided, bool):
@@ -98,7 +98,7 @@ def three_two_one(primary: Face, secondary: Face, tertiary: Face, *, inset: floa
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """How one part is located: its locators, their common tolerance, and what they stand on (None: the ground)."""
+    """How one part is located: its locators, their common tolerance, and what they are attached to (None: the ground)."""
 
     part: Part
     scheme: ThreeTwoOne | tuple[Locator, ...]
@@ -108,7 +108,7 @@ class Location:
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
-        """The parts that the faces of its scheme speak of."""
+        """The parts that the faces of its scheme refer to."""
         faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
         return tuple(part for face in faces for part in face.parts)
 
@@ -123,14 +123,15 @@ class Location:
             for locator in self.scheme:
                 yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
                 if locator.tolerance is None and self.tolerance is None:
-                    yield f'locator "{locator.name}" has no tolerance; give it one, or the locate call'
+                    yield f'locator "{locator.name}" has no tolerance; give one to the locator, or to the locate call'
             yield from text_faults("locator", names)
             yield from repetitions("locator", names)
             two_sided = sum(locator.one_sided is False for locator in self.scheme)
             if len(self.scheme) < 6 or two_sided > 6:
+                count = "1 locator" if len(self.scheme) == 1 else f"{len(self.scheme)} locators"
                 yield (
-                    f"it has {len(self.scheme)} locators; a rigid part is held by exactly 6 (3-2-1 or any six independent "
-                    "directions), or by more when no more than six of them are two-sided"
+                    f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or more if at most six are "
+                    "two-sided"
                 )
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())

@@ -14,9 +14,9 @@ from tolcontact.declaration.vectors import Vector, is_finite
 class Measure:
     """A number taken from the poses of the parts.
 
-    of one Point                how far it moved from its nominal place, along `along` [mm]
-    of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush)
-    of a function               whatever CasADi expression the function makes of the symbolic poses
+        of one Point                how far it moved from its nominal place, along `along` [mm]
+        of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush)
+        of a function               the CasADi expression that the function returns for the symbolic poses
 
     `tolerance` is the full width of the allowed zone, centred on the nominal value.
     """
@@ -41,15 +41,15 @@ class Measure:
             if self.along is None:
                 yield 'a measured point needs a direction; give along="z", or a vector'
             elif not is_finite(self.along):
-                yield 'along is neither "+x" to "-z" nor a vector of three finite numbers other than zero'
+                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
         elif not callable(self.of) and not isinstance(self.of, tuple):
             yield f"it measures a {type(self.of).__name__}; expected part.point(x, y, z) or a function of the poses"
         elif self.along is not None or self.to is not None:
-            yield "an expression says what it measures by itself; leave out to and along"
+            yield "a function of the poses defines its measure by itself; leave out to and along"
         if not (self.units and is_line(self.units)):
             yield (
                 f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number, '
-                "without any control character"
+                "without control characters"
             )
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"

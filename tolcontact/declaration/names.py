@@ -15,7 +15,7 @@ def text_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
     """What is wrong with names that are only shown."""
     for name in dict.fromkeys(names):
         if not is_line(name):
-            yield f"{kind} {name!r}: a name must be a text that holds no control character (the archive uses it)"
+            yield f"{kind} {name!r}: a name must be text without control characters (the archive uses it)"
 
 
 def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
@@ -23,8 +23,8 @@ def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
     for name in dict.fromkeys(names):
         if not (is_line(name) and _KEY.fullmatch(name)):
             yield (
-                f"{kind} {name!r}: a name must be a text that starts with a letter, digit or underscore, holds "
-                'no "/" or control character, and does not end in a space (the archive uses it)'
+                f"{kind} {name!r}: a name must be text that starts with a letter, digit or underscore, contains "
+                'no "/" and no control character, and does not end in a space (the archive uses it)'
             )
     yield from repetitions(kind, names)
 

@@ -18,7 +18,7 @@ class Part:
 
     Its own coordinates `p` lie at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation
     vector [rad], `at` a position [mm]. `fixed=None` leaves the choice to the model: a part that is the moving side of
-    a contact pair is free, any other is fixed.
+    a contact pair, or that has one-sided locators, is free; any other is fixed.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Part:
         return Point(self, vector((x, y, z)))
 
     def face(self, *selections: "str | Sequence[int] | Picker | Selection") -> "Face":
-        """The surface of this part that meets all of the given criteria; without any, the whole surface.
+        """The triangles of this part that meet every criterion; without any, the whole surface.
 
         A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
         frame), `tc.Facing`, `tc.Inside` a box, `tc.Near` another part, `tc.Brep` (a face of a STEP file), the indices
@@ -76,14 +76,14 @@ class Point:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Face:
-    """What of a part's surface meets all criteria."""
+    """The triangles of a part's surface that meet every criterion."""
 
     part: Part
     selections: tuple[Selection, ...]
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The part itself, and those that its criteria speak of."""
+        """The part itself, and those that its criteria refer to."""
         return (self.part, *(selection.part for selection in self.selections if isinstance(selection, Near)))
 
     def faults(self) -> Iterator[str]:

@@ -1,6 +1,6 @@
-"""A value in a document from a stranger's file, and where in it: taken as what is expected there, or refused.
+"""A value in a document from a file of unknown origin, and its place there: taken as what is expected, or refused.
 
-Every refusal is an ArchiveError that says where; nothing is converted.
+Every refusal is an ArchiveError that states the place; nothing is converted.
 """
 
 from collections.abc import Collection, Iterator
@@ -13,14 +13,14 @@ LARGEST = 1e100  # of any number: its square can still be computed with
 
 
 class Said:
-    """A value of JSON that stands at `at`, a place of the document such as `parts[2].name`."""
+    """A value of JSON at the place `at` of the document, such as `parts[2].name`."""
 
     def __init__(self, value: Any, at: str = "") -> None:
         self._value = value
         self._at = at
 
     def __getitem__(self, word: str) -> "Said":
-        """What a group says under `word`."""
+        """The value that a group has under `word`."""
         if not isinstance(self._value, dict):
             raise self.wrong("named values")
         if word not in self._value:
@@ -44,7 +44,7 @@ class Said:
         return items
 
     def pairs(self) -> dict[str, "Said"]:
-        """What a group of named values says."""
+        """The values of a group, by name."""
         if not isinstance(self._value, dict):
             raise self.wrong("named values")
         return {word: self[word] for word in self._value}
@@ -74,7 +74,7 @@ class Said:
         return self._value  # type: ignore[no-any-return]
 
     def constant(self) -> float:
-        """A finite number, or one of the floats that are none: an expression may compare with infinity."""
+        """A number, also a float that is not finite: an expression may compare with infinity."""
         return self._value if isinstance(self._value, float) else self.number()
 
     def index(self, count: int) -> int:

@@ -15,7 +15,7 @@ _PACKAGE = Path(__file__).resolve().parent
 def load_model(path: Path) -> Assembly:
     """The assembly that a script declares.
 
-    Raises ScriptError where the file is missing, fails, or has no function `assembly()` that returns an Assembly.
+    Raises ScriptError if the file is missing, fails, or has no function `assembly()` that returns an Assembly.
     """
     if not path.is_file():
         raise ScriptError(f'model script "{path}" does not exist')

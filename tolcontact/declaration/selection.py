@@ -58,7 +58,7 @@ class Triangles:
     def faults(self) -> Iterator[str]:
         if not all(hasattr(index, "__index__") and not isinstance(index, bool) for index in self.indices):
             yield (
-                "triangle indices must be whole numbers; for a direction that is no axis use tc.Facing((x, y, z)), for a mask "
+                "triangle indices must be whole numbers; for another direction use tc.Facing((x, y, z)), for a mask "
                 "a function of centres and normals, or np.flatnonzero(mask)"
             )
 
@@ -103,9 +103,9 @@ class Inside:
 
 @dataclass(frozen=True, eq=False)
 class Near:
-    """Flat faces, and triangles of curved ones, that look at `part` and come within `within` [mm] of it nominally."""
+    """Flat faces, and triangles of curved ones, that face `part` and come within `within` [mm] of it nominally."""
 
-    part: Any  # a Part, whose module stands above this one
+    part: Any  # a Part, whose module imports this one
     within: float
 
     def faults(self) -> Iterator[str]:

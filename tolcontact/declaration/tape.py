@@ -26,7 +26,7 @@ LONGEST = 1_000_000  # steps: an expression of more takes minutes to compile
 def tape_of(said: Said, parts: int) -> Tape:
     """The tape that a document holds, for an assembly of that many parts.
 
-    Raises ArchiveError where it is not a list of known steps, each on earlier ones.
+    Raises ArchiveError if it is not a list of known steps, each on earlier ones.
     """
     rows: list[tuple[Any, ...]] = []
     for row in said:

@@ -1,6 +1,6 @@
 """How much a locator varies: a tolerance range and the distribution that fills it."""
 
-import importlib  # scipy.stats takes longer to import than all the rest: only where it is needed
+import importlib  # scipy.stats takes longer to import than all the rest: only if it is needed
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,13 +15,13 @@ SHAPES = ("normal", "uniform", "triangular", "truncated normal")
 class Tolerance:
     """A deviation [mm] around 0 that fills a zone of full width `range`.
 
-    normal             6 sigma = range, unbounded (the default; DESIGN.md, Tolerance to distribution)
-    uniform            between -range/2 and +range/2
-    triangular         between -range/2 and +range/2, mode 0
-    truncated normal   6 sigma = range, cut at -range/2 and +range/2
+        normal             6 sigma = range, unbounded (the default)
+        uniform            between -range/2 and +range/2
+        triangular         between -range/2 and +range/2, mode 0
+        truncated normal   6 sigma = range, cut at -range/2 and +range/2
 
-    Instead of a name, `distribution` may be any frozen continuous distribution of `scipy.stats`, which then says
-    everything; leave `range` out.
+    Instead of a name, `distribution` may be any frozen continuous distribution of `scipy.stats`. It defines the spread by
+    itself; leave `range` out.
     """
 
     range: float | None = None
@@ -53,7 +53,7 @@ class Tolerance:
 
     @property
     def width(self) -> float:
-        """Full width of the zone [mm]: the range, or six standard deviations of a distribution that says everything."""
+        """Full width of the zone [mm]: the range, or six standard deviations of a scipy.stats distribution."""
         return float(6 * self.distribution.std() if self.range is None else self.range)
 
     def __str__(self) -> str:
@@ -72,18 +72,18 @@ def tolerance(value: Any) -> Tolerance:
 
 
 def scipy_distribution(name: str) -> Any | None:
-    """The continuous distribution that scipy.stats has under that name; None where it has none."""
+    """The continuous distribution that scipy.stats has under that name; None if it has none."""
     stats = importlib.import_module("scipy.stats")
     found = getattr(stats, name, None)
     return found if isinstance(found, stats.rv_continuous) and found.name == name else None
 
 
 def _not_archivable(frozen: Any) -> str:
-    """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty where it can."""
+    """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty if it can."""
     name, known = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
     if known is None or type(frozen.dist) is not type(known):
         return (
-            f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot hold; expected a '
+            f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot store; expected a '
             "continuous distribution that scipy.stats has under that name"
         )
     for parameter in (*frozen.args, *frozen.kwds.values()):

@@ -1,4 +1,4 @@
-"""Small vocabulary of declarations: vectors, directions, and the script line that said them."""
+"""Small vocabulary of declarations: vectors, directions, and the script line that states them."""
 
 import math
 import numbers
@@ -17,7 +17,7 @@ NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
 
 
 def vector(value: Any) -> Vector:
-    """Three floats; NaN where `value` is no vector, so that the fault is found with all others."""
+    """Three floats; NaN if `value` is not a vector, so that the fault is found with all others."""
     try:
         x, y, z = (float(component) for component in value)
     except (TypeError, ValueError):
@@ -26,7 +26,7 @@ def vector(value: Any) -> Vector:
 
 
 def direction(value: Any) -> Vector:
-    """Unit vector of "+x", "-z", "y" or of any three numbers; NaN where `value` gives none."""
+    """Unit vector of "+x", "-z", "y" or of any three numbers; NaN if `value` is no direction."""
     if isinstance(value, str):
         sign, axis = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
         if axis not in _AXES:
@@ -46,12 +46,12 @@ def is_finite(value: Vector) -> bool:
 
 
 def is_length(value: Any) -> bool:
-    """Whether `value` is a finite number (True and False are none)."""
+    """Whether `value` is a finite number (True and False are not)."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def script_line() -> str:
-    """`file.py:12`, the innermost line outside this package; empty where there is none."""
+    """`file.py:12`, the innermost line outside this package; empty if there is none."""
     frame = sys._getframe(1)
     while frame is not None:
         name = frame.f_code.co_filename

@@ -43,7 +43,7 @@ A `tc.ContactWarning` states the error in mm if your points, or the triangles of
 >>> with warnings.catch_warnings(record=True) as caught:
 ...     program = tc.build(ball)
 >>> print(caught[0].message)
-contact pair "foot" (...): parts may be off by up to 0.0089 mm between the flat triangles and the round faces ...
+contact pair "foot" (...): parts may be off by up to 0.0089 mm between flat triangles and the round faces ...
 
 A `tc.UnitsWarning` names a mesh whose size is implausible in mm, by itself (below 1 mm, above 10 m) or beside a part that it
 touches, if nobody stated its units; and a mesh from which locators, measures or forces lie farther away than it is large.

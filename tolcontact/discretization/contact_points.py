@@ -63,8 +63,8 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
     _, normals, _ = placed_own.project(P_m[kept])
     if ((normals * n_r[kept]).sum(axis=1) > 0).all():
         raise GeometryFault(
-            f"its faces {pair.moving} and {pair.reference} look the same way, so one cannot rest on the other; "
-            "choose faces that look at each other"
+            f"its faces {pair.moving} and {pair.reference} point the same way, so one cannot rest on the other; "
+            "choose faces that face each other"
         )
     return ContactPoints(
         pair.name,
@@ -84,13 +84,13 @@ def _announce(pair: ContactPair, area: float, count: int | None) -> None:
     points = count if pair.spacing is None else area / pair.spacing**2
     log.log(
         logging.WARNING if points and points > MANY else logging.INFO,
-        'contact pair "%s": some %d contact points, some %.0f s',
+        'contact pair "%s": about %d contact points, about %.0f s',
         shown(pair.name), points or 0, SECONDS_PER_POINT * (points or 0),
     )  # fmt: skip
 
 
 def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndarray, finest: float, reach: float) -> np.ndarray:
-    """The contact points P_m (point, 3) of curved faces, with what curvature adds where the model leaves the choice open.
+    """The contact points P_m (point, 3) of curved faces, with what curvature adds if the model leaves the choice open.
 
     Warns of what they, or the triangles, leave unseen of more than CHORD times `finest`, the smallest tolerance range.
     """
@@ -101,7 +101,7 @@ def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndar
         P_m = np.concatenate([P_m, every])
     errors = {
         "between its contact points": sampling_error(P_m, every, target, unit=finest, within=reach),
-        "between the flat triangles and the round faces that they stand for": facet_error(own, target, reach),
+        "between flat triangles and the round faces that they approximate": facet_error(own, target, reach),
     }
     advice = ("give it more points, or leave points and spacing out", "use a finer mesh")
     for (seen, error), what in zip(errors.items(), advice, strict=True):

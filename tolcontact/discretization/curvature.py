@@ -1,4 +1,4 @@
-"""Contact points that follow curvature, and how far a set of them may be from the faces that it stands for.
+"""Contact points that follow curvature, and how far a set of them may be from the faces that it represents.
 
 Between two contact points of a curved face the other part can sink in, by the arc's height over their chord. Along a
 straight generator it cannot, however far apart they stand. So triangles of the moving face are halved across the edge whose
@@ -82,7 +82,7 @@ def sampling_error(chosen: np.ndarray, every: np.ndarray, target: Surface, *, un
 
 
 def facet_error(own: Surface, target: Surface, within: float) -> float:
-    """How far [mm] the flat triangles of two faces may lie off the round surfaces that they stand for, where they are near.
+    """How far [mm] the flat triangles of two faces may lie off the round surfaces that they approximate, near each other.
 
     The height of an arc over a chord of length l whose ends turn by an angle is l times the angle / 8.
     """

@@ -52,7 +52,7 @@ def discretize(assembly: Assembly) -> Nominal:
         if labels.count(label) > 1 and clean
     )
     faults.extend(
-        f"{where('contact pair', pair)}: its name is that of the one-sided locators of a part; rename it"
+        f"{where('contact pair', pair)}: its name is reserved for the one-sided locators of a part; rename it"
         for pair in assembly.pairs
         if any(pair.name == _supports(part) for part in assembly.parts if has_supports(assembly, part))
     )
@@ -79,7 +79,7 @@ def _support_pairs(parts: tuple[NominalPart, ...]) -> Iterator[ContactPoints]:
 
 
 def _attempt(faults: list[str], where: str, build: Callable[..., Any], *arguments: Any) -> Any:
-    """What `build` gives; None, and a fault noted, where the geometry does not allow it."""
+    """What `build` gives; None, and a fault noted, if the geometry does not allow it."""
     try:
         return build(*arguments)
     except GeometryFault as fault:
@@ -136,7 +136,7 @@ def _locators(
 def _immovable(assembly: Assembly) -> list[str]:
     """Pairs that no free part could ever open."""
     return [
-        f"{where('contact pair', pair)}: contact can move neither side against the other; "
+        f"{where('contact pair', pair)}: contact cannot move its sides relative to each other; "
         f'declare part "{pair.moving.part.name}" free (fixed=False)'
         for pair in assembly.pairs
         if movers(assembly, pair.moving.part) == movers(assembly, pair.reference.part)

@@ -1,4 +1,4 @@
-"""Doubts about units: files of triangles do not say in what they count, and a model may say it wrongly."""
+"""Doubts about units: files of triangles do not state theirs, and a model may state wrong ones."""
 
 import itertools
 import warnings
@@ -19,9 +19,9 @@ FAR = 0.25  # of a mesh's size: how far its points reach at least; a mesh that i
 
 
 def warn_of_units(assembly: Assembly, shapes: Mapping[Part, Shape]) -> None:
-    """Warn of points that lie far off their mesh, and of meshes whose size is strange where nobody stated units.
+    """Warn of points that lie far off their mesh, and of meshes of implausible size if no units are given.
 
-    A size is strange by itself, or beside a part that the mesh touches. One warning for each mesh.
+    A size is implausible by itself, or beside a part that the mesh touches. One warning for each mesh.
     """
     for part, shape in shapes.items():
         if isinstance(part.geometry, Mesh):
@@ -54,7 +54,7 @@ def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> 
 
 
 def _explanation(points: np.ndarray, geometry: Mesh, shape: Shape) -> str | None:
-    """The unit in which the file may count: with it all points (point, 3) [mm] lie on the mesh, of which most are off it."""
+    """The unit that the file may be in: with it all points (point, 3) [mm] lie on the mesh, of which most are off it."""
     bounds, size = shape.mesh.bounds, float(shape.mesh.scale)
     away = _away(points, bounds)
     if _states_units(geometry) or np.median(away) <= NEAR * size:
@@ -67,21 +67,21 @@ def _explanation(points: np.ndarray, geometry: Mesh, shape: Shape) -> str | None
 
 
 def _states_units(geometry: Mesh) -> bool:
-    """Whether the source says itself in which units it counts."""
+    """Whether the source states its own units."""
     source = geometry.source
     is_file = isinstance(source, str | Path)
     return Path(source).suffix.lower() in STEP if is_file else getattr(source, "units", None) is not None
 
 
 def _counted_in(geometry: Mesh) -> float:
-    """What a mesh that does not state its units is taken to count in [mm]."""
+    """The unit [mm] that a mesh is taken to be in if it does not state one."""
     by_custom = "m" if str(geometry.source).lower().endswith((".glb", ".gltf")) else "mm"
     return UNITS[geometry.units or by_custom]
 
 
 def _advice(geometry: Mesh, size: float, unit: str) -> str:
     length = size * UNITS[unit] / _counted_in(geometry)
-    return f'if its file counts otherwise, say so: tc.Mesh(..., units="{unit}") makes it {length:.4g} mm'
+    return f'if the file is in other units, state them: with tc.Mesh(..., units="{unit}") it would be {length:.4g} mm'
 
 
 def _away(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
@@ -91,16 +91,16 @@ def _away(points: np.ndarray, bounds: np.ndarray) -> np.ndarray:
 
 
 def _strange_size(assembly: Assembly, part: Part, geometry: Mesh, shapes: Mapping[Part, Shape]) -> Iterator[str]:
-    """What is strange about the size of a mesh by itself, or beside a part that it touches."""
+    """What is implausible about the size of a mesh by itself, or beside a part that it touches."""
     if not shapes[part].unsure:
         return
     size = float(shapes[part].mesh.scale)
     if not PLAUSIBLE[0] <= size <= PLAUSIBLE[1]:
-        yield f"{size:.4g} mm across, which is unusual; {_advice(geometry, size, 'in')}"
+        yield f"{size:.4g} mm across, which is unusual for a part; {_advice(geometry, size, 'in')}"
     sides = [(pair.moving.part, pair.reference.part) for pair in assembly.pairs]
     for other in [b if a is part else a for a, b in sides if part in (a, b)]:
         if other in shapes:
             beside = float(shapes[other].mesh.scale)
             if max(size, beside) > UNLIKE * min(size, beside):
-                touched = f'but "{other.name}", which it touches, {beside:.4g} mm'
+                touched = f'but "{other.name}", which it touches, is {beside:.4g} mm across'
                 yield f"{size:.4g} mm across, {touched}; {_advice(geometry, size, 'in')}"

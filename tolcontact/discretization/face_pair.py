@@ -28,9 +28,9 @@ class Side:
     points: np.ndarray
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How deep `points` (point, 3) [mm] lie behind the face, in the body; 0 outside, and where the face has no part.
+        """How deep `points` (point, 3) [mm] lie behind the face, in the body; 0 outside, and beside the face.
 
-        Distance to the face [mm]. Of a body that is not closed whatever is behind the face counts as inside.
+        Distance to the face [mm]. Of a body that is not closed whatever is behind the face is inside.
         """
         depth = np.zeros(len(points))
         lower, upper = self.body.bounds

@@ -14,8 +14,8 @@ from tolcontact.discretization.surface import Surface
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
 FLAT = 2e-4  # angle [rad] between neighbouring triangles of one flat face: what single precision leaves of it
-LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that look at each other
-CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box counts as inside
+LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that face each other
+CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
 
@@ -23,7 +23,7 @@ Meshes = Mapping[Part, trimesh.Trimesh]
 def patch(face: Face, meshes: Meshes) -> Surface:
     """The surface that a face names. `meshes` holds each part's surface in that part's own frame.
 
-    Raises GeometryFault where there is none, or where it has no direction to be pushed in.
+    Raises GeometryFault if there is none, or if its outside is undefined.
     """
     mesh = meshes[face.part]
     used, faces = np.unique(mesh.faces[triangles(face, meshes)], return_inverse=True)
@@ -32,11 +32,11 @@ def patch(face: Face, meshes: Meshes) -> Surface:
         if isinstance(selection, Inside):
             own = _cut(own, selection, CUT_MARGIN * mesh.scale)
             if len(own.mesh.faces) == 0:
-                raise GeometryFault(f"face {face}: nothing of it lies there; the part spans {_span(mesh)}")
+                raise GeometryFault(f"face {face}: nothing of it lies in that box; the part spans {_span(mesh)}")
     sheets = _double(own.mesh)
     if sheets:
         raise GeometryFault(
-            f"face {face}: {sheets} pairs of its triangles coincide and look opposite ways, so it has no outside; "
+            f"face {face}: {sheets} pairs of coincident triangles point opposite ways, so the outside is undefined; "
             "remove one of the two sheets, or choose a direction"
         )
     return own
@@ -45,7 +45,7 @@ def patch(face: Face, meshes: Meshes) -> Surface:
 def triangles(face: Face, meshes: Meshes) -> np.ndarray:
     """Indices (triangle,) of the triangles that meet all criteria but the boxes, which may cut them.
 
-    Raises GeometryFault where there are none.
+    Raises GeometryFault if there are none.
     """
     mesh = meshes[face.part]
     chosen = np.asarray(mesh.area_faces) > 0
@@ -80,7 +80,7 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
         raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
     if chosen.shape != (len(mesh.faces),) or chosen.dtype != bool:
         raise GeometryFault(
-            f"face {face}: its function gave an array of shape {chosen.shape} and type {chosen.dtype}; "
+            f"face {face}: its function returned an array of shape {chosen.shape} and type {chosen.dtype}; "
             f"expected one True or False per triangle, shape ({len(mesh.faces)},)"
         )
     return np.asarray(chosen)
@@ -89,7 +89,7 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
 def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
     brep = mesh.face_attributes.get(BREP)
     if brep is None:
-        raise GeometryFault(f"face {face}: its part is no STEP file, so it has no B-rep faces; choose it another way")
+        raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
     brep = np.asarray(brep).ravel()
     point = np.tile(selection.at, (len(brep), 1))
     distance = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, point) - point, axis=1)

@@ -8,7 +8,7 @@ class GeometryFault(Exception):
 
 
 def clipped(words: str, most: int = 400) -> str:
-    """Words of a stranger's file as they may stand in a message: on one line, printable, and not too many."""
+    """Words of a file as they may appear in a message: on one line, printable, and not too many."""
     line = " ".join("".join(letter if letter.isprintable() else " " for letter in words).split())
     return line if len(line) <= most else f"{line[:most]}..."
 

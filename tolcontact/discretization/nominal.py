@@ -19,7 +19,7 @@ class NominalPart:
     """A part in its nominal place.
 
     vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
-    locators             those that hold it; none where it is fixed
+    locators             those that hold it; none if it is fixed
     parent               index of the part that it is located on; None for the ground
     """
 
@@ -51,7 +51,7 @@ class ContactPoints:
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     Their `offsets` are the locators' deviations. They have no faces; of a pair of faces `surface` is the reference face in
     its nominal place, and `own` the moving one.
-    `facets` [mm] is how far their triangles may lie off the round faces that they stand for.
+    `facets` [mm] is how far their triangles may lie off the round faces that they approximate.
     """
 
     name: str

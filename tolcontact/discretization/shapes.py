@@ -15,7 +15,7 @@ FIELD_STATIONS = 12
 def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
     """The closed or open triangle surface of a geometry. `contents`: of the files of a model, if they were read together.
 
-    Raises GeometryFault where a mesh cannot be read, is empty, or has no outside.
+    Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
@@ -30,14 +30,14 @@ def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
 
 
 def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
-    """Refuse what has no outside: neighbours turned against each other, and closed bodies turned inside out."""
+    """Refuse what has no defined outside: neighbours oriented inconsistently, and closed bodies turned inside out."""
     ends, edge, triangles = edges(mesh.faces)
     sense = np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0)  # neighbours run along their common edge in opposite senses
     against = int(np.count_nonzero((triangles == 2) & (np.abs(np.bincount(edge, sense)) == 2)))
     if against:
         raise GeometryFault(
-            f"{geometry}: at {against} edges two neighbouring triangles are turned against each other, so its normals do "
-            "not point outward; repair it (trimesh.repair.fix_normals), or export it again"
+            f"{geometry}: neighbouring triangles are oriented inconsistently at {against} edges, so its normals do not all "
+            "point outward; repair it (trimesh.repair.fix_normals), or export it again"
         )
     neighbours = np.asarray(mesh.face_adjacency)
     body = trimesh.graph.connected_component_labels(neighbours, node_count=len(mesh.faces))
@@ -46,7 +46,7 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     is_open[body[~_is_matched(body, edge, sense)]] = True
     corners = np.asarray(mesh.triangles) - mesh.vertices.mean(axis=0)
     volume = np.bincount(body, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6, count)
-    # A body whose normals point inward is a cavity where another one is around it, else a mistake.
+    # A body whose normals point inward is a cavity if another one is around it, else a mistake.
     lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
     for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
         around = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 from tolcontact.discretization.edges import on_rim, rim
 
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
-CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they stand for one curved face
+CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they approximate one curved face
 
 
 class Surface:

@@ -13,7 +13,7 @@ def lay_out(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
     """The six locators of a 3-2-1 scheme, in the part's own frame; directions point into the part.
 
     Each face is taken as its bounding rectangle along the edges that it shares with the other two.
-    Raises GeometryFault where the faces are not three independent ones, or the inset leaves no room.
+    Raises GeometryFault if the faces are not three independent ones, or the inset leaves no room.
     """
     corners, normals = zip(*(_frame(face, meshes) for face in scheme.faces), strict=True)
     outward = np.array(normals)

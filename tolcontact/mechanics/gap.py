@@ -12,7 +12,7 @@ from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
 
 def gap(X_RM: Pose, P_m: ca.SX, P_r: ca.SX, n_r: ca.SX) -> ca.SX:
-    """Signed gap [mm], negative where the moving point lies inside the reference part. Paper (5).
+    """Signed gap [mm], negative if the moving point lies inside the reference part. Paper (5).
 
     With x^m - x^r turned into the reference frame, n = R_r n^r (4) becomes n^r; R_r must be a rotation.
     """

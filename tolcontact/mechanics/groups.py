@@ -58,7 +58,7 @@ class Group:
 
     @property
     def ball(self) -> float:
-        """Radius of the ball [mm] that a contact point stands for in the regularization."""
+        """Radius of the ball [mm] that a contact point represents in the regularization."""
         return BALL * self.length
 
 

@@ -42,7 +42,7 @@ class SymbolicPoses:
 def measured(nominal: Nominal, poses: Sequence[Pose]) -> list[ca.SX]:
     """One scalar expression per declared measure.
 
-    Raises ModelError where a user's function fails or gives no scalar.
+    Raises ModelError if a user's function fails or does not return a scalar.
     """
     faults: list[str] = []
     expressions = []
@@ -68,5 +68,5 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose]) -> ca
     value: Any = replay(measure.of, poses) if isinstance(measure.of, tuple) else measure.of(SymbolicPoses(nominal, poses))
     expression = ca.SX(value)
     if expression.shape != (1, 1):
-        raise ValueError(f"it gave an expression of shape {expression.shape}; expected one number")
+        raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")
     return expression

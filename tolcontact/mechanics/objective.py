@@ -67,7 +67,7 @@ def _springs(setting: Setting, now: Sequence[Pose]) -> Energy:
 
 
 def _forces(setting: Setting, now: Sequence[Pose]) -> Energy:
-    """Less the work of the declared forces [N mm], over the sum of their sizes [N] (1 where there are none)."""
+    """Less the work of the declared forces [N mm], over the sum of their sizes [N] (1 if there are none)."""
     nominal, group = setting.nominal, setting.group
     work, total = ca.SX(0), 0.0
     for force in nominal.assembly.forces:

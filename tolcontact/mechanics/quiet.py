@@ -62,5 +62,5 @@ def quiet() -> Iterator[None]:
             _inside -= 1
             for name in ("stdout", "stderr") if not _inside else ():
                 stream = getattr(sys, name)
-                if isinstance(stream, _Muffled):  # else somebody has replaced ours meanwhile
+                if isinstance(stream, _Muffled):  # else ours have been replaced meanwhile
                     setattr(sys, name, stream.stream)

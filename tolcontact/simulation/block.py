@@ -17,14 +17,14 @@ class Block:
     measured      (n, state, measure)
     gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
     active        (n, pair): number of active contact points in the raw state
-    carrying      (n, pair): number of contact points that carry: with more than 1e-4 of the largest reaction
+    carrying      (n, pair): number of contact points under load: with more than 1e-4 of the largest reaction
     reaction      (n, pair): sum of their reactions, in the units of the objective
     status        (n,), Status
-    kkt_residual  (n,) [mm], 0 where untouched
-    iterations    (n,): linear steps taken, 0 where untouched
-    starts        (n,): places the steps were started from, 0 where untouched
+    kkt_residual  (n,) [mm], 0 if untouched
+    iterations    (n,): linear steps taken, 0 if untouched
+    starts        (n,): places the steps were started from, 0 if untouched
     second_answers (n,): QPs that another solver had to answer
-    searched      (n,): 1 where contact points were projected again at the corrected pose
+    searched      (n,): 1 if contact points were projected again at the corrected pose
     """
 
     start: int

@@ -36,7 +36,7 @@ def simulate_block(
         found = resolver.resolve(raw, relative, deviations)
         _put(block, resolver, found)
         worst[found.touched] = np.maximum(worst[found.touched], _outcome(found))
-    unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are no numbers touch nothing
+    unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
     worst[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED])

@@ -14,7 +14,7 @@ TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 
 
 class Surfaces(NamedTuple):
-    """What was found at some poses, both (row, pair) [mm]; NaN for pairs that are no faces.
+    """What was found at some poses, both (row, pair) [mm]; NaN for pairs that are not faces.
 
     penetration   largest depth of one face in the other's body, seen at many points of both
     beside        how far contact points that touch stand beside the rim of the reference face, which is not there

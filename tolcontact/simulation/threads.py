@@ -75,14 +75,14 @@ def map_blocks(
         while begun:
             yield finish_one()
     finally:
-        pool.shutdown(wait=False, cancel_futures=True)  # where all went well none is left; a stopped run does not wait
+        pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped run does not wait
 
 
 def block_rows(program: Program) -> int:
-    """Realizations that are simulated together: a power of two, and fewer where one of them takes long.
+    """Realizations that are simulated together: a power of two, and fewer if one of them takes long.
 
     What it takes grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
-    should end within seconds: then it is safe, and somebody who waits sees it.
+    should end within seconds: then it is safe, and visible as progress.
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS

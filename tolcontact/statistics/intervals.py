@@ -48,7 +48,7 @@ def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
 def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
     """Percentiles; the intervals run between order statistics (binomial, distribution-free).
 
-    A bound is infinite where the sample is too small to have one.
+    A bound is infinite if the sample is too small to have one.
     """
     x = Sample.of(x)
     ranks = [_ranks(x.count, percent / 100) for percent in percents]

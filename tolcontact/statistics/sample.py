@@ -43,7 +43,7 @@ class Sample:
         return float(sums[0] / self.count), float(sums[1] / self.count)
 
     def ordered(self, ranks: Sequence[int]) -> np.ndarray:
-        """The values of some ranks: 0 is the least, count - 1 the largest. NaN where one of the numbers is not finite.
+        """The values of some ranks: 0 is the least, count - 1 the largest. NaN if one of the numbers is not finite.
 
         What does not fit into memory is not sorted: digit by digit, the numbers are counted by the digits that they begin with.
         """

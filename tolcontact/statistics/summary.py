@@ -1,4 +1,4 @@
-"""What a run says about each measure, each part and the contact, read from its archive alone, piece by piece."""
+"""What a run shows about each measure, each part and the contact, read from its archive alone, piece by piece."""
 
 from collections import Counter
 
@@ -34,11 +34,11 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     magnitude_realizations                               and in their magnitudes
 
     The attribute `realizations` is the number of those that are finished, `samples` of those that the run was begun for.
-    Raises ArchiveError where fewer than LEAST realizations are finished.
+    Raises ArchiveError if fewer than LEAST realizations are finished.
     """
     done = finished(results)
     if done < LEAST:
-        raise ArchiveError(f"{done} realizations are finished, which is too few for statistics; go on with --resume")
+        raise ArchiveError(f"{done} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
     measures = range(rows.sizes[words.MEASURE])
     samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
@@ -94,7 +94,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
 
 
 def in_conflict(rows: xr.Dataset) -> np.ndarray:
-    """Which pairs contradict each other where no pose is free of penetration, (realization, pair) bool.
+    """Which pairs contradict each other if no pose is free of penetration, (realization, pair) bool.
 
     These are the pairs that the pose of least penetration leaves inside each other.
     """
@@ -144,7 +144,7 @@ def _iterations(rows: xr.Dataset) -> list[float]:
 
 
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
-    """The smallest tolerance range above 0 of any locator or measure [mm]; infinite where there is none."""
+    """The smallest tolerance range above 0 of any locator or measure [mm]; infinite if there is none."""
     locators = results["sample"].to_dataset()[words.TOLERANCE_RANGE.name].values
     ranges = np.concatenate(
         [locators, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
@@ -153,7 +153,7 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
 
 
 def _begun_for(results: xr.DataTree, done: int) -> int:
-    """How many realizations the run was begun for; those that are there, if somebody took them from an archive."""
+    """How many realizations the run was begun for; those that are there, if they were taken from an archive."""
     samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[words.REALIZATION]
     unfinished = size > done or size == words.FIRST_ROWS
     return max(samples, done) if unfinished else done
@@ -191,7 +191,7 @@ def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
 
 
 def _summed(results: xr.DataTree, part: str) -> int:
-    """How many realizations are in the field of a part; 0 where it is being written."""
+    """How many realizations are in the field of a part; 0 if it is being written."""
     field = _field(results, part)
     if words.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
         return results.to_dataset().sizes[words.REALIZATION]

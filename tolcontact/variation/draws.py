@@ -29,7 +29,7 @@ _BITS = 52
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
     """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locators`.
 
-    Raises ModelError for a distribution that gives no finite numbers.
+    Raises ModelError for a distribution that yields non-finite deviations.
     """
     deviations = np.empty((stop - start, len(nominal.locators)))
     for column, (label, tolerance) in enumerate(zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)):
@@ -37,7 +37,7 @@ def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
         if not np.isfinite(deviations[:, column]).all():
             raise ModelError(
                 nominal.assembly.name,
-                [f'locator "{label}": its distribution, {tolerance}, gives deviations that are no finite numbers'],
+                [f'locator "{label}": its distribution, {tolerance}, yields non-finite deviations'],
             )
     return deviations
 

@@ -63,11 +63,11 @@ GAP_MIN = Variable(
     "gap_min",
     (REALIZATION, STATE, PAIR),
     "f8",
-    "least gap of all contact points of a pair, negative is penetration",
+    "smallest gap of all contact points of a pair; negative: penetration",
     "mm",
 )
 ACTIVE = Variable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
-CARRYING = Variable("carrying", (REALIZATION, PAIR), "i4", "number of contact points that carry in the corrected state", "1")
+CARRYING = Variable("carrying", (REALIZATION, PAIR), "i4", "number of contact points under load in the corrected state", "1")
 REACTION = Variable("reaction", (REALIZATION, PAIR), "f8", "sum of the reactions of the contact points of a pair")
 KKT_RESIDUAL = Variable(
     "kkt_residual",
@@ -76,22 +76,22 @@ KKT_RESIDUAL = Variable(
     "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
     "mm",
 )
-ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "linear steps that the contact problem took", "1")
-STARTS = Variable("starts", (REALIZATION,), "i1", "places that the steps to an answer were started from", "1")
-SECOND_ANSWERS = Variable("second_answers", (REALIZATION,), "i4", "QPs that another solver had to answer", "1")
+ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "number of linear steps that the contact problem took", "1")
+STARTS = Variable("starts", (REALIZATION,), "i1", "number of places that the steps were started from", "1")
+SECOND_ANSWERS = Variable("second_answers", (REALIZATION,), "i4", "number of QPs that another solver had to answer", "1")
 SEARCHED = Variable(
     "searched",
     (REALIZATION,),
     "i1",
-    "1: contact points were projected again at the corrected pose, onto curved faces, and gap_min is of those; 0: it is of "
-    "the archived ones",
+    "1: contact points were projected again at the corrected pose, onto curved faces, and gap_min refers to those; "
+    "0: it refers to the archived ones",
     "1",
 )
 STATUS = Variable(
     "status",
     (REALIZATION,),
     "i1",
-    "what became of the realization",
+    "outcome of the realization",
     None,
     {
         "flag_values": [UNFINISHED, *range(len(STATUS_MEANINGS))],
@@ -133,7 +133,7 @@ MEASURE_TOLERANCE = Variable(
     "measure_tolerance",
     (MEASURE,),
     "f8",
-    "full width of the allowed zone around the nominal value; NaN where none is set",
+    "full width of the allowed zone around the nominal value; NaN if none is set",
 )
 MEASURE_UNITS = Variable("measure_units", (MEASURE,), str, "units of the measure")
 
@@ -154,7 +154,7 @@ LOCATOR_OF_POINT = Variable(
     "locator_of_point",
     (POINT,),
     "i4",
-    "number of the one-sided locator that a contact point stands for: its gap is less by the locator's deviation; -1: none",
+    "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
 )
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator")
@@ -162,7 +162,7 @@ TOLERANCE_RANGE = Variable(
     "tolerance_range",
     (LOCATOR,),
     "f8",
-    "full width of the tolerance zone; NaN where a distribution says everything",
+    "full width of the tolerance zone; NaN if the distribution alone defines the spread",
     "mm",
 )
 DISTRIBUTION = Variable("distribution", (LOCATOR,), str, "distribution of the deviation")
@@ -214,7 +214,7 @@ BESIDE = Variable(
     "beside",
     (CHECKED, PAIR),
     "f8",
-    "how far contact points that touch stand beside the rim of the reference face; NaN where that is not known",
+    "how far contact points that touch lie outside the rim of the reference face; NaN if that is not known",
     "mm",
 )
 SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE)
@@ -222,7 +222,7 @@ GROUP_CHECKSUM = Variable(
     "checksum",
     (),
     "i8",
-    "CRC-32 of what this group holds beside what is written once, one after the other; -1: being written",
+    "CRC-32 of the variables of this group that may be overwritten, in their order; -1: being written",
     "1",
 )
 SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
@@ -230,14 +230,14 @@ FIELD_SUMS = Variable(
     "sums",
     (CHECKPOINT, STATE, NUMBER),
     "f8",
-    "running sums of the displacement field, from which an unfinished run goes on",
+    "running sums of the displacement field, from which an unfinished run continues",
     "1",
 )
 SUMS_CHECKSUM = Variable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of the sums of a checkpoint", "1")
 
 
 def group_of(part: str) -> str:
-    """The name of a part's groups: its own, with an underscore behind it where it is a name of the archive.
+    """The name of a part's groups: its own, with an underscore behind it if it is a name of the archive.
 
     xarray hands the coordinates of the root on to all groups, and a group cannot be called like one of them.
     """

@@ -19,7 +19,7 @@ from tolcontact.vocabulary import CORRECTED
 from tolcontact.workflow.run import Choice, Model, check_counts, chosen, declared
 
 WARM_UP = 64  # realizations before the clock runs
-SPEAKS = ("resolution", "objective")  # words whose values say what they are
+SPEAKS = ("resolution", "objective")  # choices whose values are clear by themselves
 QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
@@ -37,13 +37,13 @@ def compare(
 
     Labels along the dimension `solver` name the solver, and what the methods differ in.
 
-    seconds            (solver)                   wall time of all realizations, from draws to measures [s]
-    by_status          (solver, status_meaning)   number of realizations
-    kkt_residual       (solver)                   largest of the realizations that count as resolved [mm]
-    penetration        (solver)                   largest true penetration left [mm]
-    pose_difference    (solver, extent)           largest distance of a part's bounding corners between both answers [mm]
-    measure_difference (solver, extent, measure)  in the measure's units
-    both_resolved      (solver)                   number of realizations that count in the differences
+        seconds            (solver)                   wall time of all realizations, from draws to measures [s]
+        by_status          (solver, status_meaning)   number of realizations
+        kkt_residual       (solver)                   largest of the certified realizations [mm]
+        penetration        (solver)                   largest true penetration left [mm]
+        pose_difference    (solver, extent)           largest distance of a part's bounding corners between both answers [mm]
+        measure_difference (solver, extent, measure)  in the measure's units
+        both_resolved      (solver)                   number of realizations that the differences cover
 
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
@@ -96,7 +96,7 @@ def _simulated(program: Program, samples: int, seed: int) -> dict[str, Any]:
 
 
 def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
-    """What tells a method from the others."""
+    """What distinguishes a method from the others."""
     names = [field.name for field in fields(Method) if len({getattr(each, field.name) for each in methods}) > 1]
     return [_said(name, getattr(method, name)) for name in names]
 
@@ -125,7 +125,7 @@ def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
 
 
 def _extent(values: np.ndarray) -> np.ndarray:
-    """Median and largest value along the first dimension; NaN where there is none."""
+    """Median and largest value along the first dimension; NaN if there is none."""
     if not len(values):
         return np.full((len(QUANTILES), *values.shape[1:]), np.nan)
     return np.asarray(np.quantile(values, list(QUANTILES.values()), axis=0))

@@ -1,4 +1,4 @@
-"""What a run will take, said before it begins: size, time, memory, disk."""
+"""What a run will take, announced before it begins: size, time, memory, disk."""
 
 import logging
 import time
@@ -10,7 +10,7 @@ from tolcontact.vocabulary import BLOCK_ROWS
 
 try:
     import resource
-except ImportError:  # not on Windows, where memory is not told
+except ImportError:  # not on Windows, where memory is not known
     resource = None  # type: ignore[assignment]
 
 TRIAL = 4  # realizations
@@ -37,7 +37,7 @@ def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
             else f", {size_in_words(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)} of memory"
         )
         log.warning(
-            "%d parts, %d contact pairs, %d contact points: %d realizations will take some %s%s, and %s in an archive",
+            "%d parts, %d contact pairs, %d contact points: %d realizations will take about %s%s, and %s in an archive",
             len(nominal.parts), len(nominal.pairs), points, samples, _duration(seconds), memory,
             size_in_words(bytes_of_rows(nominal, keep, samples)),
         )  # fmt: skip

@@ -29,13 +29,13 @@ SURFACES = 64
 FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be
 Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
-Choice = Method | Mapping[str, Any]  # a method, or some of its words, the others as the model says
+Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the others are the model's
 
 
 def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
     """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
 
-    `method` is used instead of the model's own; of a mapping, such as {"resolution": "exact"}, its words only.
+    `method` is used instead of the model's own; a mapping, such as {"resolution": "exact"}, replaces single choices.
     Raises ModelError with all its faults, OptionError for a solver or a method that cannot be used.
     """
     assembly = declared(model)
@@ -43,7 +43,7 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
 
 
 def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
-    """What is wrong with a model, every fault; nothing where it can be built (see `build`)."""
+    """Every fault of a model; none if it can be built (see `build`)."""
     try:
         build(model, solver=solver, method=method)
     except ModelError as error:
@@ -52,14 +52,14 @@ def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
 
 
 def chosen(assembly: Assembly, method: Choice | None) -> Method:
-    """The method that an assembly is resolved with. Raises OptionError for a word that no method has."""
+    """The method that an assembly is resolved with. Raises OptionError for a choice that no method has."""
     own = assembly.method or Method()
     if method is None or isinstance(method, Method):
         return method or own
     known = [field.name for field in fields(Method)]
     for word in method:
         if word not in known:
-            raise OptionError(f"a method has no {word!r}; expected some of: {', '.join(known)}")
+            raise OptionError(f"a method has no choice {word!r}; expected some of: {', '.join(known)}")
     return replace(own, **method)
 
 
@@ -95,7 +95,7 @@ def run(
 
     `model` is what `build` takes, or what it gives: a Program, which has its solver and method (else qpoases, and the
     model's own method).
-    Without `out` the results are kept in memory only. `keep` says what is kept of each realization: "measures" (with gaps,
+    Without `out` the results are kept in memory only. `keep` states what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
     `fields` says over how many realizations, the first ones, the magnitudes of displacements are summed up: a number, "all" or
     "none"; their components are always exact, over all realizations.
@@ -130,7 +130,7 @@ def run(
     if out is None:
         for word, value in {"overwrite": overwrite, "resume": resume}.items():
             if value:
-                raise OptionError(f"{word} speaks of an archive, and none is named; name it: out=...")
+                raise OptionError(f"{word} needs an archive, and none is named; name one: out=...")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "results.nc"
             write(path)
@@ -178,7 +178,7 @@ def _simulate(
 def summarize(results: xr.DataTree | str | Path) -> xr.Dataset:
     """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize).
 
-    Raises ArchiveError where realizations are not what was written, or fewer than two are finished.
+    Raises ArchiveError if realizations are not what was written, or if fewer than two are finished.
     """
     if isinstance(results, str | Path):
         with open_archive(results) as tree:
@@ -196,4 +196,4 @@ def check_counts(**counts: int) -> None:
     for word, value in counts.items():
         least = {"samples": 2, "seed": 0, "surfaces": 0}[word]
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
-            raise OptionError(f"{word} is {value!r}; expected a whole number, {least} or above and below 2^63")
+            raise OptionError(f"{word} is {value!r}; expected a whole number, at least {least} and below 2^63")

@@ -18,7 +18,7 @@ LARGEST = 300_000  # instructions that are compiled; more are interpreted, since
 class AdaptiveFunction:
     """A Function of scalar expressions: interpreted by CasADi, compiled once it was evaluated often. Threads may share it.
 
-    Both ways give the same to the last bit, so that nobody needs to know which one it was.
+    Both ways give the same to the last bit, so that it does not matter which one it was.
     """
 
     def __init__(self, function: ca.Function) -> None:

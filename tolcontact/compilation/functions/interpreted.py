@@ -28,7 +28,7 @@ class InterpretedFunction:
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """For the inputs (realization, stored entry) that are not given: outputs, likewise, and `failed` (realization,).
 
-        Outputs are NaN where the evaluation gave up.
+        Outputs are NaN if the evaluation gave up.
         """
         count = len(inputs[0])
         results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
@@ -85,7 +85,7 @@ class _Buffers:
         self.is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
-        """Evaluate for up to `width` realizations; idle places repeat the last one. False where the Function gave up."""
+        """Evaluate for up to `width` realizations; idle places repeat the last one. False if the Function gave up."""
         count = len(inputs[0])
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:count] = array
@@ -94,7 +94,7 @@ class _Buffers:
             # A first evaluation makes what the Function needs. Plugins may print in any.
             with MAKING if self.is_new else contextlib.nullcontext(), quiet():
                 self._evaluate()
-        except RuntimeError:  # CasADi's only exception: bounds that are no numbers
+        except RuntimeError:  # CasADi's only exception: bounds that are not numbers
             return False
         self.is_new = False
         for buffer, array in zip(self._outputs, outputs, strict=True):

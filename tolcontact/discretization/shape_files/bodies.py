@@ -18,7 +18,7 @@ SHOWN = 12  # bodies that a message lists
 
 @dataclass(frozen=True)
 class Body:
-    """A body: its `name`, "" if it has none, and its corners (3,); None where its triangles are not told from others'."""
+    """A body: its `name`, "" if it has none, and its corners (3,); None if its triangles are not known."""
 
     name: str
     lower: np.ndarray | None = None
@@ -51,7 +51,7 @@ class Triangles:
 
 
 def bodies(triangles: Triangles, solids: Sequence[Solid]) -> list[Body]:
-    """The bodies of a file whose text tells of some `solids`."""
+    """The bodies of a file whose text names some `solids`."""
     pieces = np.unique(triangles.piece)
     if len(pieces) == 1:
         count = int(triangles.brep.max()) + 1

@@ -70,7 +70,7 @@ def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iter
                     env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "4"},
                 )
             except OSError as error:
-                yield from [GeometryFault(f'"{path}": the reader of files cannot be started ({error})') for path, _ in files]
+                yield from [GeometryFault(f'"{path}": its reader process cannot be started ({error})') for path, _ in files]
                 return
         try:
             _awaited(process, START, folder / "ready")
@@ -115,6 +115,6 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
     if code < 0:
         known = code in {-known for known in signal.Signals}
         what = f"signal {-code}" + (f", {signal.Signals(-code).name}" if known else "")
-        return f"is damaged: it brought its reader down ({what}); export it again"
+        return f"is damaged: it crashed its reader process ({what}); export it again"
     last = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
-    return f"was not read: its reader ended with exit code {code} ({clipped(last) or 'without a word'}); export it again"
+    return f"was not read: its reader process ended with exit code {code} ({clipped(last) or 'no message'}); export it again"

@@ -24,7 +24,7 @@ BREP = "brep_index"  # the B-rep face of each triangle
 
 @dataclass(frozen=True)
 class Shape:
-    """A part's surface in mm. `unsure`: its units are those that its kind of file counts in by custom; nobody stated them."""
+    """A part's surface in mm. `unsure`: its units were not stated, and are those that are usual for its kind of file."""
 
     mesh: trimesh.Trimesh
     unsure: bool = False
@@ -32,7 +32,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds, as `worker` reads it, and what its text says if it is a STEP file."""
+    """What a file holds, as `worker` reads it, and the content of its text if it is a STEP file."""
 
     arrays: Mapping[str, np.ndarray]
     text: StepText | None
@@ -65,8 +65,8 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
 def read(geometry: Mesh, contents: Contents) -> Shape:
     """The triangles of a mesh geometry. `contents` hold that of its file, if it has one.
 
-    Raises GeometryFault where the file cannot be read, is too large or holds several bodies, where coordinates are no
-    numbers or far off, or where its units are unknown.
+    Raises GeometryFault if the file cannot be read, is too large or holds several bodies, if coordinates are not finite
+    or far off, or if its units are unknown.
     """
     source = geometry.source
     if not isinstance(source, str | Path):
@@ -86,7 +86,7 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     source = geometry.source
     own = trimesh.Trimesh(source.vertices, source.faces, process=False)
     if len(own.faces) and not 0 <= own.faces.min() <= own.faces.max() < len(own.vertices):
-        raise GeometryFault(f"{geometry}: its triangles name vertices that it does not have ({len(own.vertices)} in all)")
+        raise GeometryFault(f"{geometry}: its triangles refer to vertices beyond the {len(own.vertices)} that it has")
     if len(own.faces) > MAX_TRIANGLES:
         raise GeometryFault(screening.too_many(geometry, len(own.faces), MAX_TRIANGLES))
     own.apply_scale(_scale(geometry, getattr(source, "units", None)))
@@ -96,7 +96,7 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
 
 
 def _scale(geometry: Mesh, own: str | None) -> float:
-    """How many mm the unit of a geometry has, whose source says that it is its `own`."""
+    """How many mm the unit of a geometry has, whose source states its `own`."""
     said = geometry.units or own
     if said is None:
         return 1.0
@@ -104,25 +104,25 @@ def _scale(geometry: Mesh, own: str | None) -> float:
         return UNITS.get(said) or float(trimesh.units.unit_conversion(said, "mm"))
     except ValueError as error:
         raise GeometryFault(
-            f'{geometry} says that it counts in "{said}", which is no known unit; say tc.Mesh(..., units="mm")'
+            f'{geometry} declares the unit "{said}", which is not known; state another one: tc.Mesh(..., units="mm")'
         ) from error
 
 
 def _check_numbers(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     if not np.isfinite(mesh.vertices).all():
-        raise GeometryFault(f"{geometry} holds vertices that are not finite numbers; export it again")
+        raise GeometryFault(f"{geometry} has vertices that are not finite; export it again")
     far = float(np.abs(mesh.vertices).max(initial=0))
     if far > FAR:
         raise GeometryFault(
-            f"{geometry} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or counts in other "
-            "units: export it again, or give units"
+            f"{geometry} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or in other "
+            "units: export it again, or state its units"
         )
 
 
 def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
     """A mesh in which the vertices of neighbouring triangles are one: rims, smooth normals and bodies are read from them.
 
-    A piece (face,) that is closed by itself is a body, and keeps its vertices where it touches others; open ones may be
+    A piece (face,) that is closed by itself is a body, and keeps its vertices if it touches others; open ones may be
     parts of one body.
     """
     group = np.zeros(len(own.faces), dtype=np.int64)

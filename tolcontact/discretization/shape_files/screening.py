@@ -8,7 +8,7 @@ from tolcontact.discretization.fault import GeometryFault, clipped
 from tolcontact.discretization.shape_files.step_text import StepText, step_text
 
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")
-HEAD = 10_000  # [byte] that are looked at where a file says what it is
+HEAD = 10_000  # [byte] that are read to find out what a file is
 _PLY_ELEMENT = re.compile(rb"^element (\w+) (\d+)", re.MULTILINE)
 # How files begin that come under a wrong name, and what to do.
 _MARKS = (
@@ -34,9 +34,9 @@ def kind(path: Path) -> str:
 
 
 def screen(path: Path, most: int) -> StepText | None:
-    """Look at a file that may hold up to `most` triangles. Returns what the text of a STEP file says.
+    """Look at a file that may hold up to `most` triangles. Returns what the text of a STEP file states.
 
-    Raises GeometryFault where it is plain that the file cannot be read, or not rightly.
+    Raises GeometryFault if the file plainly cannot be read, or not correctly.
     """
     suffix = path.suffix.lower()
     if suffix not in (*MESHES, *STEP):
@@ -63,14 +63,14 @@ def screen(path: Path, most: int) -> StepText | None:
         case ".glb":
             said = int.from_bytes(head[8:12], "little")
             if said > size:
-                raise GeometryFault(f'"{path}" is cut off: it says that it has {said} bytes, and has {size}; export it again')
+                raise GeometryFault(f'"{path}" is cut off: its header states {said} bytes, but it has {size}; export it again')
         case ".step" | ".stp":
             return _check_step(path)
     return None
 
 
 def too_many(what: object, count: int, most: int) -> str:
-    """What is said of a shape of `count` triangles, more than the `most`."""
+    """The message for a shape of `count` triangles, more than the `most`."""
     return (
         f'"{what}" holds {count} triangles, more than the limit of {most}; contact points need no finer mesh than '
         "their spacing, so simplify it"
@@ -88,11 +88,11 @@ def _check_kind(path: Path, head: bytes) -> None:
     for mark, what, advice in _MARKS:
         step = suffix in STEP and mark == b"ISO-10303-21"
         if start[: len(mark)].lower() == mark.lower() and not step and mark not in _OWN.get(suffix, ()):
-            raise GeometryFault(f'"{path}" is {what} by what it holds, not {_article(suffix)} file; {advice}')
+            raise GeometryFault(f'"{path}" is {what} by its content, not {_article(suffix)} file; {advice}')
     if suffix in STEP and b"ISO-10303-21" not in head:
-        raise GeometryFault(f'"{path}" is no STEP file: it does not begin with ISO-10303-21; export it again')
+        raise GeometryFault(f'"{path}" is not a STEP file: it does not begin with ISO-10303-21; export it again')
     if suffix in (".ply", ".glb") and not start.startswith(_OWN[suffix]):
-        raise GeometryFault(f'"{path}" is no {suffix[1:].upper()} file: it does not begin like one; export it again')
+        raise GeometryFault(f'"{path}" is not a {suffix[1:].upper()} file: it does not begin like one; export it again')
 
 
 def _article(suffix: str) -> str:
@@ -101,7 +101,7 @@ def _article(suffix: str) -> str:
 
 
 def _announced(path: Path, head: bytes, size: int) -> int:
-    """How many triangles a file says that it holds, as far as that can be told without reading it all into memory."""
+    """How many triangles a file announces, as far as that is known without reading it all into memory."""
     suffix = path.suffix.lower()
     if suffix == ".stl" and size == _stl_size(head):
         return int.from_bytes(head[80:84], "little")
@@ -123,27 +123,27 @@ def _check_stl(path: Path, head: bytes, size: int) -> None:
                 raise GeometryFault(f'"{path}" is cut off: it does not end with "endsolid"; export it again')
         return
     if size < 84:
-        raise GeometryFault(f'"{path}" is cut off, or no STL file at all: it has {size} bytes; export it again')
+        raise GeometryFault(f'"{path}" is cut off, or not an STL file at all: it has {size} bytes; export it again')
     count, expected = int.from_bytes(head[80:84], "little"), _stl_size(head)
-    what = "is cut off, or no STL file at all" if size < expected else "is damaged, or no STL file at all"
+    what = "is cut off, or not an STL file at all" if size < expected else "is damaged, or not an STL file at all"
     raise GeometryFault(
-        f'"{path}" {what}: it announces {count} triangles, which take {expected} bytes, and has {size}; export it again'
+        f'"{path}" {what}: it announces {count} triangles, which take {expected} bytes, but has {size}; export it again'
     )
 
 
 def _check_ply(path: Path, head: bytes, size: int) -> None:
     if b"end_header" not in head:
-        raise GeometryFault(f'"{path}" is no PLY file, or cut off: its header does not end; export it again')
+        raise GeometryFault(f'"{path}" is not a PLY file, or cut off: its header does not end; export it again')
     rows = sum(int(count) for _, count in _PLY_ELEMENT.findall(head))
     if rows > size:  # each takes a byte at least
         raise GeometryFault(
-            f'"{path}" is cut off or damaged: it announces {rows} vertices, faces and the like, and has {size} bytes; '
+            f'"{path}" is cut off or damaged: it announces {rows} vertices, faces and other elements, but has {size} bytes; '
             "export it again"
         )
     if b"format ascii" in head:
         found = sum(1 for line in path.read_bytes().partition(b"end_header")[2].splitlines() if line.strip())
         if found < rows:
-            raise GeometryFault(f'"{path}" is cut off: it announces {rows} lines of numbers, and has {found}; export it again')
+            raise GeometryFault(f'"{path}" is cut off: it announces {rows} lines of numbers, but has {found}; export it again')
 
 
 def _check_step(path: Path) -> StepText:
@@ -152,7 +152,7 @@ def _check_step(path: Path) -> StepText:
     elsewhere = said.files or (() if b"_SHELL" in content else said.documents)
     if elsewhere:
         raise GeometryFault(
-            f'"{path}" leaves shapes to other files ({_listed(elsewhere)}), which are not read; give the file of the part '
+            f'"{path}" refers to other files for shapes ({_listed(elsewhere)}), which are not read; give the file of the part '
             "itself, or export it as one file without external references"
         )
     if b"END-ISO-10303-21" not in content:

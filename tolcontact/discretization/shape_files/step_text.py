@@ -1,4 +1,4 @@
-"""What the text of a STEP file (ISO 10303-21) says of its solids, and of files that it refers to."""
+"""What the text of a STEP file (ISO 10303-21) states about its solids, and about files that it refers to."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -37,7 +37,7 @@ class StepText:
 
 
 def step_text(content: bytes) -> StepText:
-    """What a STEP file's `content` says; of damaged ones, what can still be told."""
+    """What a STEP file's `content` states; of damaged ones, what is still legible."""
     solids: list[tuple[str, list[int]]] = []
     shells: dict[int, list[int]] = {}
     oriented: dict[int, list[int]] = {}

@@ -45,9 +45,9 @@ class OwnFolder(trimesh.resolvers.Resolver):  # type: ignore[misc]
     def get(self, name: str) -> bytes:
         path = (self.folder / name).resolve()
         if "://" in name or not path.is_relative_to(self.folder):
-            raise Refused(f'refers to "{name}", which does not lie in its folder; export it as one file (GLB)')
+            raise Refused(f'refers to "{name}", which is outside its folder; export it as one file (GLB)')
         if not path.is_file():
-            raise Refused(f'refers to "{name}", which is not there; put it beside it, or export it as one file (GLB)')
+            raise Refused(f'refers to "{name}", which does not exist; put it beside it, or export all as one file (GLB)')
         return path.read_bytes()
 
     def write(self, name: str, data: Any) -> None:
@@ -75,7 +75,7 @@ def read_mesh(path: Path, kind: str) -> Arrays:
         raise
     except Exception as error:  # trimesh's readers raise whatever their format's parser raises
         if isinstance(error, UnicodeDecodeError) or getattr(error, "name", "") in GUESSERS:
-            raise Refused("is damaged: where it should hold words, it holds none; export it again") from error
+            raise Refused("is damaged: it does not contain text where it should; export it again") from error
         raise Refused(
             f"cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB"
         ) from error
@@ -89,11 +89,11 @@ def read_mesh(path: Path, kind: str) -> Arrays:
 
 
 def check_json(content: bytes) -> None:
-    """Refuse what is no glTF: trimesh would look for another file then."""
+    """Refuse what is not glTF: trimesh would look for another file then."""
     try:
         json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise Refused("is no glTF file: it is no JSON; export it again, as one file (GLB) at best") from error
+        raise Refused("is not a glTF file: it is not JSON; export it again, preferably as one file (GLB)") from error
 
 
 def plain(content: bytes) -> bytes:
@@ -109,7 +109,7 @@ def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
     """All pieces of a STEP file in their places [m]: one per place where a product with a shape of its own stands.
 
     Beside `joined`, `brep` (face,) numbers the B-rep faces within their piece, `names` (piece,) are the file's, and
-    `coloured` (piece,) says which are of several colours, and so have their B-rep faces out of order.
+    `coloured` (piece,) marks those of several colours, which have their B-rep faces out of order.
     """
     if cascadio is None:
         raise Refused('is a STEP file, which needs the package cascadio; install it with: pip install "tolcontact[step]"')
@@ -202,7 +202,7 @@ def joined(found: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:
     count = 0
     for k, (own, triangles) in enumerate(found):
         if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(own):
-            raise Refused(f"is damaged: its triangles name vertices that it does not have ({len(own)} in all); export it again")
+            raise Refused(f"is damaged: its triangles refer to vertices beyond the {len(own)} that it has; export it again")
         vertices.append(own)
         faces.append(triangles + count)
         piece.append(np.full(len(triangles), k))
@@ -222,7 +222,7 @@ def limit(memory: int, seconds: int) -> None:
         for what, most in limits.items():
             _, hard = resource.getrlimit(what)
             own = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            with contextlib.suppress(OSError, ValueError):  # where the system knows no such limit
+            with contextlib.suppress(OSError, ValueError):  # if the system knows no such limit
                 resource.setrlimit(what, (own, own))
 
 
@@ -246,8 +246,8 @@ def work(folder: Path) -> None:
             )
         except Refused as refused:
             say(folder, k, str(refused))
-        except Exception as error:  # whatever a file of a stranger brings about is said of that file
-            say(folder, k, f"is damaged or of a kind that is not known ({type(error).__name__}: {error}); export it again")
+        except Exception as error:  # whatever a file causes is reported as its fault
+            say(folder, k, f"is damaged, or of an unknown kind ({type(error).__name__}: {error}); export it again")
 
 
 def save(folder: Path, k: int, arrays: Arrays) -> None:

@@ -32,7 +32,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
-    yield Text("Estimates with their 95 % confidence intervals; changes from the same draws.")
+    yield Text("Estimates with their 95 % confidence intervals; changes are from the same draws.")
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
     magnitudes = int(summary["magnitude_realizations"])
@@ -50,7 +50,7 @@ def grouped(count: int) -> str:
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Columns as wide as their cells; where they need more than WIDTH, each interval goes below its estimate."""
+    """Columns as wide as their cells; if they need more than WIDTH, each interval goes below its estimate."""
     widths = [max(len(row[k]) for row in [columns, *rows]) for k in range(len(columns))]
     if sum(widths) + 2 * len(widths) > WIDTH:
         rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
@@ -98,12 +98,13 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
     stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
     if stuck:
-        yield f"not assemblable: {percent(summary['not_assemblable'].values)}; their poses of least penetration count above"
+        share = percent(summary["not_assemblable"].values)
+        yield f"not assemblable: {share}; least-penetration poses are included"
         yield f"pairs in conflict there: {', '.join(stuck)}"
     if unsure := by_status["not_converged"]:
-        yield f"not converged: {unsure} of {count}; the poses where their steps ended count above"
+        yield f"not converged: {unsure} of {count}; their last poses are included above"
     if doubtful := by_status["doubtful"]:
-        yield f"doubtful: {doubtful} of {count} answers lie far from the raw pose, where faces are not what they were"
+        yield f"doubtful: {doubtful} of {count} answers lie too far from the raw pose to be certified"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
@@ -120,18 +121,20 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     if math.isfinite(depth):
         yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
-            yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, between contact points; use more points"
+            yield f"advice: it exceeds {ADVISED:.0%} of the smallest tolerance range; use more contact points"
         if beside > limit:
-            yield f"contact points that touch stand up to {beside:.3g} mm beside their reference face"
+            yield f"contact points that touch lie up to {beside:.3g} mm beside their reference face"
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     """What to do about penetration that a linear step, or the paper's set of active points, has left."""
     limit = ADVISED * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
-        yield f"advice: points that were not active at first penetrate by up to {penetration:.3g} mm; use the closed active set"
-    elif summary.attrs["resolution"] == "linearized" and (penetration > limit or _by_status(summary)["not_converged"]):
-        yield f"advice: more than {ADVISED:.0%} of the smallest tolerance range, or not converged; use --resolution exact"
+        yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
+    elif summary.attrs["resolution"] == "linearized" and penetration > limit:
+        yield f"advice: penetration exceeds {ADVISED:.0%} of the smallest range; use --resolution exact"
+    elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
+        yield "advice: some realizations did not converge; use --resolution exact"
 
 
 def _by_status(summary: xr.Dataset) -> dict[str, int]:
@@ -139,7 +142,7 @@ def _by_status(summary: xr.Dataset) -> dict[str, int]:
 
 
 def number(values: object, *, sign: bool = False, most: int = MAX_DECIMALS) -> str:
-    """`estimate [lower, upper]`, with as many decimals (`most` at most) as its width deserves; "-" where there is none."""
+    """`estimate [lower, upper]`, with as many decimals (`most` at most) as its width deserves; "-" if there is none."""
     estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
     if not math.isfinite(estimate):
         return "-"
@@ -155,7 +158,7 @@ def number(values: object, *, sign: bool = False, most: int = MAX_DECIMALS) -> s
 
 
 def _digits(width: float) -> int:
-    """One more digit where the first one of the half width is 1 or 2, so that rounding stays below a fifth of it."""
+    """One more digit if the first one of the half width is 1 or 2, so that rounding stays below a fifth of it."""
     return 1 if width / 10 ** math.floor(math.log10(width)) < 3 else 0
 
 
