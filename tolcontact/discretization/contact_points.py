@@ -108,7 +108,7 @@ def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndar
         if error > CHORD * finest:
             warnings.warn(
                 f"{where('contact pair', pair)}: parts may be off by up to {error:.2g} mm {seen}, "
-                f"{error / finest:.2g} of the smallest tolerance range, {finest:.4g} mm; {what}",
+                f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {what}",
                 ContactWarning,
                 stacklevel=6,
             )

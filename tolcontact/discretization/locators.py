@@ -79,6 +79,6 @@ class Locators:
         if not condition < CONDITION_LIMIT:
             raise GeometryFault(
                 f"its {len(J)} locators do not fix it: the locator matrix has condition number {condition:.1e}, the limit is "
-                f"{CONDITION_LIMIT:.0e}; no three points of the primary face may lie on a line, and the directions "
-                "together must hold all three translations and all three rotations"
+                f"{CONDITION_LIMIT:.0e}; the points of the primary face must not lie on a line, and the directions "
+                "together must constrain all three translations and all three rotations"
             )

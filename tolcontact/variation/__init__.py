@@ -35,7 +35,7 @@ with the realizations of a shorter one, and two solvers or two methods can be co
 >>> height = model.measure("height", part.point(50, 0, 10), along="z")
 >>> from tolcontact.variation import draw
 >>> nominal = tc.build(model).nominal
->>> nominal.locator_labels
+>>> nominal.locators.labels
 ('part.A1', 'part.A2', 'part.A3', 'part.B1', 'part.B2', 'part.C1')
 >>> deviations = draw(nominal, seed=1, start=0, stop=1000)  # (realization, locator) [mm]
 >>> bool((deviations[500:510] == draw(nominal, seed=1, start=500, stop=510)).all())
