@@ -25,9 +25,7 @@ LOOKED_AT = 4  # realizations whose surfaces are looked at
 
 def simulate(program: Program, samples: int) -> dict[str, np.ndarray]:
     """All blocks joined."""
-    blocks = list(simulate_blocks(program, samples=samples, seed=7))
-    names = [name for name in Block.__dataclass_fields__ if name != "start"]
-    return {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}
+    return vars(Block.joined(simulate_blocks(program, samples=samples, seed=7)))
 
 
 def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarray]) -> collections.Counter:

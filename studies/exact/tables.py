@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.statistics import intervals
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -30,8 +30,7 @@ def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = 
     start = time.perf_counter()
     blocks = list(simulate_blocks(program, samples=samples, seed=1))
     taken = time.perf_counter() - start
-    names = ("measured", "gap_min", "status", "iterations")
-    return {name: np.concatenate([getattr(block, name) for block in blocks]) for name in names}, taken
+    return vars(Block.joined(blocks)), taken
 
 
 def shifted(assembly: tc.Assembly, by=FAR) -> tc.Assembly:

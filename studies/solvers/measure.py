@@ -27,10 +27,9 @@ import qpsolvers
 from scipy.optimize import nnls
 
 import tolcontact as tc
-from tolcontact.compilation import contact_qp as contact_program
-from tolcontact.compilation import contact_solver, plugins
-from tolcontact.compilation.functions.batch import quiet
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.compilation import contact_qp, contact_solver, plugins
+from tolcontact.mechanics.quiet import quiet
+from tolcontact.simulation import simulate_block
 from tolcontact.variation.draws import draw
 
 mpl.use("Agg")
@@ -75,22 +74,22 @@ def models() -> dict[str, tc.Assembly]:
 
 def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     """The QPs of the first linear step, with a row for every contact point of the first group."""
-    kept = contact_program._standing
-    contact_program._standing = lambda gaps, _: np.arange(gaps.coordinates.shape[1])
+    kept = contact_qp.standing_points
+    contact_qp.standing_points = lambda gaps, _: np.arange(gaps.coordinates.shape[1])
     found: list[Problem] = []
-    solve = contact_solver.Mapped.__call__
+    solve = contact_solver.InterpretedFunction.__call__
 
     def record(self, inputs):
         if self._solvers and not found:
             found.extend(dict(zip("hgabc", (array[k].copy() for array in inputs), strict=True)) for k in range(len(inputs[0])))
         return solve(self, inputs)
 
-    contact_solver.Mapped.__call__ = record
+    contact_solver.InterpretedFunction.__call__ = record
     try:
         program = tc.build(assembly, solver="daqp", method=tc.Method())
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
-        contact_program._standing, contact_solver.Mapped.__call__ = kept, solve
+        contact_qp.standing_points, contact_solver.InterpretedFunction.__call__ = kept, solve
     functions = program.groups[0].program
     h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
     for one in found:

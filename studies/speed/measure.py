@@ -22,19 +22,21 @@ import peers
 import shapes
 
 import tolcontact as tc
-from tolcontact.archive import ArchiveWriter
-from tolcontact.compilation.functions import batch
+from tolcontact.archive import ArchiveWriter, Run, stored
+from tolcontact.compilation.functions import InterpretedFunction, adaptive
 from tolcontact.contact.scan import CompiledScan
-from tolcontact.simulation import blocks as running
 from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import threads as running
+from tolcontact.statistics import DisplacementFields
 from tolcontact.variation.draws import draw
+from tolcontact.vocabulary import BLOCK_ROWS
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 TURNS, PAIRS = 5, 11
-batch.ENOUGH = 0  # compile Functions at once: what counts here is the cost of many realizations
+adaptive.ENOUGH = 0  # compile Functions at once: what counts here is the cost of many realizations
 EXACT = tc.Method(resolution="exact")
 CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
@@ -51,7 +53,7 @@ def ours(
     solver: str = "daqp",
     threads: int = 1,
     method: tc.Method | None = None,
-    block: int = running.BLOCK,
+    block: int = BLOCK_ROWS,
 ) -> Contender:
     program = tc.build(assembly, solver=solver, method=method or tc.Method())
     list(simulate_blocks(program, samples=256, seed=1))
@@ -213,8 +215,8 @@ def against_bodies(samples: int) -> None:
 
 def against_packing(samples: int) -> None:
     """Blocks four times as large pack what four blocks leave unsolved into the same batches."""
-    packed = 4 * running.BLOCK
-    print(f"\n| exact | blocks of {running.BLOCK} [us] | of {packed}, packed [us] | packed / not |\n|---|---:|---:|---:|")
+    packed = 4 * BLOCK_ROWS
+    print(f"\n| exact | blocks of {BLOCK_ROWS} [us] | of {packed}, packed [us] | packed / not |\n|---|---:|---:|---:|")
     cases = {
         "RA1": model("ra1"),
         "curved, 3003": shapes.slab(3000, 200.0),
@@ -222,10 +224,10 @@ def against_packing(samples: int) -> None:
         "cells": model("cells"),
     }
     for name, a in cases.items():
-        sizes = (running.BLOCK, packed)
+        sizes = (BLOCK_ROWS, packed)
         cost = medians({size: ours(a, max(samples, packed), method=EXACT, block=size) for size in sizes})
         print(
-            f"| {name} | {' | '.join(f'{each:.1f}' for each in cost.values())} | {cost[packed] / cost[running.BLOCK]:.2f} |",
+            f"| {name} | {' | '.join(f'{each:.1f}' for each in cost.values())} | {cost[packed] / cost[BLOCK_ROWS]:.2f} |",
             flush=True,
         )
 
@@ -275,9 +277,9 @@ def breakdown(samples: int) -> None:
     where = {
         "sampling": [(running, "draw")],
         "scan": [(CompiledScan, name) for name in ("survey", "least", "deepest")],
-        "QP": [(batch.Mapped, "__call__")],
-        "rows, update, measures": [(batch.Expressions, "__call__")],
-        "fields": [(ArchiveWriter, "_add_to_fields")],
+        "QP": [(InterpretedFunction, "__call__")],
+        "rows, update, measures": [(adaptive.AdaptiveFunction, "__call__")],
+        "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
         "archive": [(ArchiveWriter, "append"), (ArchiveWriter, "check_point")],
     }
     print("\n| us per realization, one thread |", " | ".join(where), "| between them |\n|---|" + "---:|" * (len(where) + 1))
@@ -298,11 +300,13 @@ def breakdown(samples: int) -> None:
                 whole = time.perf_counter() - start
                 with tempfile.TemporaryDirectory() as folder:
                     path = Path(folder) / "run.nc"
-                    with ArchiveWriter(path, program, seed=1, samples=samples // 4, keep="measures", surfaces=0) as writer:
+                    fields = DisplacementFields(program.nominal, samples)
+                    run = Run(seed=1, samples=samples // 4, keep="measures", surfaces=0, fields="all")
+                    with ArchiveWriter(path, program, run, fields.sizes) as writer:
                         for block in blocks:
-                            writer.append(block)
+                            writer.append(stored(block, writer.kept))
+                            fields.merge(fields.sums(block.poses, block.start))
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
-            spent["archive"] -= spent["fields"]
             turns.append([*spent.values(), whole - sum(inside.values())])
         cells = 1e6 * np.median(turns, axis=0) / (samples // 4)
         print(f"| {name} |", " | ".join(f"{cell:.2f}" for cell in cells), "|", flush=True)
