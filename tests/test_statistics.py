@@ -5,7 +5,12 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from tolcontact.statistics import FieldMoments, intervals, sample
+from tests import cases
+from tolcontact import poses as pose
+from tolcontact import vocabulary as words
+from tolcontact.declaration import movers
+from tolcontact.discretization import discretize
+from tolcontact.statistics import DisplacementFields, intervals, sample
 from tolcontact.statistics.sample import Sample
 
 SAMPLES, REPEATS = 1000, 1000
@@ -85,23 +90,61 @@ def test_intervals_of_spreads_cover_in_small_samples(size):
     assert (covered / REPEATS > 0.92).all()
 
 
-def test_fields_equal_the_plain_sums_over_realizations():
-    rng = np.random.default_rng(2)
-    v = rng.normal(size=(30, 3)) * 50 + [1000, 0, 0]
-    R = Rotation.from_rotvec(rng.normal(size=(700, 3)) * 0.05).as_matrix()
-    t = rng.normal(size=(700, 3))
-    moments = FieldMoments(v)
-    for part in (slice(0, 1), slice(1, 400), slice(400, 700)):
-        moments.add(R[part], t[part])
-    u = np.einsum("kij,vj->kvi", R - np.eye(3), v) + t[:, None]
-    u = np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
-    assert np.abs(moments.mean() - u.mean(axis=0)).max() < 1e-10
-    assert np.abs(moments.six_sigma() - 6 * u.std(axis=0, ddof=1)).max() < 1e-9
-    expected = [intervals.standard_deviation(u[:, k, 3], times=6)[1:] for k in range(30)]
-    assert np.abs(moments.magnitude_bounds() - expected).max() < 1e-9
-    again = FieldMoments(v)
-    again.state = moments.state
-    assert (again.state == moments.state).all() and (again.six_sigma() == moments.six_sigma()).all()
+def random_poses(nominal, count, rng):
+    """Poses (n, state, part, 12), turned by some degrees."""
+    turns = Rotation.from_rotvec(rng.normal(size=(count * 2 * len(nominal.parts), 3)) * 0.05)
+    R = turns.as_matrix().reshape(count, 2, len(nominal.parts), 9)
+    return np.concatenate([R, rng.normal(size=(count, 2, len(nominal.parts), 3))], axis=3)
+
+
+def displacements(part, poses):
+    """x, y, z and magnitude (realization, vertex, component) of the surface points of a part at poses (realization, 12)."""
+    u = pose.apply(poses, part.vertices) - part.vertices
+    return np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
+
+
+@pytest.mark.parametrize("magnitudes", [700, 450, 2])
+def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
+    """However the realizations are cut into blocks, and far from the origin, too; the magnitude is of the first ones."""
+    nominal = discretize(cases.stack(cases.Frame(shift=(1000.0, 0.0, 0.0))))
+    poses = random_poses(nominal, 700, np.random.default_rng(2))
+    fields = DisplacementFields(nominal, magnitudes)
+    for first, last in ((0, 1), (1, 400), (400, 700)):
+        fields.merge(fields.sums(poses[first:last], first))
+    for index, (part, field) in enumerate(zip(nominal.parts, fields.fields(), strict=True)):
+        assert field[words.FIELD_REALIZATIONS] == 700 and field[words.MAGNITUDE_REALIZATIONS] == magnitudes
+        for state in (0, 1) if movers(nominal.assembly, part.part) else (0,):
+            u = displacements(part, poses[:, state, index])
+            few = u[:magnitudes, :, 3]
+            assert np.abs(field[words.FIELD_MEAN][state, :, :3] - u[..., :3].mean(axis=0)).max() < 1e-9
+            assert np.abs(field[words.FIELD_SIX_SIGMA][state, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
+            assert np.abs(field[words.FIELD_MEAN][state, :, 3] - few.mean(axis=0)).max() < 1e-9
+            assert np.abs(field[words.FIELD_SIX_SIGMA][state, :, 3] - 6 * few.std(axis=0, ddof=1)).max() < 1e-9
+            expected = [intervals.standard_deviation(few[:, v], times=6)[1:] for v in range(0, few.shape[1], 50)]
+            assert np.allclose(field[words.FIELD_INTERVAL][state, ::50], expected, rtol=1e-6, atol=1e-9)
+
+
+def test_sums_of_fields_go_on_from_where_they_were():
+    nominal = discretize(cases.ra1())
+    poses = random_poses(nominal, 60, np.random.default_rng(3))
+    whole, half, rest = (DisplacementFields(nominal, 50) for _ in range(3))
+    for fields, spans in ((whole, [(0, 20), (20, 40), (40, 60)]), (half, [(0, 20), (20, 40)])):
+        for first, last in spans:
+            fields.merge(fields.sums(poses[first:last], first))
+    rest.go_on_from(half.numbers)
+    rest.merge(rest.sums(poses[40:], 40))
+    assert all(np.array_equal(one, other) for one, other in zip(whole.numbers, rest.numbers, strict=True))
+
+
+def test_without_magnitudes_components_stay_exact():
+    nominal = discretize(cases.ra1())
+    poses = random_poses(nominal, 30, np.random.default_rng(3))
+    fields = DisplacementFields(nominal, 0)
+    fields.merge(fields.sums(poses, 0))
+    field = fields.fields()[1]
+    u = displacements(nominal.parts[1], poses[:, 1, 1])
+    assert np.abs(field[words.FIELD_SIX_SIGMA][1, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
+    assert np.isnan(field[words.FIELD_SIX_SIGMA][1, :, 3]).all() and field[words.MAGNITUDE_REALIZATIONS] == 0
 
 
 def test_intervals_are_those_of_scipys_distributions():

@@ -168,10 +168,10 @@ class _Surface:
         scatter = np.einsum("va,iab,vb->vi", self._v, sums.scatter, self._v)
         sigma = np.sqrt(np.maximum(scatter, 0) / max(sums.count[0] - 1, 1))
         n = int(sums.of_magnitude[0])
-        with np.errstate(invalid="ignore", divide="ignore"):
+        magnitude, estimate = np.full(len(self), np.nan), np.full((3, len(self)), np.nan)
+        if n > 1:
             second, fourth = (np.maximum(moment, 0) / n for moment in (sums.moments[0], sums.moments[2]))
-            magnitude = sums.magnitude if n else np.full(len(self), np.nan)
-            estimate = intervals.of_moments(n, second, fourth)
-        of_magnitude, lower, upper = (6 * np.sqrt(np.maximum(each, 0)) for each in estimate)
+            magnitude, estimate = sums.magnitude, np.array(intervals.of_moments(n, second, fourth))
+        of_magnitude, lower, upper = 6 * np.sqrt(estimate)
         mean = np.column_stack([self._v @ sums.mean.T, magnitude])
         return mean, np.column_stack([6 * sigma, of_magnitude]), np.column_stack([lower, upper])
