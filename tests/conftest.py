@@ -1,6 +1,23 @@
-"""Fixtures of several test modules."""
+"""Fixtures of several test modules; and the shapes of arrays, which are checked in all tests."""
+
+from pathlib import Path
 
 import pytest
+from jaxtyping import install_import_hook
+
+PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
+ROOMS = (
+    "contact",
+    "compilation",
+    "simulation",
+)  # whose functions check the shapes of their arguments, before anything imports them
+CHECKED = [
+    ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts)
+    for room in ROOMS
+    for file in sorted((PACKAGE / room).rglob("*.py"))
+    if file.name not in ("__init__.py", "kernel.py")  # Numba compiles no function that something is wrapped around
+]
+install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
 
 import tolcontact as tc
 from tests import cases

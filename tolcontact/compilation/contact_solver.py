@@ -4,6 +4,7 @@ import copy
 
 import numpy as np
 
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation.contact_qp import ContactProgram
 from tolcontact.compilation.functions import InterpretedFunction, NamedFunction, flat
 from tolcontact.compilation.outcome import SOLUTION
@@ -16,7 +17,7 @@ TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
 ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished, and
 NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, if the step is so small that noise would be seen
 
-Arrays = dict[str, np.ndarray]  # by name, (realization, entry)
+Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
 
 class ContactSolver:
@@ -40,7 +41,7 @@ class ContactSolver:
         self._first: _PluginSolver = _PluginSolver(self._program, self._plugin)
         self._others: dict[str, _PluginSolver] = {}
 
-    def __call__(self, **arrays: np.ndarray) -> Arrays:
+    def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
@@ -63,7 +64,7 @@ class ContactSolver:
                 del self._others[name]
         return answer
 
-    def energy(self, **arrays: np.ndarray) -> np.ndarray:
+    def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
         """The objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
         return self._energy(**arrays)["energy"][:, 0]
 

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.projection import project, reach
 from tolcontact.contact.scan import PairScan, least_gaps, pair_scan
@@ -24,16 +25,16 @@ class Seen(NamedTuple):
     """
 
     scans: list[PairScan]
-    least: np.ndarray
-    active: np.ndarray
-    moments: np.ndarray
+    least: Float[Array, "realization pair"]
+    active: Int[Array, "realization pair"]
+    moments: Float[Array, "realization side moment"]
 
 
 class Carriers(NamedTuple):
     """Points of a pair that carry: the realization of each, its nominal place (point, 3), and their usual distance [mm]."""
 
-    realization: np.ndarray
-    places: np.ndarray
+    realization: Int[Array, " point"]
+    places: Float[Array, "point 3"]
     spacing: float
 
 
@@ -57,7 +58,7 @@ class Candidates:
         self.round = round_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
         self._reaches = {k: reach(self._every[k]) for k in (range(len(self._pairs)) if is_iterated else self.round)}
 
-    def scans(self, relative: np.ndarray, *, anew: bool = False) -> list[PairScan]:
+    def scans(self, relative: Float[Array, "realization pair 12"], *, anew: bool = False) -> list[PairScan]:
         """Scans of the points that may carry; projected again if the method requires it.
 
         `anew`: those against curved faces are projected again in any case.
@@ -68,11 +69,11 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         return scans
 
-    def projected(self, k: int, relative: np.ndarray) -> PairScan:
+    def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
         """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
         return project(self._some[k], self._pairs[k].surface, relative, self._reaches[k])
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray) -> Seen:
+    def survey(self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]) -> Seen:
         """What is seen of raw states, for deviations (realization, locator) [mm]."""
         scans = self.scans(relative)
         surveyed = scans if self._method.is_iterated else self._every
@@ -93,7 +94,12 @@ class Candidates:
         every = np.array([table.sum(axis=1) for table in self._every[k].tables]).reshape(active.shape[1:])
         return np.broadcast_to(every, active.shape)
 
-    def may_carry(self, scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> list[np.ndarray | None]:
+    def may_carry(
+        self,
+        scans: Sequence[PairScan],
+        relative: Float[Array, "realization pair 12"],
+        deviations: Float[Array, "realization locator"],
+    ) -> list[Bool[Array, "realization _"] | None]:
         """Which points (realization, point) may carry: in the paper's set those that are active in the raw state."""
         if self._method.is_closed:
             return [None for _ in scans]

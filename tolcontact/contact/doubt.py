@@ -7,6 +7,7 @@ a point may be held by a plane beside the face, or a part may have turned over i
 import numpy as np
 
 from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import Nominal
@@ -36,15 +37,15 @@ class Doubt:
             self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 
-    def is_near(self, task: Task, state: State) -> np.ndarray:
+    def is_near(self, task: Task, state: State) -> Bool[Array, " n"]:
         """(n,): whether no part has turned, and no contact point travelled, farther than the method's limits."""
         return np.asarray(~self._turned(task, state) & ~self._is_far(task, state))
 
-    def is_lost(self, task: Task, state: State) -> np.ndarray:
+    def is_lost(self, task: Task, state: State) -> Bool[Array, " n"]:
         """(n,): whether forces pulled a part so far away that no step will bring it back."""
         return self._has_drifted(task, state, LOST)
 
-    def is_adrift(self, task: Task, state: State) -> np.ndarray:
+    def is_adrift(self, task: Task, state: State) -> Bool[Array, " n"]:
         """(n,): whether forces found nothing for a part to rest on."""
         return self._has_drifted(task, state, ADRIFT)
 
@@ -53,7 +54,7 @@ class Doubt:
             return np.zeros(len(task), dtype=bool)
         return np.asarray(self.displacement(task.raw, state.poses) / self._size > sizes)
 
-    def remains(self, task: Task, state: State, candidates: Candidates) -> np.ndarray:
+    def remains(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
         """(n,): whether the doubt remains once the faces themselves were looked at.
 
         It does if a part turned too far. If it only travelled, the faces must be free of penetration, and hold the points
@@ -72,12 +73,12 @@ class Doubt:
                 doubtful[far] |= faces.depth(X_RM) > self.allowed(k)
         return doubtful
 
-    def _turned(self, task: Task, state: State) -> np.ndarray:
+    def _turned(self, task: Task, state: State) -> Bool[Array, " n"]:
         """(n,): whether a part turned too far from its raw pose."""
         apart = state.poses[:, self._movers, :9] - task.raw[:, self._movers, :9]
         return np.asarray(((apart**2).sum(axis=2) > self._turned_far).any(axis=1))
 
-    def _is_far(self, task: Task, state: State) -> np.ndarray:
+    def _is_far(self, task: Task, state: State) -> Bool[Array, " n"]:
         """(n,): whether a contact point may be too far from its raw place."""
         return np.asarray(self.displacement(task.raw, state.poses) > self._farthest)
 
@@ -85,7 +86,7 @@ class Doubt:
         """How deep [mm] the faces of pair k of the group may lie in each other before an answer is doubted."""
         return self._open + self._group_pairs[k].facets
 
-    def rolled(self, k: int, state: State) -> np.ndarray:
+    def rolled(self, k: int, state: State) -> Bool[Array, " n"]:
         """(n,): whether points may have slid around the reference face of pair k until their planes are not its own.
 
         Beside its foot a plane leaves a curved face by the curvature times half the square of the distance.
@@ -94,7 +95,7 @@ class Doubt:
         slid = _displacement(state.relative[:, k] - pose.AT_REST, centre, radius)
         return np.asarray(curvature * slid**2 / 2 > self.allowed(k))
 
-    def displacement(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    def displacement(self, before: Float[Array, "n part 12"], after: Float[Array, "n part 12"]) -> Float[Array, " n"]:
         """What no contact point moves farther than (n,) [mm] between two poses (n, part of the group, 12).
 
         That of the centre of a ball around the points, and the ball's radius times the turn.

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.scan import Deepest, PairScan
 from tolcontact.contact.slots import NOTHING, Slots
@@ -25,8 +26,8 @@ USABLE = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
 class Step(NamedTuple):
     """How large a step was, (n,) [mm]: its largest increment, and the same in the norm of the objective."""
 
-    size: np.ndarray
-    scaled: np.ndarray
+    size: Float[Array, " n"]
+    scaled: Float[Array, " n"]
 
 
 class LinearStep:
@@ -50,7 +51,7 @@ class LinearStep:
         if self._remembers:
             self._solve.start_over()
 
-    def start(self, poses: np.ndarray, relative: np.ndarray) -> State:
+    def start(self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"]) -> State:
         """The state at poses (n, part, 12), with X_RM (n, pair, 12), before any step."""
         return State.start(poses, relative, self.spans[-1].stop, len(self.varying))
 
@@ -60,7 +61,7 @@ class LinearStep:
         state: State,
         *,
         stride: float,
-        caution: np.ndarray | float = 0.0,
+        caution: Float[Array, " n"] | float = 0.0,
         firmness: float = 1.0,
         newton: bool = False,
     ) -> Step:

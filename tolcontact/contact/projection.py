@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.scan import PairScan
 from tolcontact.discretization.surface import Surface
 
@@ -18,9 +19,9 @@ class FoundScan(PairScan):
     over             (realization, point): points that do not overhang the rim of the reference face; the others cannot touch
     """
 
-    feet: np.ndarray
-    normals: np.ndarray
-    over: np.ndarray
+    feet: Float[Array, "realization point 3"]
+    normals: Float[Array, "realization point 3"]
+    over: Bool[Array, "realization point"]
 
     def take(self, some: np.ndarray) -> "FoundScan":
         return replace(self, feet=self.feet[some], normals=self.normals[some], over=self.over[some])
@@ -48,7 +49,7 @@ def reach(scan: PairScan) -> float:
     return float(np.median(distance[:, 1])) / 2
 
 
-def project(scan: PairScan, surface: Surface | None, relative: np.ndarray, margin: float) -> PairScan:
+def project(scan: PairScan, surface: Surface | None, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
     """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
     Points that overhang the rim by up to `margin` [mm] still count: else those at the rim would come and go with every step.

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.doubt import Doubt
@@ -72,7 +73,12 @@ class ContactResolver:
         """The rows of each pair in the QP."""
         return self._step.spans
 
-    def resolve(self, poses: np.ndarray, relative: np.ndarray, deviations: np.ndarray) -> Resolved:
+    def resolve(
+        self,
+        poses: Float[Array, "realization part 12"],
+        relative: Float[Array, "realization pair 12"],
+        deviations: Float[Array, "realization locator"],
+    ) -> Resolved:
         """Correct the realizations of a block that this group does not leave as they are.
 
         poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw; deviations
@@ -165,7 +171,7 @@ class ContactResolver:
             state.put(left[better], other.take(better))
             left = left[state.rank[left] > 0]
 
-    def _is_better(self, task: Task, state: State, than: State) -> np.ndarray:
+    def _is_better(self, task: Task, state: State, than: State) -> Bool[Array, " n"]:
         """(n,): whether an answer has a lower rank than another one, or the same and a better objective."""
         energy, before = (self._energy_of(task, each) for each in (state, than))
         inside, before_inside = (each.slack.max(axis=1) for each in (state, than))
@@ -173,7 +179,7 @@ class ContactResolver:
         gains = np.where(state.rank == 0, lower, (state.rank == 1) & (inside < before_inside - BETTER))
         return np.asarray((state.rank < than.rank) | ((state.rank == than.rank) & gains))
 
-    def _energy_of(self, task: Task, state: State) -> np.ndarray:
+    def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
 
     def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:
@@ -185,7 +191,7 @@ class ContactResolver:
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
         return poses, self._relative(poses)
 
-    def _relative(self, poses: np.ndarray) -> np.ndarray:
+    def _relative(self, poses: Float[Array, "n part 12"]) -> Float[Array, "n pair 12"]:
         """X_RM (n, pair, 12) at poses (n, part of the group, 12)."""
         found = []
         for pair in self._pairs:

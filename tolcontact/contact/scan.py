@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
@@ -23,15 +24,15 @@ BEYOND = 1e300  # where no point is
 class Survey(NamedTuple):
     """How many points of a pair are active (realization,), and their moments (realization, side, moment)."""
 
-    active: np.ndarray
-    moments: np.ndarray
+    active: Int[Array, " realization"]
+    moments: Float[Array, "realization side moment"]
 
 
 class Deepest(NamedTuple):
     """The deepest point of each cluster, and its depth [mm], both (realization, cluster)."""
 
-    points: np.ndarray
-    depth: np.ndarray
+    points: Int[Array, "realization cluster"]
+    depth: Float[Array, "realization cluster"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,23 +50,25 @@ class PairScan:
     clusters           (cluster + 1,): the first branch of each cluster, and the end
     """
 
-    basis: np.ndarray
-    columns: np.ndarray
-    coordinates: np.ndarray
-    tables: tuple[np.ndarray, ...]
-    P_m: np.ndarray
-    P_r: np.ndarray
-    n_r: np.ndarray
+    basis: Float[Array, "entry r"]
+    columns: Int[Array, " k"]
+    coordinates: Float[Array, "coordinate point"]
+    tables: tuple[Float[Array, "moment point"], ...]
+    P_m: Float[Array, "point 3"]
+    P_r: Float[Array, "point 3"]
+    n_r: Float[Array, "point 3"]
     offsets: Offsets
-    leaves: np.ndarray
-    branches: np.ndarray
-    clusters: np.ndarray
+    leaves: Int[Array, " _"]
+    branches: Int[Array, " _"]
+    clusters: Int[Array, " _"]
 
     def take(self, some: np.ndarray) -> "PairScan":
         """The scan for some of the realizations: here all have the same contact points."""
         return self
 
-    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    def gaps(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+    ) -> Float[Array, "realization point"]:
         """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
         slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
         for entry, row in zip(relative.T, self.basis[:-1], strict=True):
@@ -77,21 +80,27 @@ class PairScan:
             result += np.multiply(slope[:, None], row, out=term)
         return result
 
-    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def rows(
+        self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization locator"]
+    ) -> tuple[Float[Array, "realization slot 3"], Float[Array, "realization slot 3"], Float[Array, "realization slot 3"]]:
         """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
         if self.columns.size:
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
+    def survey(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
+    ) -> "Survey":
         """The points whose gap is below `activity`."""
         active = self.gaps(relative, deviations) < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
         return Survey(active.sum(axis=1), moments)
 
-    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    def least(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+    ) -> Float[Array, " realization"]:
         """The least gap of all points (realization,) [mm]."""
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
 
@@ -111,7 +120,9 @@ class PairScan:
 class CompiledScan(PairScan):
     """A scan whose passes are compiled; PairScan is the same in NumPy."""
 
-    def survey(self, relative: np.ndarray, deviations: np.ndarray, activity: float) -> "Survey":
+    def survey(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
+    ) -> "Survey":
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
@@ -119,7 +130,9 @@ class CompiledScan(PairScan):
         kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
         return Survey(active, moments)
 
-    def least(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+    def least(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+    ) -> Float[Array, " realization"]:
         return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
@@ -219,6 +232,8 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
     return np.unique(label, return_inverse=True)[1]
 
 
-def least_gaps(scans: Sequence[PairScan], relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+def least_gaps(
+    scans: Sequence[PairScan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]
+) -> Float[Array, "realization pair"]:
     """Least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

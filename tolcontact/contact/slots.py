@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tolcontact.arrays import Array, Bool, Float, Int
+
 MOST = 8  # points that keep their slots from one round to the next
 NOTHING = 1e-9  # of the largest multiplier of a pair: smaller ones are rounding
 
@@ -12,9 +14,9 @@ NOTHING = 1e-9  # of the largest multiplier of a pair: smaller ones are rounding
 class Slots:
     """points (n, slot): numbers of contact points; filled (n, slot): which slots are in use; reactions (n, slot)."""
 
-    points: np.ndarray
-    filled: np.ndarray
-    reactions: np.ndarray
+    points: Int[Array, "n slot"]
+    filled: Bool[Array, "n slot"]
+    reactions: Float[Array, "n slot"]
 
     @classmethod
     def empty(cls, count: int, slots: int) -> "Slots":
@@ -33,12 +35,12 @@ class Slots:
         """Replace the slots of some realizations."""
         self.points[some], self.filled[some], self.reactions[some] = other.points, other.filled, other.reactions
 
-    def reactions_of(self, points: np.ndarray) -> np.ndarray:
+    def reactions_of(self, points: Int[Array, "n slot"]) -> Float[Array, "n slot"]:
         """The reactions of some contact points (n, slot), 0 if they have none here."""
         same = (points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]
         return np.asarray(np.where(same, self.reactions[:, None, :], 0.0).max(axis=2))
 
-    def kept(self, multipliers: np.ndarray) -> "Slots":
+    def kept(self, multipliers: Float[Array, "n slot"]) -> "Slots":
         """Only the slots whose rows carry, at most MOST of them, largest multipliers (n, slot) first."""
         largest = np.where(self.filled, multipliers, 0.0)
         order = np.argsort(-largest, axis=1, kind="stable")
@@ -47,7 +49,9 @@ class Slots:
         carries[:, MOST:] = False
         return Slots(np.take_along_axis(self.points, order, axis=1), carries, np.where(carries, sorted_, 0.0))
 
-    def with_deepest(self, points: np.ndarray, depth: np.ndarray, tolerance: float) -> "tuple[Slots, np.ndarray]":
+    def with_deepest(
+        self, points: Int[Array, "n cluster"], depth: Float[Array, "n cluster"], tolerance: float
+    ) -> tuple["Slots", Bool[Array, " n"]]:
         """Fill the free slots with the deepest of the candidate `points` (n, cluster) that are inside.
 
         Returns the new slots, and (n,) whether any candidate was new.

@@ -6,10 +6,10 @@ them back; what works on realizations takes a task and a state, and knows no oth
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
-from typing import Self
 
 import numpy as np
 
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, SLOTS
 from tolcontact.contact.scan import PairScan
 from tolcontact.contact.slots import Slots
@@ -30,11 +30,11 @@ class Task:
     scans          for each pair of the group the points that may carry
     """
 
-    raw: np.ndarray
-    relative: np.ndarray
-    deviations: np.ndarray
-    moments: np.ndarray
-    may_carry: list[np.ndarray | None]
+    raw: Float[Array, "n part 12"]
+    relative: Float[Array, "n pair 12"]
+    deviations: Float[Array, "n locator"]
+    moments: Float[Array, "n side moment"]
+    may_carry: list[Bool[Array, "n _"] | None]
     scans: Sequence[PairScan]
 
     def __len__(self) -> int:
@@ -71,44 +71,44 @@ class State:
     slots       of the pairs with changing points: what carried last
     """
 
-    poses: np.ndarray
-    relative: np.ndarray
-    residual: np.ndarray
-    slack: np.ndarray
-    astray: np.ndarray
-    iterations: np.ndarray
-    second_answers: np.ndarray
-    multipliers: np.ndarray
-    gap_min: np.ndarray
-    searched: np.ndarray
-    doubtful: np.ndarray
+    poses: Float[Array, "n part 12"]
+    relative: Float[Array, "n pair 12"]
+    residual: Float[Array, " n"]
+    slack: Float[Array, "n pair"]
+    astray: Float[Array, " n"]
+    iterations: Int[Array, " n"]
+    second_answers: Int[Array, " n"]
+    multipliers: Float[Array, "n row"]
+    gap_min: Float[Array, "n pair"]
+    searched: Bool[Array, " n"]
+    doubtful: Bool[Array, " n"]
     slots: list[Slots]
 
     def __len__(self) -> int:
         return len(self.poses)
 
     @property
-    def in_conflict(self) -> np.ndarray:
+    def in_conflict(self) -> Bool[Array, " n"]:
         """(n,): whether penetration was left that no increment could remove."""
         return np.asarray((self.slack > ACCURACY).any(axis=1))
 
     @property
-    def solved(self) -> np.ndarray:
+    def solved(self) -> Bool[Array, " n"]:
         """(n,): whether the optimality conditions hold. A conflict is believed if it exceeds what was left undone."""
         return np.asarray(self.residual <= np.maximum(ACCURACY, self.slack.max(axis=1)))
 
     @property
-    def rank(self) -> np.ndarray:
+    def rank(self) -> Int[Array, " n"]:
         """(n,): 0 for a certified answer, 1 for a conflict, 2 if there is no answer, or a doubtful one."""
         return np.where(self.solved & ~self.doubtful, np.where(self.in_conflict, 1, 0), 2)
 
     @property
-    def loaded(self) -> np.ndarray:
+    def loaded(self) -> Bool[Array, "n row"]:
         """(n, row of the QP): whether its point carries."""
         return np.asarray(self.multipliers > CARRIES * self.multipliers.max(axis=1, initial=0)[:, None])
 
     @classmethod
-    def start(cls, poses: np.ndarray, relative: np.ndarray, rows: int, varying: int) -> Self:
+    def start(cls, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], rows: int, varying: int) -> "State":
         """No step was taken; the QP has so many `rows`, and `varying` of the pairs have slots in it."""
         count, pairs = relative.shape[:2]
         return cls(
@@ -126,7 +126,7 @@ class State:
             slots=[Slots.empty(count, SLOTS) for _ in range(varying)],
         )
 
-    def take(self, some: np.ndarray) -> Self:
+    def take(self, some: np.ndarray) -> "State":
         """A copy of some realizations."""
         return type(self)(
             **{name: getattr(self, name)[some] for name in _ARRAYS}, slots=[each.take(some) for each in self.slots]
@@ -158,7 +158,7 @@ class Unsettled:
     def __len__(self) -> int:
         return len(self._where)
 
-    def settle(self, done: np.ndarray) -> None:
+    def settle(self, done: Bool[Array, " n"]) -> None:
         """Put back those that are `done` (n,), and go on with the others."""
         if not done.any():
             return
@@ -182,17 +182,17 @@ class Resolved:
     active    (realization, pair of the group): number of active contact points in the raw state
     """
 
-    touched: np.ndarray
+    touched: Int[Array, " n"]
     state: State
-    starts: np.ndarray
-    gap_min: np.ndarray
-    active: np.ndarray
+    starts: Int[Array, " n"]
+    gap_min: Float[Array, "realization state pair"]
+    active: Int[Array, "realization pair"]
 
-    def reactions(self, spans: Sequence[slice]) -> np.ndarray:
+    def reactions(self, spans: Sequence[slice]) -> Float[Array, "n pair"]:
         """Sum of the reactions of each pair, (n, pair), whose rows of the QP are `spans`."""
         return np.stack([self.state.multipliers[:, span].sum(axis=1) for span in spans], axis=1)
 
-    def carrying(self, spans: Sequence[slice]) -> np.ndarray:
+    def carrying(self, spans: Sequence[slice]) -> Int[Array, "n pair"]:
         """Number of carrying points of each pair, (n, pair)."""
         loaded = self.state.loaded
         return np.stack([loaded[:, span].sum(axis=1) for span in spans], axis=1)

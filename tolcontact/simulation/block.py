@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.vocabulary import STATES, Status
 
 
@@ -28,19 +29,19 @@ class Block:
     """
 
     start: int
-    deviations: np.ndarray
-    poses: np.ndarray
-    measured: np.ndarray
-    gap_min: np.ndarray
-    active: np.ndarray
-    carrying: np.ndarray
-    reaction: np.ndarray
-    status: np.ndarray
-    kkt_residual: np.ndarray
-    iterations: np.ndarray
-    starts: np.ndarray
-    second_answers: np.ndarray
-    searched: np.ndarray
+    deviations: Float[Array, "n locator"]
+    poses: Float[Array, "n state part 12"]
+    measured: Float[Array, "n state measure"]
+    gap_min: Float[Array, "n state pair"]
+    active: Int[Array, "n pair"]
+    carrying: Int[Array, "n pair"]
+    reaction: Float[Array, "n pair"]
+    status: Int[Array, " n"]
+    kkt_residual: Float[Array, " n"]
+    iterations: Int[Array, " n"]
+    starts: Int[Array, " n"]
+    second_answers: Int[Array, " n"]
+    searched: Int[Array, " n"]
 
     def __len__(self) -> int:
         return len(self.status)
@@ -51,7 +52,14 @@ class Block:
         return f"realizations {self.start} to {self.start + len(self) - 1}: {found}"
 
     @classmethod
-    def untouched(cls, start: int, deviations: np.ndarray, raw: np.ndarray, measured: np.ndarray, pairs: int) -> "Block":
+    def untouched(
+        cls,
+        start: int,
+        deviations: Float[Array, "n locator"],
+        raw: Float[Array, "n part 12"],
+        measured: Float[Array, "n measure"],
+        pairs: int,
+    ) -> "Block":
         """Realizations at their raw poses (n, part, 12), with measures (n, measure), that contact leaves as they are."""
         count, states = len(raw), len(STATES)
         return cls(

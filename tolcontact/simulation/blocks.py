@@ -4,6 +4,7 @@ import enum
 
 import numpy as np
 
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.mechanics import ENTRIES
@@ -22,7 +23,7 @@ class Outcome(enum.IntEnum):
 
 
 def simulate_block(
-    program: Program, deviations: np.ndarray, *, start: int = 0, resolvers: list[ContactResolver] | None = None
+    program: Program, deviations: Float[Array, "n locator"], *, start: int = 0, resolvers: list[ContactResolver] | None = None
 ) -> Block:
     """Raw and corrected states for given deviations (realization, locator) [mm]."""
     if resolvers is None:
@@ -61,7 +62,7 @@ def _put(block: Block, resolver: ContactResolver, found: Resolved) -> None:
     block.second_answers[touched] += state.second_answers
 
 
-def _outcome(found: Resolved) -> np.ndarray:
+def _outcome(found: Resolved) -> Int[Array, " n"]:
     """(n,), Outcome."""
     state = found.state
     answered = np.where(state.doubtful, Outcome.DOUBTFUL, np.where(state.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED))
@@ -74,7 +75,7 @@ def _statuses(is_exact: bool) -> np.ndarray:
     return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)
 
 
-def _observe(program: Program, poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _observe(program: Program, poses: Float[Array, "n part 12"]) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
     """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
     seen = program.observe(poses=poses)
     return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact import poses as pose
+from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.variation.draws import draw
@@ -20,11 +21,11 @@ class Surfaces(NamedTuple):
     beside        how far contact points that touch stand beside the rim of the reference face, which is not there
     """
 
-    penetration: np.ndarray
-    beside: np.ndarray
+    penetration: Float[Array, "n pair"]
+    beside: Float[Array, "n pair"]
 
 
-def check_surfaces(program: Program, poses: np.ndarray) -> Surfaces:
+def check_surfaces(program: Program, poses: Float[Array, "n part 12"]) -> Surfaces:
     """Look at the faces of every pair at corrected poses (row, part, 12)."""
     nominal, fixed = program.nominal, not program.method.is_iterated
     found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
@@ -42,7 +43,7 @@ def check_surfaces(program: Program, poses: np.ndarray) -> Surfaces:
     return found
 
 
-def simulated_poses(program: Program, rows: np.ndarray, seed: int) -> np.ndarray:
+def simulated_poses(program: Program, rows: Int[Array, " n"], seed: int) -> Float[Array, "n part 12"]:
     """Corrected poses (row, part, 12) of some realizations, simulated once more."""
     drawn = [draw(program.nominal, seed=seed, start=int(row), stop=int(row) + 1) for row in rows]
     return simulate_block(program, np.concatenate(drawn)).poses[:, CORRECTED]

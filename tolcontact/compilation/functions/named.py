@@ -5,6 +5,7 @@ import math
 import casadi as ca
 import numpy as np
 
+from tolcontact.arrays import Array, Float, Real
 from tolcontact.compilation.functions.adaptive import AdaptiveFunction
 
 
@@ -22,7 +23,7 @@ class NamedFunction:
         outputs = [ca.densify(output) for output in function.call(inputs)]
         return cls(ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out()))
 
-    def __call__(self, **arrays: np.ndarray) -> dict[str, np.ndarray]:
+    def __call__(self, **arrays: Real[Array, "realization ..."]) -> dict[str, Float[Array, "realization _"]]:
         """Outputs by name, (realization, stored entry), for inputs `name=(realization, ...)`.
 
         Arrays of other names are left alone.
@@ -31,6 +32,6 @@ class NamedFunction:
         return dict(zip(self._results, outputs, strict=True))
 
 
-def flat(array: np.ndarray) -> np.ndarray:
+def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:
     """(realization, entry) of an array that is flat or (column, row), CasADi's order, inside a realization."""
     return np.ascontiguousarray(array, dtype=float).reshape(len(array), math.prod(array.shape[1:]))
