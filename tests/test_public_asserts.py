@@ -111,7 +111,7 @@ def test_the_last_bit_counts_and_nan_equals_nan(results):
 
 
 def test_runs_of_other_models_or_sizes_are_not_the_same(archive, results):
-    with pytest.raises(AssertionError, match=r"other labels of part: \['bottom', 'middle', 'upper'\] and \['base', 'top'\]"):
+    with pytest.raises(AssertionError, match=r"labels of part differ: \['bottom', 'middle', 'upper'\] and \['base', 'top'\]"):
         assert_same_run(archive, tc.run(cases.ra1(points=9), samples=20, solver="daqp"))
     fewer = tc.run(cases.stack(), samples=20, seed=3, solver="daqp", keep="poses")
     with pytest.raises(AssertionError, match="300 and 20 realizations"):

@@ -48,6 +48,8 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | read results | `summarize`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
 | warnings | `ContactWarning`, `UnitsWarning` |
+
+`tolcontact.testing` has asserts for tests of your own models.
 """
 
 import lazy_loader

@@ -52,7 +52,7 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
     Unfinished realizations are passed over, and those whose `searched` is 1: their contact points were projected again, and are
     not archived. (Archives of format 1 do not say which; all of theirs are computed.)
 
-    Raises AssertionError with the largest difference and where it is; also where the archive does not hold the poses (or, for
+    Raises AssertionError with the largest difference and where it is; also if the archive does not hold the poses (or, for
     one-sided locators, the deviations).
     """
     with _opened(results) as tree:
@@ -72,7 +72,7 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
                     place = f'realization {numbers[some][held[some]][row]}, {words.STATES[state]}, contact pair "{name}"'
     if largest > within:
         raise AssertionError(
-            f'"{words.GAP_MIN.name}" is not the least gap of the archived contact points: it differs by {largest:.3g} mm in '
+            f'"{words.GAP_MIN.name}" is not the smallest gap of the archived contact points: it differs by {largest:.3g} mm in '
             f"{place}; {within:.3g} mm are allowed"
         )
 
@@ -92,7 +92,7 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
         for dim in (words.PART, words.PAIR, words.MEASURE):
             labels = [[str(label) for label in tree.coords[dim].values] for tree in (one, other)]
             if labels[0] != labels[1]:
-                raise AssertionError(f"the runs have other labels of {dim}: {labels[0]} and {labels[1]}")
+                raise AssertionError(f"the labels of {dim} differ: {labels[0]} and {labels[1]}")
         sizes = [tree.sizes[words.REALIZATION] for tree in (one, other)]
         if sizes[0] != sizes[1]:
             raise AssertionError(f"the runs have {sizes[0]} and {sizes[1]} realizations")

@@ -93,7 +93,7 @@ continues to the same data as an undisturbed run, up to the original number of r
 300 ... created
 ... resumed after 0 realizations
 
-A resumed run starts after the last full block, here after none. The model, its contact points, the solver and the method must
+A resumed run starts after the last checkpoint, here after none. The model, its contact points, the solver and the method must
 be the same as before; otherwise the run is refused. Archives of an earlier format can be read, not resumed.
 
 ## Checksums, and archives from others

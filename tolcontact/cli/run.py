@@ -29,7 +29,7 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"What to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
-        str, typer.Option(metavar="all|N|none", help="How many realizations the magnitudes of displacement fields cover.")
+        str, typer.Option(metavar="all|N|none", help="Number of realizations that the magnitudes of displacement fields cover.")
     ] = str(MAGNITUDES),
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")

@@ -43,13 +43,13 @@ points and between surfaces, and the number of steps: see `tc.summarize`, or `pr
 ## Displacement fields
 
 The displacement u = (R - I) v + t (14) is taken at surface points v of every part, in both states: its mean and 6 sigma in x,
-y, z and magnitude. Components follow exactly from the mean and covariance of the poses; the magnitude is summed up
-realization by realization, and its 6 sigma has an interval at each point. Fields always cover all realizations of a finished
-run, also those whose poses are not kept.
+y, z and magnitude. Components follow exactly from the mean and covariance of the poses of all realizations, also if poses are
+not kept. The magnitude is summed up realization by realization, over the first 16 384 of them (`fields=`, `--fields`: a
+number, "all" or "none"); its 6 sigma has an interval at each point.
 
 >>> field = results["field/block"]
->>> sorted(field.data_vars)[:3]
-['checksum', 'faces', 'magnitude_six_sigma_interval']
+>>> int(field.realizations), int(field.magnitude_realizations)
+(1000, 1000)
 >>> field.six_sigma.sel(state="corrected", component="z").dims
 ('vertex',)
 """

@@ -190,12 +190,12 @@ FIELD_INTERVAL = Variable(
     "95 % confidence interval of six standard deviations of the displacement magnitude",
     "mm",
 )
-FIELD_REALIZATIONS = Variable("realizations", (), "i8", "number of realizations in the displacement field", "1")
+FIELD_REALIZATIONS = Variable("realizations", (), "i8", "number of realizations that the displacement field covers", "1")
 MAGNITUDE_REALIZATIONS = Variable(
     "magnitude_realizations",
     (),
     "i8",
-    "number of realizations, the first ones, in the magnitude of the displacement field",
+    "number of realizations, the first ones, that the magnitude of the displacement field covers",
     "1",
 )
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)

@@ -97,8 +97,8 @@ def run(
     model's own method).
     Without `out` the results are kept in memory only. `keep` states what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
-    `fields` says over how many realizations, the first ones, the magnitudes of displacements are summed up: a number, "all" or
-    "none"; their components are always exact, over all realizations.
+    `fields` is the number of realizations, the first ones, that the magnitudes of displacement fields cover, "all" or "none";
+    their components are always exact, over all realizations.
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
@@ -109,7 +109,7 @@ def run(
     if keep not in KEPT:
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
     if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
-        raise OptionError(f"fields is {fields!r}; expected a whole number, 2 or above, or one of: {', '.join(FIELD_CHOICES)}")
+        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
     if isinstance(model, Program) and not (solver is None and method is None):
         raise OptionError(
             "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
