@@ -23,8 +23,8 @@ install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pe
 @pytest.fixture(scope="session")
 def archive(tmp_path_factory):
     """An archive of 300 realizations of the stack. Copy it to change it."""
-    import tolcontact as tc  # not above: the hook must be there first
-    from tests import cases
+    import tolcontact as tc  # noqa: PLC0415  (the hook must be there first)
+    from tests import cases  # noqa: PLC0415
 
     path = tmp_path_factory.mktemp("archive") / "stack.nc"
     tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path).close()
