@@ -95,7 +95,7 @@ class TrueProblem:
         for force in self.nominal.assembly.forces:
             part = self.nominal.part_index(force.at.part)
             if part in self.free:
-                P = np.asarray(self.nominal.place(force.at))[None]
+                P = np.asarray(self.nominal.position(force.at))[None]
                 work += ca.dot(ca.DM(np.array(force.vector)), at(new, part, P) - at(raw, part, P))
                 forces += np.linalg.norm(force.vector)
         return work, forces

@@ -46,7 +46,7 @@ def test_energy_from_moments_is_the_sum_over_points():
     R, t = random_pose()
     z = ca.SX.sym("z", 6)
     part, raw = Carried((0,), centre, False), Pose(ca.SX(R), ca.SX(t))
-    moves = increments(z, 10.0, [raw.place(ca.DM(centre))])
+    moves = increments(z, 10.0, [raw.apply(ca.DM(centre))])
     energy = displacement_energy(ca.SX(moment_table(points, centre).sum(axis=1)), centre, raw, linear(part, raw, moves))
     step = RNG.normal(size=6)
     x = points @ R.T + t
@@ -61,8 +61,8 @@ def test_corrected_pose_moves_points_by_the_increment_to_first_order(update, is_
     z = ca.SX.sym("z", 6)
     raw = Pose(ca.SX(R), ca.SX(t))
     part = Carried((0,), centre, is_reference)
-    moves = increments(z, 5.0, [raw.place(ca.DM(centre))])
-    moved = ca.Function("x", [z], [update(part, raw, moves).place(ca.DM(point)), update(part, raw, moves).R])
+    moves = increments(z, 5.0, [raw.apply(ca.DM(centre))])
+    moved = ca.Function("x", [z], [update(part, raw, moves).apply(ca.DM(point)), update(part, raw, moves).R])
     step = RNG.normal(size=6) * 1e-4
     x = R @ point + t
     expected = x + step[:3] + np.cross(step[3:] / 5, x - (R @ centre + t))

@@ -87,7 +87,7 @@ class Loop:
             rows = [np.r_[n, np.cross(x, n)] for x, n in zip(arms, part.locators.directions, strict=True)]
             self.schemes.append((np.linalg.inv(np.array(rows)) if rows else np.zeros((6, 0)), centre))
         measure = nominal.assembly.measures[0]
-        self.at, self.along = nominal.place(measure.of), np.array(measure.along)
+        self.at, self.along = nominal.position(measure.of), np.array(measure.along)
 
     def measure(self, deviations: np.ndarray, solve: Solve, form: str) -> tuple[np.ndarray, np.ndarray]:
         """Measures, and where the answer has no penetration left, for deviations (realization, locator)."""

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import netCDF4
 import numpy as np
 
+from tolcontact import poses as pose
 from tolcontact import vocabulary as words
 from tolcontact.vocabulary import Variable
 
@@ -59,7 +60,7 @@ def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None
         np.array([np.ma.getdata(file[variable.name][int(row), 1]) for row in rows])
         for variable in (words.ROTATION, words.TRANSLATION)
     )
-    return np.concatenate([R.reshape(*R.shape[:2], 9), t], axis=2)
+    return pose.pose(R, t)
 
 
 def nothing_checked(count: int, pairs: int) -> dict[Variable, np.ndarray]:

@@ -109,7 +109,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
         z=ca.SX.sym("z", FREEDOMS * len(group.free)),
     )
     now = poses_of(inputs["poses"])
-    centres = [now[k].place(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
+    centres = [now[k].apply(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
     motion = Motion(group.carried, now, increments(setting.z, group.length, centres))
     moved = motion.by(linear)
     rows = contact_rows(setting, standing, now, moved, inputs)

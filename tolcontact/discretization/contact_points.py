@@ -43,7 +43,7 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
         evenly = DEFAULT_POINTS if pair.points is None and pair.spacing is None else pair.points
         _announce(pair, own.mesh.area, evenly)
         sampled = spread(own.mesh, evenly, pair.spacing)
-    P_m, finest = moving.place(sampled), assembly.finest()
+    P_m, finest = moving.placed(sampled), assembly.finest()
     if is_flat(placed_own) and is_flat(target):
         if pair.points is None and pair.spacing is None:
             P_m = np.concatenate([P_m, overlap_corners(placed_own, target)])

@@ -36,9 +36,9 @@ class NominalPart:
     @cached_property
     def body(self) -> trimesh.Trimesh:
         """Its mesh in its nominal place."""
-        return trimesh.Trimesh(self.place(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
+        return trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
 
-    def place(self, p: np.ndarray) -> np.ndarray:
+    def placed(self, p: np.ndarray) -> np.ndarray:
         """Own coordinates (..., 3) to nominal assembly coordinates (..., 3) [mm]."""
         R_WP, t_WP = self.placement
         return np.asarray(p @ R_WP.T + t_WP)
@@ -110,6 +110,6 @@ class Nominal:
         """Indices of the triangles, in their part's mesh, of which a face consists or is cut."""
         return [int(k) for k in triangles(face, {part.part: part.mesh for part in self.parts})]
 
-    def place(self, point: Point) -> np.ndarray:
+    def position(self, point: Point) -> np.ndarray:
         """Nominal assembly coordinates (3,) [mm] of a declared point."""
-        return self.parts[self.part_index(point.part)].place(np.array(point.position))
+        return self.parts[self.part_index(point.part)].placed(np.array(point.position))

@@ -94,7 +94,7 @@ def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 def _total(part: Carried, X: Pose, movers: Sequence[Twist]) -> Twist:
     """What all its movers together do to a part, about its own centre."""
-    c = X.place(ca.DM(part.centre))
+    c = X.apply(ca.DM(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)
     for mover in part.movers:
         d, W = d + movers[mover].at(c), W + movers[mover].W

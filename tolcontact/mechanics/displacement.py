@@ -28,6 +28,6 @@ def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Po
     second = ca.SX.zeros(3, 3)
     for k, (i, j) in enumerate(_UPPER):
         second[i, j] = second[j, i] = moments[4 + k]
-    a = end.place(ca.DM(centre)) - start.place(ca.DM(centre))
+    a = end.apply(ca.DM(centre)) - start.apply(ca.DM(centre))
     D = end.R - start.R
     return count * ca.dot(a, a) / 2 + ca.dot(a, D @ first) + ca.trace(D @ second @ D.T) / 2

@@ -16,7 +16,7 @@ def gap(X_RM: Pose, P_m: ca.SX, P_r: ca.SX, n_r: ca.SX) -> ca.SX:
 
     With x^m - x^r turned into the reference frame, n = R_r n^r (4) becomes n^r; R_r must be a rotation.
     """
-    return ca.dot(n_r, X_RM.place(P_m) - P_r)
+    return ca.dot(n_r, X_RM.apply(P_m) - P_r)
 
 
 def gap_gradient() -> ca.Function:

@@ -28,7 +28,7 @@ class SymbolicPoses:
 
     def position(self, point: Point) -> ca.SX:
         """Where a declared point is, (3, 1) [mm], in the assembly frame."""
-        return self._pose(point.part).place(ca.DM(self._nominal.place(point)))
+        return self._pose(point.part).apply(ca.DM(self._nominal.position(point)))
 
     def rotation(self, part: Part) -> ca.SX:
         """R (3, 3) of a part: its rotation from its nominal place."""
@@ -62,7 +62,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose]) -> list[ca.SX]:
 def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose]) -> ca.SX:
     if isinstance(measure.of, Point):
         now = SymbolicPoses(nominal, poses)
-        start = ca.DM(nominal.place(measure.of)) if measure.to is None else now.position(measure.of)
+        start = ca.DM(nominal.position(measure.of)) if measure.to is None else now.position(measure.of)
         end = now.position(measure.to or measure.of)
         return ca.dot(ca.DM(np.array(measure.along)), end - start)
     value: Any = replay(measure.of, poses) if isinstance(measure.of, tuple) else measure.of(SymbolicPoses(nominal, poses))

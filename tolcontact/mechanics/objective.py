@@ -73,8 +73,8 @@ def _forces(setting: Setting, now: Sequence[Pose]) -> Energy:
     for force in nominal.assembly.forces:
         part = nominal.part_index(force.at.part)
         if part in group.parts and group.carried[group.position(part)].movers:
-            p, k = ca.DM(nominal.place(force.at)), group.position(part)
-            work += ca.dot(ca.DM(np.array(force.vector)), now[k].place(p) - setting.raw[k].place(p))
+            p, k = ca.DM(nominal.position(force.at)), group.position(part)
+            work += ca.dot(ca.DM(np.array(force.vector)), now[k].apply(p) - setting.raw[k].apply(p))
             total += float(np.linalg.norm(force.vector))
     total = total or 1.0
     quadratic = setting.firmness * YIELD * proximity(setting, setting.raw, now) / group.length

@@ -22,7 +22,7 @@ class Pose(NamedTuple):
         """Composition: first `inner`, then this pose."""
         return Pose(self.R @ inner.R, self.R @ inner.t + self.t)
 
-    def place(self, p: ca.SX | ca.DM) -> ca.SX:
+    def apply(self, p: ca.SX | ca.DM) -> ca.SX:
         """Where the point with nominal coordinates `p` (3, 1) [mm] is now."""
         return self.R @ p + self.t
 

@@ -20,7 +20,7 @@ def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bo
         X_PM = setting.linear(X_PM)
     exact = ~own.locators.one_sided
     P, n = own.locators.points[exact], own.locators.directions[exact]
-    return ca.vertcat(*(ca.dot(ca.DM(b), X_PM.place(ca.DM(a)) - ca.DM(a)) for a, b in zip(P, n, strict=True)))
+    return ca.vertcat(*(ca.dot(ca.DM(b), X_PM.apply(ca.DM(a)) - ca.DM(a)) for a, b in zip(P, n, strict=True)))
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from tolcontact import poses as pose
 from tolcontact import vocabulary as words
 from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize
@@ -109,8 +110,7 @@ def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
     resolved = np.isin(run["status"], words.CERTIFIED)
     both = resolved & np.isin(first["status"], words.CERTIFIED)
     poses, others = (each["poses"][both] for each in (run, first))
-    turn = (poses - others)[:, :, :9].reshape(*poses.shape[:2], 3, 3)
-    apart = np.einsum("kpij,pcj->kpci", turn, corners) + (poses - others)[:, :, None, 9:]
+    apart = pose.apply(poses - others, corners)  # which is linear in the pose
     distance = np.linalg.norm(apart, axis=3).max(axis=(1, 2), initial=0)
     measured = np.abs(run["measured"] - first["measured"])[both]
     return {
