@@ -4,7 +4,9 @@ Every function takes a sample, an array (realization,) or a Sample, and returns 
 normal distribution: contact cuts distributions off.
 """
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +15,20 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
-Estimate = tuple[float, float, float]
 
 _LOWER, _UPPER = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
 _Z = float(special.ndtri(_UPPER))
+
+
+class Estimate(NamedTuple):
+    """An estimate with the bounds of its 95 % confidence interval."""
+
+    value: float
+    lower: float
+    upper: float
+
+
+NOTHING = Estimate(math.nan, math.nan, math.nan)
 
 
 def mean(x: np.ndarray | Sample) -> Estimate:
@@ -24,14 +36,14 @@ def mean(x: np.ndarray | Sample) -> Estimate:
     x = Sample.of(x)
     deviation = np.sqrt(_unbiased(x))
     half = float(special.stdtrit(x.count - 1, _UPPER) * deviation / np.sqrt(x.count))
-    return x.mean, x.mean - half, x.mean + half
+    return Estimate(x.mean, x.mean - half, x.mean + half)
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
     """Variance; Bonett's interval (2006), on the log scale with the standard error that the fourth moment gives."""
     x = Sample.of(x)
     estimate, lower, upper = of_moments(x.count, *x.moments)
-    return float(estimate), float(lower), float(upper)
+    return Estimate(float(estimate), float(lower), float(upper))
 
 
 def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimate:
@@ -42,7 +54,7 @@ def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimat
 def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
     """`times` the root of a variance."""
     estimate, lower, upper = np.sqrt(variance)
-    return float(times * estimate), float(times * lower), float(times * upper)
+    return Estimate(float(times * estimate), float(times * lower), float(times * upper))
 
 
 def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
@@ -57,7 +69,7 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     for (below, above, _, _, share), (low, high, one, next_) in zip(ranks, values, strict=True):
         lower, upper = low if below >= 0 else -np.inf, high if above < x.count else np.inf
         # What lies between two order statistics may be beyond a bound, in small samples.
-        found.append((float(np.clip(one + (next_ - one) * share, lower, upper)), float(lower), float(upper)))
+        found.append(Estimate(float(np.clip(one + (next_ - one) * share, lower, upper)), float(lower), float(upper)))
     return found
 
 
@@ -76,7 +88,7 @@ def share_of(k: int, n: int) -> Estimate:
     """`share` of `k` hits among `n`."""
     lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
     upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
-    return k / n, float(lower), float(upper)
+    return Estimate(k / n, float(lower), float(upper))
 
 
 def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> Estimate:
@@ -84,14 +96,14 @@ def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> E
     after, before = Sample.of(after), Sample.of(before)
     ours, theirs = after.moments[0], before.moments[0]
     if _is_constant(after) or _is_constant(before):
-        return (float("nan"),) * 3
+        return NOTHING
     # What each realization adds to the logarithm of the ratio; the sum of all is zero.
     pairs = zip(after.pieces(), before.pieces(), strict=True)
     influence2 = sum((((a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs) ** 2).sum() for a, b in pairs)
     # The correction for small samples is Bonett's for one variance.
     n = after.count
     factor = np.exp(_Z * n / (n - _Z) * np.sqrt((influence2 / n + 3 / n) / (n - 1)))
-    return ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor)
+    return Estimate(ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor))
 
 
 def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -162,7 +162,7 @@ def _begun_for(results: xr.DataTree, done: int) -> int:
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
     tolerance = float(rows[words.MEASURE_TOLERANCE.name][measure])
     nominal = float(rows[words.MEASURE_NOMINAL.name][measure])
-    outside: Estimate = (np.nan,) * 3
+    outside = intervals.NOTHING
     if np.isfinite(tolerance) and np.isfinite(x.mean):
         outside = intervals.share(Sample(lambda: (np.abs(piece - nominal) > tolerance / 2 for piece in x.pieces())))
     variance = intervals.variance(x)
