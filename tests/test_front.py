@@ -1,5 +1,6 @@
 """What a user sees first: names, handles, versions, how things print, and a model's own method."""
 
+import html
 import tomllib
 from pathlib import Path
 
@@ -38,6 +39,17 @@ def test_declared_things_print_as_rows():
     assert a._repr_html_().startswith("<pre>assembly RA1") and "<script" not in tc.Assembly("<script>")._repr_html_()
     assert repr(a.parts[0]) == "part base: box 100 x 50 x 10 mm"
     assert repr(a.parts[0].face("+z")) == "base +z" and repr(a.parts[0].point(1, 2, 3)) == "base (1, 2, 3)"
+    for declared in (*a.pairs, *a.measures, *a.parts, tc.Locator("A", (0, 0, 0), "z", 1.0), tc.Tolerance(1)):
+        assert repr(declared) == str(declared) and "object at" not in str(declared) and "\n" not in str(declared)
+        assert declared._repr_html_() == f"<pre>{html.escape(str(declared))}</pre>"
+
+
+def test_programs_and_blocks_are_readable():
+    program = tc.build(cases.ra1(), solver="daqp")
+    assert repr(program).splitlines()[0] == "program of RA1: daqp, linearized, active points"
+    assert "  contact interface: 202 contact points" in repr(program)
+    (block,) = tc.simulate_blocks(program, samples=100, seed=1)
+    assert repr(block).startswith("realizations 0 to 99: ") and "resolved" in repr(block)
 
 
 def test_faults_are_listed_without_a_run():

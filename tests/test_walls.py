@@ -32,9 +32,9 @@ NEVER = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses", "compiled",
-    "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics",
-    "archive", "workflow", "report", "testing", "cli", "__init__", "__main__",
+    "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
+    "compiled", "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation",
+    "statistics", "archive", "workflow", "report", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from tolcontact.mechanics.pose import ENTRIES, poses_of, relative
 from tolcontact.mechanics.quiet import MAKING, quiet
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
+from tolcontact.readable import Readable
 
 log = logging.getLogger(__name__)
 
@@ -35,8 +36,8 @@ class ContactGroup:
     solve: ContactSolver
 
 
-@dataclass(frozen=True, eq=False)
-class Program:
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(Readable):
     """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
 
     place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
@@ -56,6 +57,17 @@ class Program:
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     tapes: dict[str, Tape]
+
+    def __str__(self) -> str:
+        nominal, method = self.nominal, self.method
+        rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
+        rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
+        rows += [f"  contact {pair.name}: {len(pair.P_m)} contact points" for pair in nominal.pairs]
+        rows += [
+            f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
+            for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
+        ]
+        return "\n".join(rows)
 
 
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:

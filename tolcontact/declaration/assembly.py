@@ -1,6 +1,5 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
-import html
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
@@ -16,11 +15,12 @@ from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import direction, script_line
 from tolcontact.declaration.vectors import vector as _vector
 from tolcontact.method import Method
+from tolcontact.readable import Readable
 
 CONSTANT = 1e-3
 
 
-class Assembly:
+class Assembly(Readable):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record what is declared; `faults()` lists everything that is wrong with it.
@@ -223,13 +223,6 @@ class Assembly:
     def __str__(self) -> str:
         rows = [*self._parts, *self._locations, *self._pairs, *self._forces, *self._measures]
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
-
-    def __repr__(self) -> str:
-        return str(self)
-
-    def _repr_html_(self) -> str:
-        """As notebooks show it."""
-        return f"<pre>{html.escape(str(self))}</pre>"
 
 
 def _expect(what: str, value: Any, kind: Any, wanted: str) -> None:

@@ -5,12 +5,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tolcontact.declaration.part import Face
+from tolcontact.readable import Readable
 
 VERTICES = "vertices"
 
 
-@dataclass(frozen=True, eq=False)
-class ContactPair:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPair(Readable):
     """Points of the `moving` face are kept outside the `reference` face.
 
     The points are `points` of them spread evenly, or as many as keep every spot of the face within `spacing` [mm] of

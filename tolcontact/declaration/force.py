@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 from tolcontact.declaration.part import Point
 from tolcontact.declaration.vectors import Vector, is_finite
+from tolcontact.readable import Readable
 
 
-@dataclass(frozen=True, eq=False)
-class Force:
+@dataclass(frozen=True, eq=False, repr=False)
+class Force(Readable):
     """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
 
     name: str

@@ -7,10 +7,11 @@ from typing import Any
 
 from tolcontact.declaration.vectors import is_length
 from tolcontact.errors import shown
+from tolcontact.readable import Readable
 
 
-@dataclass(frozen=True)
-class Box:
+@dataclass(frozen=True, repr=False)
+class Box(Readable):
     """A block from the origin of its part's frame to (x, y, z) [mm]."""
 
     x: float
@@ -31,8 +32,8 @@ STEP = (".step", ".stp")
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
 
 
-@dataclass(frozen=True, eq=False)
-class Mesh:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mesh(Readable):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
     `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m,

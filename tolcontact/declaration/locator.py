@@ -11,10 +11,11 @@ from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import Vector, is_finite, is_length
 from tolcontact.declaration.vectors import direction as _direction
 from tolcontact.declaration.vectors import vector as _vector
+from tolcontact.readable import Readable
 
 
-@dataclass(frozen=True)
-class Locator:
+@dataclass(frozen=True, repr=False)
+class Locator(Readable):
     """A point of a part [mm], a direction into the part, and the deviation along it; in the part's own frame.
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
@@ -64,8 +65,8 @@ class Locator:
         return f"{kind} {self.name}: ({point}) along ({along}), {self.tolerance}"
 
 
-@dataclass(frozen=True, eq=False)
-class ThreeTwoOne:
+@dataclass(frozen=True, eq=False, repr=False)
+class ThreeTwoOne(Readable):
     """A 3-2-1 scheme on three faces; its six points follow from the faces once their geometry is known.
 
     A1, A2 on the primary face beside the secondary one, `inset` from its ends; A3 opposite, half way; B1, B2 on the
@@ -96,8 +97,8 @@ def three_two_one(primary: Face, secondary: Face, tertiary: Face, *, inset: floa
     return ThreeTwoOne(primary, secondary, tertiary, inset)
 
 
-@dataclass(frozen=True, eq=False)
-class Location:
+@dataclass(frozen=True, eq=False, repr=False)
+class Location(Readable):
     """How one part is located: its locators, their common tolerance, and what they are attached to (None: the ground)."""
 
     part: Part

@@ -8,10 +8,11 @@ from typing import Any
 from tolcontact.declaration.names import is_line
 from tolcontact.declaration.part import Point
 from tolcontact.declaration.vectors import Vector, is_finite
+from tolcontact.readable import Readable
 
 
-@dataclass(frozen=True, eq=False)
-class Measure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Measure(Readable):
     """A number taken from the poses of the parts.
 
         of one Point                how far it moved from its nominal place, along `along` [mm]

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Selection, criterion
 from tolcontact.declaration.vectors import Vector, is_finite, script_line, vector
+from tolcontact.readable import Readable
 
 if TYPE_CHECKING:
     from tolcontact.declaration.selection import Picker
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Part:
+class Part(Readable):
     """A rigid body: its shape, its place in the nominal assembly, and whether contact may move it.
 
     Its own coordinates `p` lie at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation
@@ -52,12 +53,9 @@ class Part:
         choice = {None: "", True: ", fixed", False: ", free"}[self.fixed]
         return f"part {self.name}: {self.geometry}{place}{choice}"
 
-    def __repr__(self) -> str:
-        return str(self)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Point:
+class Point(Readable):
     """A point of a part, in the part's own frame [mm]."""
 
     part: Part
@@ -70,12 +68,9 @@ class Point:
     def __str__(self) -> str:
         return "{} ({:g}, {:g}, {:g})".format(self.part.name, *self.position)
 
-    def __repr__(self) -> str:
-        return str(self)
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Face:
+class Face(Readable):
     """The triangles of a part's surface that meet every criterion."""
 
     part: Part
@@ -92,6 +87,3 @@ class Face:
 
     def __str__(self) -> str:
         return " ".join([self.part.name, *map(str, self.selections)])
-
-    def __repr__(self) -> str:
-        return str(self)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from tolcontact.declaration.vectors import DIRECTIONS, Vector, is_finite, is_length, vector
 from tolcontact.declaration.vectors import direction as _direction
+from tolcontact.readable import Readable
 
 if TYPE_CHECKING:
     import numpy as np
@@ -22,8 +23,8 @@ class Selection(Protocol):
     def faults(self) -> Iterator[str]: ...
 
 
-@dataclass(frozen=True)
-class Facing:
+@dataclass(frozen=True, repr=False)
+class Facing(Readable):
     """Triangles whose outward normal is within `angle` [rad] of `direction`: "+x" to "-z", or a vector."""
 
     direction: Any
@@ -49,8 +50,8 @@ class Facing:
         return "facing ({})".format(", ".join(f"{c:g}" for c in self.axis))
 
 
-@dataclass(frozen=True)
-class Triangles:
+@dataclass(frozen=True, repr=False)
+class Triangles(Readable):
     """Triangles by their indices in the mesh."""
 
     indices: tuple[int, ...]
@@ -66,8 +67,8 @@ class Triangles:
         return f"({len(self.indices)} triangles)"
 
 
-@dataclass(frozen=True, eq=False)
-class Picked:
+@dataclass(frozen=True, eq=False, repr=False)
+class Picked(Readable):
     """Triangles that a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -] picks."""
 
     function: "Picker"
@@ -79,8 +80,8 @@ class Picked:
         return "(selected)"
 
 
-@dataclass(frozen=True)
-class Inside:
+@dataclass(frozen=True, repr=False)
+class Inside(Readable):
     """What lies inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there."""
 
     lower: Vector
@@ -101,8 +102,8 @@ class Inside:
         return "inside {} to {}".format(*corners)
 
 
-@dataclass(frozen=True, eq=False)
-class Near:
+@dataclass(frozen=True, eq=False, repr=False)
+class Near(Readable):
     """Flat faces, and triangles of curved ones, that face `part` and come within `within` [mm] of it nominally."""
 
     part: Any  # a Part, whose module imports this one
@@ -116,8 +117,8 @@ class Near:
         return f"within {self.within:g} mm of {self.part.name}"
 
 
-@dataclass(frozen=True)
-class Brep:
+@dataclass(frozen=True, repr=False)
+class Brep(Readable):
     """The face of a STEP file's boundary representation that passes through the point `at` [mm]."""
 
     at: Vector

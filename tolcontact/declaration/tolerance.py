@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from tolcontact.declaration.vectors import is_length
+from tolcontact.readable import Readable
 
 SHAPES = ("normal", "uniform", "triangular", "truncated normal")
 
 
-@dataclass(frozen=True)
-class Tolerance:
+@dataclass(frozen=True, repr=False)
+class Tolerance(Readable):
     """A deviation [mm] around 0 that fills a zone of full width `range`.
 
         normal             6 sigma = range, unbounded (the default)

@@ -6,11 +6,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
+from tolcontact.readable import Readable
 from tolcontact.vocabulary import STATES, Status
 
 
-@dataclass(frozen=True, eq=False)
-class Block:
+@dataclass(frozen=True, eq=False, repr=False)
+class Block(Readable):
     """Realizations `start` to `start + n`; the first dimension of every array is the realization.
 
     deviations    (n, locator) [mm]
@@ -46,7 +47,7 @@ class Block:
     def __len__(self) -> int:
         return len(self.status)
 
-    def __repr__(self) -> str:
+    def __str__(self) -> str:
         counts = np.bincount(self.status, minlength=len(Status))
         found = ", ".join(f"{counts[status]} {status.name.lower()}" for status in Status if counts[status])
         return f"realizations {self.start} to {self.start + len(self) - 1}: {found}"
