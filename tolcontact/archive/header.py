@@ -17,7 +17,7 @@ from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import to_document
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import Variable
@@ -100,6 +100,21 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             **run_settings(program, run),
         }
     )
+    _write_labels(file, nominal)
+    _write_rows(file, program, kept_rows(run.keep))
+    _write_measures(file, program)
+    _write_model(file.createGroup("model"), nominal, declaration(program))
+    _write_contact(file.createGroup("contact"), nominal)
+    _write_sample(file.createGroup("sample"), nominal, deviations=words.DEVIATION in kept_rows(run.keep))
+    checked = file.createGroup("surface")
+    checked.createDimension(words.CHECKED, run.surfaces)
+    _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
+    for part, numbers in zip(nominal.parts, sums, strict=True):
+        _write_field(file.createGroup(words.field_of(part.name)), part, numbers)
+
+
+def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
+    """Dimensions of the root, and what their places are called."""
     labels = {
         words.STATE: words.STATES,
         words.PART: [part.name for part in nominal.parts],
@@ -116,44 +131,52 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             write(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
-    rows = kept_rows(run.keep)
+
+
+def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Variable]) -> None:
+    """The variables of realizations, their checksums, and the places of checkpoints; all without values yet."""
     for variable in words.ROWS:
         if variable in rows:
             define(file, variable)
+    file[words.REACTION.name].units = program.method.minimizes.reaction_units
     file.createDimension(words.BLOCK, None)
     file.createDimension(words.ROW_VARIABLE, len(rows))
     write(file, words.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
     define(file, words.ROW_CHECKSUM)
     file.createDimension(words.CHECKPOINT, 2)
     lay_out(file, words.SUMMED_ROWS, [words.UNFINISHED] * 2)
-    file[words.REACTION.name].units = program.method.minimizes.reaction_units
-    units = [measure.units for measure in nominal.measures]
+
+
+def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
+    measures = program.nominal.measures
+    units = [measure.units for measure in measures]
     if set(units) != {"mm"}:
         file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
     write(file, words.MEASURE_NOMINAL, program.nominal_measures)
-    write(file, words.MEASURE_TOLERANCE, [np.nan if m.tolerance is None else m.tolerance for m in nominal.measures])
+    write(file, words.MEASURE_TOLERANCE, [np.nan if m.tolerance is None else m.tolerance for m in measures])
     write(file, words.MEASURE_UNITS, units)
-    _write_model(file.createGroup("model"), nominal, declaration(program))
-    _write_contact(file.createGroup("contact"), nominal)
-    _write_sample(file.createGroup("sample"), nominal, deviations=words.DEVIATION in rows)
-    checked = file.createGroup("surface")
-    checked.createDimension(words.CHECKED, run.surfaces)
-    _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
-    for part, numbers in zip(nominal.parts, sums, strict=True):
-        group = file.createGroup(f"field/{words.group_of(part.name)}")
-        group.setncattr("part", part.name)
-        for name, size in ((words.VERTEX, len(part.vertices)), (words.FACE, len(part.faces)), (words.CORNER, 3)):
-            group.createDimension(name, size)
-        sizes = {words.COMPONENT: len(words.COMPONENTS), words.BOUND: len(words.BOUNDS), words.NUMBER: numbers}
-        for name, size in sizes.items():
-            group.createDimension(name, size)
-        write(group, words.COMPONENT_LABEL, words.COMPONENTS)
-        write(group, words.FIELD_VERTICES, part.vertices)
-        write(group, words.FIELD_FACES, part.faces)
-        write(group, words.BOUND_LABEL, words.BOUNDS)
-        _lay_out_together(group, no_field(len(part.vertices)))
-        lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), numbers], np.nan))
-        lay_out(group, words.SUMS_CHECKSUM, [words.UNFINISHED] * 2)
+
+
+def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
+    """The surface of a part, and room for its displacement field and its sums."""
+    group.setncattr("part", part.name)
+    sizes = {
+        words.VERTEX: len(part.vertices),
+        words.FACE: len(part.faces),
+        words.CORNER: 3,
+        words.COMPONENT: len(words.COMPONENTS),
+        words.BOUND: len(words.BOUNDS),
+        words.NUMBER: numbers,
+    }
+    for name, size in sizes.items():
+        group.createDimension(name, size)
+    write(group, words.COMPONENT_LABEL, words.COMPONENTS)
+    write(group, words.FIELD_VERTICES, part.vertices)
+    write(group, words.FIELD_FACES, part.faces)
+    write(group, words.BOUND_LABEL, words.BOUNDS)
+    _lay_out_together(group, no_field(len(part.vertices)))
+    lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), numbers], np.nan))
+    lay_out(group, words.SUMS_CHECKSUM, [words.UNFINISHED] * 2)
 
 
 def kept_rows(kept: str) -> tuple[Variable, ...]:

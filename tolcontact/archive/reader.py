@@ -10,7 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.document import from_document
+from tolcontact.declaration.rebuilding import from_document
 from tolcontact.errors import ArchiveError
 
 

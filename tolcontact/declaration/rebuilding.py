@@ -1,0 +1,151 @@
+"""An assembly from the plain document that an archive keeps of it."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.contact_pair import VERTICES, ContactPair
+from tolcontact.declaration.force import Force
+from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
+from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.part import Face, Part, Point
+from tolcontact.declaration.said import Said
+from tolcontact.declaration.selection import Facing, Inside, Triangles
+from tolcontact.declaration.tape import tape_of
+from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
+from tolcontact.declaration.vectors import DIRECTIONS
+from tolcontact.errors import OptionError
+from tolcontact.method import Method
+
+T = TypeVar("T")
+MOST = 2**31  # of triangles, or points
+
+
+def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
+    """The assembly of a document; `meshes` holds a mesh (anything with vertices and faces) for each mesh part.
+
+    Raises ArchiveError for a document that `to_document` cannot have made. Nothing in it is run.
+    """
+    whole, reader = Said(document), _Reader(meshes)
+    for said in whole["parts"]:
+        new = reader.part(said)
+        if new.name in reader.parts:
+            raise said["name"].wrong("a name that no other part has")
+        reader.parts[new.name] = new
+    assembly = Assembly.of(
+        whole["name"].text(),
+        _optional(whole["method"], _method_of) if "method" in whole else None,  # which the first format does not have
+        parts=reader.parts.values(),
+        locations=map(reader.location, whole["locations"]),
+        pairs=map(reader.pair, whole["pairs"]),
+        measures=map(reader.measure, whole["measures"]),
+        forces=map(reader.force, whole["forces"]),
+    )
+    for fault in assembly.faults():  # a model that has any is not archived
+        raise whole.refused(fault)
+    return assembly
+
+
+class _Reader:
+    """What is said of each thing, as the thing itself. Parts come first: the others refer to them."""
+
+    def __init__(self, meshes: Mapping[str, Any]) -> None:
+        self.meshes = meshes
+        self.parts: dict[str, Part] = {}
+
+    def known(self, said: Said) -> Part:
+        if said.text() not in self.parts:
+            raise said.wrong("the name of a part")
+        return self.parts[said.text()]
+
+    def face(self, said: Said) -> Face:
+        if "direction" in said:
+            chosen: Facing | Triangles = Facing(said["direction"].one_of(DIRECTIONS))
+        else:
+            chosen = Triangles(tuple(index.index(MOST) for index in said["triangles"]))
+        boxes = [[corner.vector() for corner in box.items(2)] for box in said["inside"]]
+        return Face(self.known(said["part"]), (chosen, *(Inside(lower, upper) for lower, upper in boxes)))
+
+    def point(self, said: Said) -> Point:
+        return Point(self.known(said["part"]), said["position"].vector())
+
+    def locator(self, said: Said) -> Locator:
+        return Locator(
+            said["name"].text(),
+            said["point"].vector(),
+            said["direction"].vector(),
+            _optional(said["tolerance"], _tolerance_of),
+            one_sided=said["one_sided"].boolean(),
+            stiffness=said["stiffness"].number(),
+        )
+
+    def location(self, said: Said) -> Location:
+        scheme: ThreeTwoOne | tuple[Locator, ...]
+        if "three_two_one" in said["scheme"]:
+            primary, secondary, tertiary = map(self.face, said["scheme"]["three_two_one"].items(3))
+            scheme = ThreeTwoOne(primary, secondary, tertiary, said["scheme"]["inset"].number())
+        else:
+            scheme = tuple(map(self.locator, said["scheme"]))
+        common, on = _optional(said["tolerance"], _tolerance_of), _optional(said["on"], self.known)
+        return Location(self.known(said["part"]), scheme, common, on, said["declared_at"].text())
+
+    def pair(self, said: Said) -> ContactPair:
+        points = said["points"].one_of([VERTICES]) if said["points"].is_text else _optional(said["points"], _count)
+        spacing, within = (_optional(said[word], Said.number) for word in ("spacing", "within"))
+        sides = self.face(said["moving"]), self.face(said["reference"])
+        return ContactPair(said["name"].text(), *sides, points, spacing, within, said["declared_at"].text())
+
+    def measure(self, said: Said) -> Measure:
+        of = self.point(said["of"]) if "of" in said else tape_of(said["tape"], len(self.parts))
+        to = self.point(said["to"]) if "to" in said else None
+        along, tolerance = _optional(said["along"], Said.vector), _optional(said["tolerance"], Said.number)
+        return Measure(said["name"].text(), of, to, along, tolerance, said["units"].text(), said["declared_at"].text())
+
+    def force(self, said: Said) -> Force:
+        return Force(said["name"].text(), self.point(said["at"]), said["vector"].vector(), said["declared_at"].text())
+
+    def part(self, said: Said) -> Part:
+        name = said["name"].text()
+        if "box" in said["geometry"]:
+            geometry: Box | Mesh = Box(*said["geometry"]["box"].vector())
+        elif name in self.meshes:
+            geometry = Mesh(self.meshes[name])
+        else:
+            raise said["name"].wrong("a part with a mesh, or with a box")
+        place, fixed = (said["at"].vector(), said["rotation"].vector()), _optional(said["fixed"], Said.boolean)
+        return Part(name, geometry, *place, fixed, said["declared_at"].text())
+
+
+def _optional(said: Said, read: Callable[[Said], T]) -> T | None:
+    return None if said.is_none else read(said)
+
+
+def _method_of(said: Said) -> Method:
+    choices = {word: value.text() if value.is_text else value.number() for word, value in said.pairs().items()}
+    try:
+        return Method(**choices)  # type: ignore[arg-type]
+    except (OptionError, TypeError) as error:
+        raise said.refused(str(error)) from error
+
+
+def _count(said: Said) -> int:
+    return said.index(MOST)
+
+
+def _tolerance_of(said: Said) -> Tolerance:
+    if "scipy" not in said:
+        return Tolerance(said["range"].number(), said["distribution"].one_of(SHAPES))
+    name, keywords = said["scipy"].text(), said["kwds"].pairs()
+    distribution = scipy_distribution(name)
+    if distribution is None:
+        raise said["scipy"].wrong("a continuous distribution of scipy.stats")
+    try:
+        return Tolerance(
+            distribution=distribution(
+                *(argument.number() for argument in said["args"]),
+                **{word: value.number() for word, value in keywords.items()},
+            )
+        )
+    except (TypeError, ValueError) as error:  # parameters that it does not have
+        raise said.refused(f"scipy.stats.{name}: {error}") from error
