@@ -1,5 +1,7 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
+import multiprocessing
+
 import netCDF4
 import numpy as np
 import pytest
@@ -12,10 +14,13 @@ from tests.helpers import COMMAND, model_in, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.archive import inspection
+from tolcontact.child import ChildDiedError
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
 HARMLESS = ("declared_at is an escape",)  # what is shown as it is written
+FORKS = multiprocessing.get_context("forkserver")
+FORKS.set_forkserver_preload(["tolcontact.archive.inspection"])
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
 
@@ -33,8 +38,25 @@ def program():
 
 @pytest.fixture
 def near(monkeypatch):
-    """The inspection in this process: without starting another one, some hundred files take seconds."""
-    monkeypatch.setattr(inspection, "run_child", lambda _script, path, **_: inspection._look(inspection.Path(path)))
+    """The inspection in a process that need not import anything: some hundred files take seconds."""
+
+    def look_nearby(_script, path, **_):
+        there, here = FORKS.Pipe()
+        process = FORKS.Process(target=look, args=(path, here))
+        process.start()
+        here.close()
+        try:
+            return there.recv()
+        except EOFError as error:  # the netCDF library may crash
+            raise ChildDiedError("its reader died") from error
+        finally:
+            process.join()
+
+    monkeypatch.setattr(inspection, "run_child", look_nearby)
+
+
+def look(path, answer):
+    answer.send(inspection._look(inspection.Path(path)))
 
 
 @pytest.mark.usefixtures("near")
@@ -136,7 +158,7 @@ def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):
 
 def test_a_newer_format_is_named(good, tmp_path):
     make(good, tmp_path / "newer.nc", "format is newer")
-    with pytest.raises(ArchiveError, match="has format 99; this version of tolcontact reads formats up to 2"):
+    with pytest.raises(ArchiveError, match="has format 99; this version of tolcontact reads formats up to 3"):
         tc.open_archive(tmp_path / "newer.nc")
 
 
