@@ -30,6 +30,7 @@ def largest_turn(run):
     return pose.turn(run["poses"][:, RAW], run["poses"][:, CORRECTED]).max(axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("wedges", [3, 6])
 def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
@@ -57,6 +58,7 @@ def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_
     assert np.abs(runs[0]["poses"] - runs[1]["poses"]).max() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("seed", [1, 2])
 def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
@@ -128,6 +130,7 @@ def told(make, **options):
     return program, run, [str(one.message) for one in caught if one.category is ContactWarning]
 
 
+@pytest.mark.slow
 def test_a_shaft_in_a_v_rests_where_it_should():
     """Default points: bias below a thousandth of the tolerance range, or a warning that names the error."""
     program, run, _ = told(cases.shaft_in_a_v(1000), samples=100, solver="daqp", method=SEATED)
@@ -141,6 +144,7 @@ def test_a_shaft_in_a_v_rests_where_it_should():
     assert len(warned) == 2 and "between its contact points" in warned[0]
 
 
+@pytest.mark.slow
 def test_a_peg_that_can_spin_lies_at_the_side_of_its_hole():
     """Planes at fixed points let it roll into the wall: such answers are tried again with points projected anew."""
     _, run, _ = told(cases.peg_in_a_hole(), samples=8, solver="daqp", method=SEATED)
@@ -153,6 +157,7 @@ def test_a_peg_that_can_spin_lies_at_the_side_of_its_hole():
     assert run["searched"][resolved].all()
 
 
+@pytest.mark.slow
 def test_a_ball_rests_in_a_cone():
     _, run, _ = told(cases.ball_in_a_cone(), samples=6, solver="daqp", method=SEATED)
     resolved = run["status"] == Status.RESOLVED
@@ -165,6 +170,7 @@ def test_a_ball_rests_in_a_cone():
     assert np.linalg.norm(centre - apex - height[:, None] * axis, axis=1).max() < 1e-3  # on the cone's axis
 
 
+@pytest.mark.slow
 def test_surfaces_are_checked_between_contact_points(tmp_path):
     """A shaft on few points sinks into the walls; the archive says how deep, and the true answer agrees."""
     with warnings.catch_warnings():
@@ -213,8 +219,9 @@ def test_polishing_finds_the_solution_from_the_rows_that_carry():
     H = np.eye(size) + np.zeros((count, 1, 1))
     g = -x + np.einsum("kij,ki->kj", A, lam) + bound
     problem = {"h": H, "g": g, "a": A, "lba": lower}
-    blurred = [values * (1 + 1e-5 * rng.normal(size=values.shape)) for values in (x, -lam, -bound)]
-    y, lam_a, lam_x = polished(problem, blurred, equal, slacks)
+    known = {"x": x, "lam_a": -lam, "lam_x": -bound}
+    blurred = {name: values * (1 + 1e-5 * rng.normal(size=values.shape)) for name, values in known.items()}
+    y, lam_a, lam_x = polished(problem, blurred, equal, slacks).values()
     assert np.abs(y - x).max() < 1e-9
     assert np.abs(np.einsum("kij,kj->ki", H, y) + g + np.einsum("kij,ki->kj", A, lam_a) + lam_x).max() < 1e-10
     assert np.abs((np.einsum("kij,kj->ki", A, y) - lower)[carries]).max() < 1e-10
@@ -244,6 +251,7 @@ def _patch_of(part, direction):
     return patch(part.face(direction), {part: mesh}).placed(np.eye(3), np.array(part.at))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(0, 60, 2))
 def test_nothing_contradicts_a_certificate(seed):
     """Random scenes: see studies/certificates, which judges many more."""

@@ -10,6 +10,8 @@ import pytest
 import tolcontact
 from tests.helpers import finish, run, script, start
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory):

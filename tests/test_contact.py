@@ -53,6 +53,7 @@ def test_solvers_agree_on_the_same_draws(case, solver):
     assert (run["status"] == reference["status"]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "case, solver, tolerance",
     [
@@ -109,6 +110,7 @@ def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not(
     assert closed["gap_min"][only_upper, CORRECTED, 0].min() > -1e-2
 
 
+@pytest.mark.slow
 def test_planar_contact_is_flush():
     """CASES C2: with three or more active points that are not collinear, every active gap becomes 0, to order eta."""
     program, run = simulate(cases.ra1(), samples=1000)
@@ -153,6 +155,7 @@ METHODS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [cases.ra1, cases.stack], ids=["ra1", "stack"])
 class TestInvariance:
     """CASES C9. Seating: tests/test_seating.py."""

@@ -59,6 +59,7 @@ def look(path, answer):
     answer.send(inspection._look(inspection.Path(path)))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("near")
 @pytest.mark.parametrize("name", [name for name in HOSTILE if name not in CRASHES])
 def test_an_archive_with_a_lie_is_refused_in_one_line(name, good, program, tmp_path):
@@ -79,6 +80,7 @@ def resume(program, path):
     tc.run(program, samples=5000, out=path, resume=True, surfaces=4).close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["runs tests", "title is an escape", "claims 1e12 realizations", "is deep", *CRASHES])
 def test_the_command_refuses_with_code_2(name, good, tmp_path):
     path = tmp_path / "hostile.nc"
@@ -162,6 +164,7 @@ def test_a_newer_format_is_named(good, tmp_path):
         tc.open_archive(tmp_path / "newer.nc")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [*NAMES, "part_", "part__", "sum", "vertices", "état", "e\u0301tat", "a b", "点", "x" * 200])
 def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
     a = tc.Assembly(name)

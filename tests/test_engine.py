@@ -25,6 +25,7 @@ RNG = np.random.default_rng(5)
 PLANAR = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", PLANAR.values(), ids=PLANAR)
 @pytest.mark.parametrize("method", [tc.Method(), tc.Method(resolution="exact", objective="locator stiffness")], ids=str)
 def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(make, method):
@@ -65,6 +66,7 @@ EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": 
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", ["linearized", "exact"])
 @pytest.mark.parametrize("make", EVERY.values(), ids=EVERY)
 def test_few_rows_give_what_all_rows_give(make, resolution, monkeypatch):
@@ -91,6 +93,7 @@ def test_only_corners_of_planar_contacts_can_be_the_deepest():
     assert np.abs(gaps.min(axis=1) - gaps[:, found.corners].min(axis=1)).max() < 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["daqp", "qpoases", "highs"])
 def test_results_do_not_depend_on_the_number_of_threads(solver, monkeypatch):
     program = tc.build(cases.model("channel"), solver=solver, method=tc.Method(resolution="exact"))

@@ -20,6 +20,7 @@ JUDGED = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", JUDGED)
 def test_no_nonlinear_solver_does_better(name):
     """200 realizations: objective within 1e-6 of ipopt's or lower, no gap, and a KKT residual found without our multipliers."""
@@ -49,6 +50,7 @@ def certified(program, run):
     return np.min(least, axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", ["active points", "all points", "locator stiffness"])
 @pytest.mark.parametrize("make", [lambda: cases.model("tower"), cases.ring, cases.jaws], ids=["tower", "ring", "jaws"])
 def test_many_bodies_are_resolved(make, objective):
@@ -66,6 +68,7 @@ def test_many_bodies_are_resolved(make, objective):
     assert (run["carrying"].sum(axis=1) > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_opposed_faces_without_clearance(solver):
     """CASES C8: one linear step cannot open all gaps, repeated ones always do. The pose there is a slide along y."""
@@ -93,6 +96,7 @@ def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
     assert (fits["status"] == Status.RESOLVED).all()
 
 
+@pytest.mark.slow
 def test_share_of_square_pins_that_do_not_fit():
     """CASES C6: 0.049133 of the draws cannot be assembled."""
     samples = 20_000
@@ -102,6 +106,7 @@ def test_share_of_square_pins_that_do_not_fit():
     assert abs(share - 0.049133) < 3.3 * np.sqrt(0.049133 * (1 - 0.049133) / samples)
 
 
+@pytest.mark.slow
 def test_conflicts_do_not_loosen_two_sided_locators():
     """Also with a solver that finds no rest there: poses of least penetration are poses that the locators allow."""
     program = tc.build(cases.square_pins(), solver="daqp", method=SEATED)

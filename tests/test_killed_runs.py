@@ -8,6 +8,8 @@ from tests import cases
 from tests.helpers import contents, finish, run, script, start
 from tolcontact.errors import ArchiveError
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
 def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):

@@ -58,6 +58,7 @@ def test_cells_give_way_most_in_the_middle_and_their_pitch_varies_less():
     assert found["pitch in the middle"] < 0.7
 
 
+@pytest.mark.slow
 def test_blocks_of_a_tower_only_push_each_other_up():
     _, run = simulate(cases.model("tower"), samples=1000, solver="daqp", method=METHODS["tower"])
     top = run["measured"][..., 0]
@@ -67,6 +68,7 @@ def test_blocks_of_a_tower_only_push_each_other_up():
     assert top[:, CORRECTED].min() > -0.4
 
 
+@pytest.mark.slow
 def test_a_cover_stays_within_the_clearance_of_its_pins():
     """The hole stays within half the clearance of its pin, wherever the pin stands."""
     program, run = simulate(cases.model("cover"), samples=300, solver="daqp", method=ALL_POINTS)
@@ -95,6 +97,7 @@ def test_ra2_has_3000_contact_points(ra2):
     assert 74 < lean.min() and lean.max() < 76  # flanges are not orthogonal to the web
 
 
+@pytest.mark.slow
 def test_ra2_comes_to_the_papers_figures(ra2):
     """As for RA1: inside the 95 % prediction interval for one more run of N = 1000, all six figures together."""
     runs = []

@@ -14,6 +14,7 @@ from tolcontact.compilation import usable_plugins
 from tolcontact.mechanics.quiet import quiet
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", usable_plugins())
 @pytest.mark.parametrize("case", ["block on six", "parked"])
 def test_solvers_print_nothing(solver, case, capfd):

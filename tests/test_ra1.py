@@ -40,6 +40,7 @@ def first_order(d):
     return np.stack([raw, np.where(np.min(gaps, axis=0) < 0, base @ plane_weights(BASE, MEASURED), raw)], axis=1)
 
 
+@pytest.mark.slow
 def test_the_papers_six_figures_lie_inside_the_scatter_of_20_seeds():
     """Inside the 95 % prediction interval for one more run of N = 1000, all six figures together (Bonferroni).
 

@@ -14,6 +14,8 @@ from tolcontact.compilation import ACCURACY
 from tolcontact.method import OBJECTIVES
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
+pytestmark = pytest.mark.slow
+
 lengths = st.floats(2, 50)
 ranges = st.sampled_from([0.0, 0.01, 0.1, 1.0])
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import pytest
 import xarray as xr
 
 import tolcontact as tc
@@ -21,6 +22,7 @@ def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path
     assert list(first["measure_units"].values) == ["mm", "mm", "rad"]
 
 
+@pytest.mark.slow
 def test_faces_of_step_files_are_rebuilt_without_the_files():
     first = tc.run(cases.model("cover"), samples=50, seed=2, solver="daqp", method=ALL_POINTS)
     rebuilt = tc.model_of(first)

@@ -12,6 +12,7 @@ from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), ("qpoases", "measures")])
 def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path):
     paths = [tmp_path / "grown.nc", tmp_path / "whole.nc"]

@@ -91,6 +91,7 @@ def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeyp
     assert [Path(file["path"]).name for file in files] == ["a.stl", "b.ply", "c.step"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_the_reader_ends_with_an_interrupted_process(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())

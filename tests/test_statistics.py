@@ -33,6 +33,7 @@ TRUTH = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_intervals_cover_the_truth_in_95_of_100(name):
     estimate, truth = TRUTH[name]
@@ -76,6 +77,7 @@ def test_a_constant_has_no_spread():
         assert np.isnan(intervals.variance_ratio(x, np.arange(1000.0))).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [2, 3, 5, 10, 30])
 def test_intervals_of_spreads_cover_in_small_samples(size):
     rng = np.random.default_rng(2)

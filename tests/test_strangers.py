@@ -68,6 +68,7 @@ STRANGE = [
 ]  # fmt: skip
 
 
+@pytest.mark.slow
 def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(document):
     accepted = 0
     for path in places(document):
@@ -83,6 +84,7 @@ def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(document):
     assert accepted
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_two_strange_values_end_in_one_error_too(document, data):

@@ -37,6 +37,7 @@ def left_in(folder):
     return sorted(p.name for p in folder.iterdir())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("apart", [0.0, 0.5])
 def test_of_two_runs_on_one_new_name_one_is_refused_and_the_others_rows_are_whole(apart, tmp_path):
     begun = [begin(tmp_path, "--samples", 30_000, "--out", "new.nc", "--seed", 1)]
@@ -81,6 +82,7 @@ def test_more_than_the_disk_holds_is_refused_before_the_first_byte(tmp_path):
     assert (tmp_path / "small.nc").read_bytes() == before and len(list(tmp_path.iterdir())) == 1
 
 
+@pytest.mark.slow
 def test_a_long_run_stands_under_its_own_name_from_its_first_block_on(tmp_path):
     path, sizes, samples = tmp_path / "long.nc", [], vocabulary.FIRST_ROWS + 9000
     tc.run(
@@ -94,6 +96,7 @@ def test_a_long_run_stands_under_its_own_name_from_its_first_block_on(tmp_path):
         assert tc.summarize(grown).attrs["realizations"] == samples
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_path, capsys):
     def interrupt(rows):
         if rows >= 8192:
@@ -114,6 +117,7 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
         assert one.identical(other), group
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by, code, tmp_path):
     begun = begin(tmp_path, "--samples", 10_000_000, "--out", "stopped.nc", "--keep", "measures")
