@@ -1,0 +1,161 @@
+"""What stands in an archive beside its rows: settings, models, contacts, samples, and which rows were looked at again."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+import xarray as xr
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tests.test_contact import simulate
+from tolcontact.errors import ArchiveError
+
+SEATED = {"resolution": "exact", "objective": "seating"}
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    path = tmp_path_factory.mktemp("archive") / "stack.nc"
+    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, surfaces=12).close()
+    return path
+
+
+def checked(tree):
+    return tree["surface"].to_dataset()["realization_checked"].values.tolist()
+
+
+def test_a_third_of_the_checked_rows_are_the_deepest_and_a_third_those_with_most_carrying_points(archive):
+    root = xr.load_dataset(archive)
+    certified = np.isin(root.status.values, [tc.Status.UNTOUCHED, tc.Status.RESOLVED])
+    rows = checked(xr.load_datatree(archive))
+    assert len(rows) == 12 and rows == sorted(set(rows)) and certified[rows].all()
+    inside = np.where(certified, -root.gap_min.sel(state="corrected").values.min(axis=1), -1)
+    carrying = np.where(certified, root.carrying.values.sum(axis=1), -1)
+    deepest, busiest = (np.argsort(-values, kind="stable")[:4] for values in (inside, carrying))
+    assert (inside[deepest] > 1e-9).all()
+    assert {*deepest, *busiest} < set(rows)
+
+
+def test_the_other_checked_rows_are_drawn(archive):
+    """Without penetration and with few carrying points nothing is special: what is drawn depends on the seed."""
+    runs = [tc.run(cases.stack(), samples=300, seed=seed, solver="daqp", surfaces=12) for seed in (3, 4)]
+    assert checked(runs[0]) == checked(xr.load_datatree(archive)) != checked(runs[1])
+    few = checked(tc.run(cases.stack(), samples=5, solver="daqp", surfaces=12))
+    assert few == [*range(5), *[-1] * 7]
+    assert checked(tc.run(cases.stack(), samples=5, solver="daqp", surfaces=0)) == []
+
+
+def test_rows_that_are_not_certified_are_not_checked():
+    """A block that its locators hold in a wall, but for few realizations."""
+    tree = tc.run(cases.block_on_six(0.2), samples=60, solver="daqp", method=SEATED, surfaces=60)
+    certified = np.flatnonzero(np.isin(tree["status"].values, [tc.Status.UNTOUCHED, tc.Status.RESOLVED]))
+    assert 2 < len(certified) < 30
+    rows = checked(tree)
+    assert rows[: len(certified)] == certified.tolist() and set(rows[len(certified) :]) == {-1}
+    surface = tree["surface"].to_dataset()
+    assert np.isnan(surface["surface_penetration"].values[len(certified) :]).all()
+    assert (surface["surface_penetration"].values[: len(certified)] < 1e-6).all()
+
+
+def test_the_settings_of_a_run_are_its_attributes(archive):
+    said = xr.load_dataset(archive).attrs
+    expected = {
+        "solver": "daqp", "resolution": "linearized", "objective": "active points", "weighting": "active points",
+        "regularization": "points", "eta": 1e-6, "active_set": "closed", "activity": 1e-9, "search": "fixed", "near_turn": 1.0,
+        "near_travel": 0.5, "method_from": "defaults", "seed": 3, "samples": 300, "kept": "all", "solver_accuracy": 1e-8,
+        "title": "variation simulation of stack",
+    }  # fmt: skip
+    assert {word: said[word] for word in expected} == expected
+    assert json.loads(said["solver_options"]) and said["solver_second"] == "qpoases"
+    assert f"tolcontact {tc.__version__}" in said["versions"] and said["history"].endswith("created")
+
+
+def test_the_weighting_is_that_of_points_where_points_count():
+    for objective, weighting, units in (("all points", "all points", "mm"), ("locator stiffness", "none", "N")):
+        found = tc.run(cases.stack(), samples=5, solver="daqp", method={"objective": objective})
+        assert found.attrs["weighting"] == weighting and found["reaction"].attrs["units"] == units
+
+
+def test_units_of_measures():
+    a = cases.one_dimensional(6)
+    block = a.parts[1]
+    alone = tc.run(a, samples=5, solver="daqp")
+    assert alone["measured"].attrs["units"] == "mm"
+    a.measure("tilt", lambda poses: poses.rotation(block)[2, 0], units="rad")
+    mixed = tc.run(a, samples=5, solver="daqp")
+    assert mixed["measured"].attrs["units"] == "1" and mixed["measure_units"].values.tolist() == ["mm", "rad"]
+    assert np.isnan(mixed["measure_tolerance"].values).all()
+
+
+def test_the_sample_names_every_locator_with_its_tolerance_and_stiffness():
+    tree = tc.run(cases.stopped(), samples=10, solver="daqp")
+    sample = tree["sample"].to_dataset()
+    assert sample["locator"].values.tolist() == [f"block.{name}" for name in ("Z1", "Z2", "Z3", "Y1", "Y2", "X", "stop 0")]
+    assert (sample["tolerance_range"].values == 1).all() and set(sample["distribution"].values) == {"normal"}
+    assert sample["one_sided"].values.tolist() == [0] * 6 + [1]
+    places = [(5, 5, 0), (45, 5, 0), (25, 25, 0), (5, 0, 10), (45, 0, 10), (0, 15, 10), (0, 5, 5)]
+    assert (sample["locator_point"].values == places).all()
+    assert sample["locator_direction"].values.tolist() == [[0, 0, 1.0]] * 3 + [[0, 1.0, 0]] * 2 + [[1.0, 0, 0]] * 2
+    assert (sample["stiffness"].values == 1).all()
+    contact = tree["contact"].to_dataset()
+    assert contact["reference_part"].values.tolist() == [-1] and contact["locator_of_point"].values.tolist() == [6]
+
+
+def test_a_distribution_of_ones_own_is_named():
+    a = tc.Assembly("own")
+    block = a.part("block", tc.Box(10, 10, 10), fixed=True)
+    a.locate(block, [tc.Locator("Z", (5, 5, 0), "z", stats.gamma(2, scale=0.1)), *cases.translating(0)[1:]])
+    a.measure("height", block.point(0, 0, 10), along="z")
+    sample = tc.run(a, samples=5, solver="daqp")["sample"].to_dataset()
+    assert sample["distribution"].values.tolist()[0] == "gamma" and np.isnan(sample["tolerance_range"].values[0])
+
+
+def test_contacts_say_which_parts_touch_and_which_points_belong_to_a_pair(archive):
+    program, _ = simulate(cases.stack(), samples=2, solver="daqp")
+    contact = xr.load_datatree(archive)["contact"].to_dataset()
+    assert contact["moving_part"].values.tolist() == [1, 2] and contact["reference_part"].values.tolist() == [0, 1]
+    of = contact["pair_of_point"].values
+    for k, pair in enumerate(program.nominal.pairs):
+        assert np.abs(contact["moving_point"].values[of == k] - pair.P_m).max() < 1e-12
+        assert (contact["reference_normal"].values[of == k] == [0, 0, 1]).all()
+    assert (contact["locator_of_point"].values == -1).all()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [({"seed": 4}, "seed = 3, now it is 4"), ({"keep": "poses"}, "kept = all"), ({"surfaces": 9}, "surfaces = 12, now it is 9")],
+)
+def test_resuming_another_run_is_refused(wrong, told, archive):
+    same = {"samples": 300, "seed": 3, "solver": "daqp", "surfaces": 12}
+    with pytest.raises(ArchiveError, match=told):
+        tc.run(cases.stack(), out=archive, resume=True, **{**same, **wrong})
+
+
+def test_resuming_a_model_whose_mesh_was_replaced_is_refused(tmp_path):
+    def model(width):
+        trimesh.creation.box(bounds=[[0, 0, 0], [width, 10, 10]]).export(tmp_path / "block.stl")
+        a = tc.Assembly("replaced")
+        floor = a.part("floor", tc.Box(10, 10, 10), at=(0, 0, -10), fixed=True)
+        block = a.part("block", tc.Mesh(tmp_path / "block.stl"))
+        a.locate(block, cases.translating(1))
+        a.contact("seat", moving=block.face("-z"), reference=floor.face("+z"), points=9)
+        a.measure("height", block.point(5, 5, 10), along="z")
+        return a
+
+    run = {"samples": 5, "solver": "daqp", "out": tmp_path / "out.nc"}
+    tc.run(model(10), **run).close()
+    tc.run(model(10), **run, resume=True).close()
+    with pytest.raises(ArchiveError, match=r'part "block" had another shape|another model'):
+        tc.run(model(10.001), **run, resume=True)
+
+
+def test_history_tells_when_a_run_went_on(archive, tmp_path):
+    path = tmp_path / "copy.nc"
+    path.write_bytes(archive.read_bytes())
+    tc.run(cases.stack(), samples=400, seed=3, solver="daqp", out=path, resume=True, surfaces=12).close()
+    attributes = xr.load_dataset(path).attrs
+    begun, resumed = attributes["history"].splitlines()
+    assert begun.endswith("created") and resumed.endswith("resumed after 0 realizations") and attributes["samples"] == 400
