@@ -62,16 +62,12 @@ class Fault:
     lines: range = field(compare=False)  # of its statement
     source: bytes = field(compare=False)  # the whole file with it
 
-    @property
-    def room(self) -> str:
-        return room_of(self.file)
-
     def record(self, **more) -> dict:
         return {name: getattr(self, name) for name in ("file", "function", "operator", "before", "after", "nth")} | more
 
 
-def room_of(file: str) -> str:
-    return Path(file).parts[1].removesuffix(".py")
+def room_of(record) -> str:
+    return Path(record["file"] if isinstance(record, dict) else record.file).parts[1].removesuffix(".py")
 
 
 class Source:
@@ -172,11 +168,11 @@ def drawn(faults: list[Fault], count: int, seed: int) -> list[Fault]:
     shuffled, turns, places = random.Random(seed).sample(faults, len(faults)), Counter(), Counter()
     by_turn = []
     for number, fault in enumerate(shuffled):
-        by_turn.append((turns[fault.room, fault.operator], number))
-        turns[fault.room, fault.operator] += 1
+        by_turn.append((turns[room_of(fault), fault.operator], number))
+        turns[room_of(fault), fault.operator] += 1
     order = []
     for _, number in sorted(by_turn):
-        room = shuffled[number].room
+        room = room_of(shuffled[number])
         order.append((places[room] / WEIGHTS.get(room, 1), number))
         places[room] += 1
     return [shuffled[number] for _, number in sorted(order)[:count]]
@@ -184,13 +180,11 @@ def drawn(faults: list[Fault], count: int, seed: int) -> list[Fault]:
 
 def again(faults: list[Fault], file: Path) -> Iterator[Fault]:
     """The survivors of an earlier run, as far as they can still be made; their files may have other names by now."""
-    records = [json.loads(line) for line in file.read_text().splitlines()]
-    for record in (record for record in records if record["outcome"] == "survived"):
-        alike = [f for f in faults if f.record(file="") | {"file": ""} == {k: record[k] for k in f.record()} | {"file": ""}]
-        if alike:
+    keys = ("function", "operator", "before", "after", "nth")
+    for record in (json.loads(line) for line in file.read_text().splitlines()):
+        alike = [fault for fault in faults if all(getattr(fault, key) == record[key] for key in keys)]
+        if record["outcome"] == "survived" and alike:
             yield next((fault for fault in alike if fault.file == record["file"]), alike[0])
-        else:
-            print("gone:", record["file"], record["before"])
 
 
 class Store:
@@ -294,7 +288,7 @@ def row(record: dict) -> str:
 
 def summary(records: list[dict]) -> str:
     """Numbers of outcomes by room."""
-    counts = Counter((room, r["outcome"]) for r in records for room in (room_of(r["file"]), "~ all"))
+    counts = Counter((room, r["outcome"]) for r in records for room in (room_of(r), "~ all"))
     rows = [[room, *(counts[room, outcome] for outcome in OUTCOMES)] for room in sorted({room for room, _ in counts})]
     return "\n".join(f"{name:<14}" + "".join(f"{count:>12}" for count in of) for name, *of in [["room", *OUTCOMES], *rows])
 
