@@ -15,12 +15,12 @@ import faulthandler
 import hashlib
 import itertools
 import json
+import multiprocessing
 import os
 import queue
 import random
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 from collections import Counter
@@ -30,6 +30,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import coverage
+import numba
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 # Rooms and modules that have no say in results, by name. All others are looked at, whatever they are called.
@@ -38,6 +40,9 @@ SPARED |= {"quiet", "inspection", "taking", "reader", "version", "__main__", "__
 WEIGHTS = {"contact": 4, "compilation": 3, "statistics": 3, "archive": 3, "simulation": 2, "mechanics": 2}  # others 1
 PATIENCE, TIMES = 40.0, 10.0  # s, and times what it takes without a fault: then a test is stopped, and the fault is found
 OUTCOMES = ("found", "timeout", "survived", "not reached")
+
+FORKS = multiprocessing.get_context("forkserver")  # processes that begin with what takes seconds to import
+FORKS.set_forkserver_preload(["casadi", "igl", "netCDF4", "numba", "pandas", "pytest", "scipy.stats", "trimesh", "xarray"])
 
 COMPARED = {"Lt": ("<", "<=", ">"), "LtE": ("<=", "<"), "Gt": (">", ">=", "<"), "GtE": (">=", ">")}
 COMPARED |= {"Eq": ("==", "!="), "NotEq": ("!=", "==")}
@@ -178,10 +183,10 @@ def drawn(faults: list[Fault], count: int, seed: int) -> list[Fault]:
     return [shuffled[number] for _, number in sorted(order)[:count]]
 
 
-def again(faults: list[Fault], file: Path) -> Iterator[Fault]:
-    """The survivors of an earlier run, as far as they can still be made; their files may have other names by now."""
+def again(faults: list[Fault], records: list[dict]) -> Iterator[Fault]:
+    """The survivors among some records, as far as they can still be made; their files may have other names by now."""
     keys = ("function", "operator", "before", "after", "nth")
-    for record in (json.loads(line) for line in file.read_text().splitlines()):
+    for record in records:
         alike = [fault for fault in faults if all(getattr(fault, key) == record[key] for key in keys)]
         if record["outcome"] == "survived" and alike:
             yield next((fault for fault in alike if fault.file == record["file"]), alike[0])
@@ -196,20 +201,28 @@ class Store:
             print(f"first run of all tests, in {folder}", flush=True)
             shutil.rmtree(folder, ignore_errors=True)
             options = ["--cov=tolcontact", "--cov-context=test", "--cov-report=", "tests"]
-            pytest(self.copy(0), folder, options, COVERAGE_FILE=str(folder / "coverage"))
+            run_tests(self.copy(0), folder, options, COVERAGE_FILE=str(folder / "coverage"))
             (folder / "done").touch()
         self.costs, failed = Counter(), set()
-        for test, outcome, seconds in reports_in(folder):
+        for test, outcome, seconds in records_in(folder / "log.jsonl"):
             self.costs[test] += seconds
             failed |= {test} if outcome != "passed" else set()
         self._passed = self.costs.keys() - failed
         data = coverage.CoverageData(folder / "coverage")
         data.read()
-        self._reached = {}
-        for file in data.measured_files():
-            lines = data.contexts_by_lineno(file).items()
-            names = {line: {context.rpartition("|")[0] for context in contexts} for line, contexts in lines}
-            self._reached[file[file.rindex("tolcontact/") :]] = names
+        tests_of = {context: self._tests_of(*context.split("|")) for context in data.measured_contexts() if context}
+        self._reached = {
+            file[file.rindex("tolcontact/") :]: {
+                line: set().union(*(tests_of[context] for context in contexts if context))
+                for line, contexts in data.contexts_by_lineno(file).items()
+            }
+            for file in data.measured_files()
+        }
+
+    def _tests_of(self, test: str, phase: str) -> set[str]:
+        """A test; or all of its file, where something was reached while a fixture was made, which they may share."""
+        file = test[: test.index("::") + 2]
+        return {test} if phase == "run" else {other for other in self.costs if other.startswith(file)}
 
     def copy(self, number: int) -> Path:
         to = self.folder / f"copy{number}"
@@ -217,12 +230,16 @@ class Store:
         return Path(shutil.copytree(ROOT, to, ignore=shutil.ignore_patterns(".git", "__pycache__", ".*_cache", "*.nc")))
 
     def tests(self, fault: Fault, budget: float) -> list[str]:
-        """Tests that reach a fault, cheapest first, as many as take `budget` seconds in all."""
+        """Tests that reach a fault, as many as take `budget` seconds in all: cheapest first, files in turn."""
         here = self._reached.get(fault.file, {})
         found = set().union(*(here.get(line, ()) for line in fault.lines)) if fault.function else set()
         # What runs at import, or is compiled, is not seen: whoever uses the module reaches it.
-        found = (found or set().union(*here.values())) & self._passed or self._using(Path(fault.file).stem) & self._passed
-        ordered = sorted(found, key=self.costs.__getitem__)
+        found = (found or set().union(*here.values()) | self._using(Path(fault.file).stem)) & self._passed
+        turns, of_file = {}, Counter()
+        for test in sorted(found, key=self.costs.__getitem__):
+            of_file[test.split("::")[0]] += self.costs[test]
+            turns[test] = of_file[test.split("::")[0]]
+        ordered = sorted(found, key=turns.__getitem__)
         spent = itertools.accumulate(self.costs[test] for test in ordered)
         return [test for test, total in zip(ordered, spent, strict=True) if total < budget]
 
@@ -234,18 +251,32 @@ class Store:
         return found
 
 
-def reports_in(folder: Path) -> list[tuple[str, str, float]]:
-    log = folder / "log.jsonl"
-    return [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+def records_in(file: Path | None) -> list:
+    return [json.loads(line) for line in file.read_text().splitlines()] if file and file.exists() else []
 
 
-def pytest(copy: Path, folder: Path, options: list[str], **environment: str) -> int:
-    """Run tests in a copy, with this file as a plugin that writes into `folder`."""
-    known = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "FAULTS": str(folder)}
-    command = [sys.executable, "-m", "pytest", "-p", "tests.faults", "-p", "no:cacheprovider", *options]
+def run_tests(copy: Path, folder: Path, options: list[str], **environment: str) -> int:
+    """Run tests in a copy, with this file as a plugin that writes into `folder`; their exit code."""
+    known = {"PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1", "FAULTS": str(folder)}
     known |= {"NUMBA_CACHE_DIR": str(folder / "numba"), **environment}
+    begun = FORKS.Process(target=_run_tests, args=(copy, folder, options, known))
+    begun.start()
+    begun.join()
+    return begun.exitcode
+
+
+def _run_tests(copy: Path, folder: Path, options: list[str], environment: dict[str, str]) -> None:
+    """In a process that has imported all libraries already, but of the package nothing."""
+    os.environ.update(environment)
+    os.chdir(copy)
+    for name in [name for name in sys.modules if name.split(".")[0] == "tests"]:
+        del sys.modules[name]
+    sys.path.insert(0, str(copy))
+    sys.dont_write_bytecode, numba.config.CACHE_DIR = True, environment["NUMBA_CACHE_DIR"]
     with (folder / "output.txt").open("w") as output:
-        return subprocess.run(command, cwd=copy, env=known, stdout=output, stderr=output, check=False).returncode
+        for stream in (1, 2):
+            os.dup2(output.fileno(), stream)
+    sys.exit(int(pytest.main(["-p", "tests.faults", "-p", "no:cacheprovider", *options])))
 
 
 def pytest_runtest_logstart(nodeid: str) -> None:
@@ -273,9 +304,9 @@ def tried(store: Store, copy: Path, fault: Fault, tests: list[str]) -> dict:
         spoiled.write_bytes(fault.source)
         # Numba's cache serves the functions of files that are as they were; others begin with an empty one.
         cache = {} if b"tolcontact.compiled" in fault.source else {"NUMBA_CACHE_DIR": str(store.folder / "numba")}
-        failed = pytest(copy, folder, ["-x", f"@{folder / 'tests.txt'}"], **cache)
+        failed = run_tests(copy, folder, ["-x", f"@{folder / 'tests.txt'}"], **cache)
         shutil.copy2(ROOT / fault.file, spoiled)
-        reports, late = reports_in(folder), folder / "late.txt"
+        reports, late = records_in(folder / "log.jsonl"), folder / "late.txt"
         outcome = "survived" if not failed else "timeout" if late.exists() and late.read_text() else "found"
     last = reports[-1][0] if reports else "no test could be run"
     return fault.record(outcome=outcome, by=last if failed else "", tests=len({test for test, *_ in reports}))
@@ -304,10 +335,12 @@ def main() -> None:
     parser.add_argument("--budget", type=float, default=120, help="seconds that the tests of a fault may take in all")
     parser.add_argument("--jobs", type=int, default=1, help="faults that are tried at once")
     parser.add_argument("--store", type=Path, help="folder of the first run, whatever has changed since")
-    parser.add_argument("--out", type=Path, help="file for the records, one JSON object a line")
+    parser.add_argument("--out", type=Path, help="file for the records, one JSON object a line; goes on with those in it")
     asked = parser.parse_args()
     faults = list(all_faults(asked.only))
-    chosen = list(again(faults, asked.survivors)) if asked.survivors else drawn(faults, asked.count, asked.seed)
+    before, known = records_in(asked.survivors), records_in(asked.out)
+    chosen = list(again(faults, before)) if asked.survivors else drawn(faults, asked.count, asked.seed)
+    chosen = [fault for fault in chosen if not any(record == record | fault.record() for record in known)]
     sources = b"".join(path.read_bytes() for room in ("tolcontact", "tests") for path in sorted((ROOT / room).rglob("*.py")))
     digest = hashlib.sha256(sources).hexdigest()[:12]
     store = Store(asked.store or Path(tempfile.gettempdir()) / f"tolcontact-faults-{digest}")
@@ -326,7 +359,7 @@ def main() -> None:
         return record
 
     with ThreadPoolExecutor(asked.jobs) as pool:
-        print(summary(list(pool.map(judged, chosen))))
+        print(summary(known + list(pool.map(judged, chosen))))
 
 
 if __name__ == "__main__":

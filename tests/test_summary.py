@@ -101,7 +101,7 @@ def test_realizations_are_counted_by_what_became_of_them(run):
     assert found["not_assemblable"].values == pytest.approx([0.2, 0.0252, 0.5561], abs=1e-4)
     assert dict(zip(found["pair"].values, found["conflicts"].values, strict=True)) == {"lower joint": 2, "upper joint": 1}
     assert found["penetration"].sel(state="raw") == 0.7 and found["penetration"].sel(state="corrected") == 0.3
-    assert found.attrs["realizations"] == 10
+    assert found.attrs["realizations"] == found.attrs["samples"] == 10  # that somebody took
 
 
 def test_the_smallest_range_is_that_of_a_locator_or_of_a_measure_in_mm(run):
@@ -117,6 +117,7 @@ def test_unfinished_rows_are_left_out(run):
     status, steps = [RESOLVED, RESOLVED, UNTOUCHED, -1, -1], [1, 3, 0, -1, -1]
     found = summary_of(run, status=status, iterations=steps)
     assert found.attrs["realizations"] == 3 and found["by_status"].values.sum() == 3
+    assert found.attrs["samples"] == 20  # for which the run was begun
     assert found["iterations"].values.tolist() == [2, 3]
 
 

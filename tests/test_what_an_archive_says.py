@@ -1,7 +1,10 @@
 """What stands in an archive beside its rows: settings, models, contacts, samples, and which rows were looked at again."""
 
 import json
+import time
+import zlib
 
+import netCDF4
 import numpy as np
 import pytest
 import trimesh
@@ -159,3 +162,42 @@ def test_history_tells_when_a_run_went_on(archive, tmp_path):
     attributes = xr.load_dataset(path).attrs
     begun, resumed = attributes["history"].splitlines()
     assert begun.endswith("created") and resumed.endswith("resumed after 0 realizations") and attributes["samples"] == 400
+
+
+def test_checksums_are_those_of_little_endian_numbers_and_of_utf8_texts(archive):
+    """What the archive says of itself, worked out without the package."""
+    with netCDF4.Dataset(archive) as file:
+        known = {"pair": "lower joint\0upper joint\0", "measure_units": "mm\0mm\0"}
+        for name, text in known.items():
+            assert int(file[name].crc32) == zlib.crc32(text.encode())
+        declared = str(file["model/declaration"][...])
+        assert int(file["model/declaration"].crc32) == zlib.crc32(f"{declared}\0".encode())
+        for name, kind in (("measure_nominal", "<f8"), ("contact/pair_of_point", "<i4"), ("sample/one_sided", "i1")):
+            assert int(file[name].crc32) == zlib.crc32(file[name][:].data.astype(kind).tobytes())
+        assert str(file["row_variable"][0]) == "measured" and file["row_checksum"].shape[0] == 1
+        assert int(file["row_checksum"][0, 0]) == zlib.crc32(file["measured"][:].data.astype("<f8").tobytes())
+        # Of a field: what is written again and again, one after the other.
+        field, found = file["field/upper"], 0
+        for name, kind in (
+            ("mean", "<f8"), ("six_sigma", "<f8"), ("magnitude_six_sigma_interval", "<f8"), ("realizations", "<i8"),
+        ):  # fmt: skip
+            found = zlib.crc32(np.asarray(field[name][...]).astype(kind).tobytes(), found)
+        assert int(field["checksum"][...]) == found
+
+
+def test_the_fields_of_a_run_that_broke_off_are_at_most_some_seconds_old(tmp_path):
+    """Nobody can be asked to finish what a crash ended: fields are written as the run goes on."""
+
+    def break_off(rows):
+        time.sleep(2.1)
+        if rows >= 8192:
+            raise LookupError("something else")
+
+    run = {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}
+    with pytest.raises(LookupError):
+        tc.run(cases.stack(), samples=20_000, out=tmp_path / "broken.nc", progress=break_off, **run)
+    tc.run(cases.stack(), samples=8192, out=tmp_path / "whole.nc", **run).close()
+    broken, whole = (xr.load_dataset(tmp_path / name, group="field/upper") for name in ("broken.nc", "whole.nc"))
+    assert int(broken["realizations"]) == 8192
+    for name in ("mean", "six_sigma", "magnitude_six_sigma_interval"):
+        assert (broken[name].values == whole[name].values).all()
