@@ -6,6 +6,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tolcontact.errors import ArchiveError
 
 UNTOUCHED, RESOLVED, NOT_CONVERGED, NOT_ASSEMBLABLE, DOUBTFUL = range(5)
 
@@ -102,6 +103,12 @@ def test_realizations_are_counted_by_what_became_of_them(run):
     assert dict(zip(found["pair"].values, found["conflicts"].values, strict=True)) == {"lower joint": 2, "upper joint": 1}
     assert found["penetration"].sel(state="raw") == 0.7 and found["penetration"].sel(state="corrected") == 0.3
     assert found.attrs["realizations"] == found.attrs["samples"] == 10  # that somebody took
+
+
+@pytest.mark.parametrize("wrong", [-2, 5, 6])
+def test_a_status_without_a_meaning_is_damage(wrong, run):
+    with pytest.raises(ArchiveError, match="some statuses have no meaning"):
+        summary_of(run, status=[RESOLVED, wrong, RESOLVED])
 
 
 def test_the_smallest_range_is_that_of_a_locator_or_of_a_measure_in_mm(run):

@@ -1,0 +1,59 @@
+"""Where an answer is looked for from other starts, and what that is good for."""
+
+import numpy as np
+import pytest
+import trimesh
+
+import tolcontact as tc
+from tests import cases
+from tests.test_contact import R_t, simulate
+from tolcontact.vocabulary import CORRECTED, Status
+
+EXACT = tc.Method(resolution="exact")
+SEATED = tc.Method(objective="seating", resolution="exact")
+FIT = 0.05
+
+
+def peg() -> tc.Assembly:
+    """A round peg, free to spin, that a force pushes to the side of a hole whose place varies; on few points."""
+    a = tc.Assembly("peg")
+    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5 + FIT, 20, 10, sections=180)), fixed=True)
+    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=180)), fixed=False)
+    feet = [tc.Locator(f"Z{k}", (x, y, -5), "z", 0) for k, (x, y) in enumerate([(20, 0), (-20, 0), (0, 20)])]
+    sides = [tc.Locator(f"S{k}", (x, 0, 0), along, 0.2) for k, (x, along) in enumerate([(0, "x"), (0, "y"), (20, "y")])]
+    a.locate(plate, [*feet, *sides])
+    ends = [tc.Locator(f"Z{k}", (x, y, -10), "z", 0) for k, (x, y) in enumerate([(0, 0), (5, 0), (0, 5)])]
+    a.locate(pin, [*ends, *cases.parked("X:-5,0,0:x", "Y1:0,-5,0:y", "Y2:4,-3,0:y")])
+    a.force("push", at=pin.point(0, 0, 0), vector=(1, -2, 0))
+    wall = plate.face(lambda c, n: (abs(n[:, 2]) < 0.1) & (np.hypot(c[:, 0], c[:, 1]) < 10))
+    a.contact("fit", moving=pin.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=wall, points=200)
+    a.measure("x", pin.point(0, 0, 0), along="x", tolerance=0.2)
+    return a
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_projected_anew():
+    """Along planes at fixed points it rolls into the wall. In the end it touches where the force points to."""
+    _, run = simulate(peg(), samples=6, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert (run["starts"] >= 2).all() and (run["searched"] == 1).all()
+    _, t = R_t(run["poses"][:, CORRECTED])
+    apart = (t[:, 1] - t[:, 0])[:, :2]
+    # The chord of 180 sides is off by 8e-4 mm.
+    assert np.abs(np.linalg.norm(apart, axis=1) - FIT).max() < 1e-3
+    assert np.abs(apart @ [1, -2] / np.sqrt(5) - FIT).max() < 1e-3
+
+
+def test_what_is_certified_near_is_tried_once_and_what_is_not_from_two_other_starts():
+    for make, status, starts in ((cases.tab, Status.NOT_ASSEMBLABLE, 3), (cases.jaws, Status.RESOLVED, 1)):
+        _, run = simulate(make(), samples=20, solver="daqp", method=EXACT)
+        assert (run["status"] == status).all() and (run["starts"] == starts).all()
+        assert (run["iterations"] > starts).all()  # of all starts together
+
+
+def test_a_tab_that_is_wider_than_its_slot_shares_the_excess_whatever_it_was_tried_from():
+    """0.1 mm too wide: the pose of least penetration is in the middle, 0.05 mm in each side."""
+    _, run = simulate(cases.tab(9.9), samples=20, solver="daqp", method=EXACT)
+    assert np.abs(run["gap_min"][:, CORRECTED, :2] + 0.05).max() < 1e-4
+    assert (run["gap_min"][:, CORRECTED, 2] > -1e-4).all()
+    assert run["kkt_residual"].max() < 1e-4
