@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases, referee
-from tests.test_contact import R_t, simulate
+from tests.helpers import R_t, simulate
 from tolcontact.contact import linear_step
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 

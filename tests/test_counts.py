@@ -5,7 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.test_contact import simulate
+from tests.helpers import simulate
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SEATED = tc.Method(objective="seating", resolution="exact")
@@ -13,7 +13,7 @@ SEATED = tc.Method(objective="seating", resolution="exact")
 
 def heights(program, run):
     """Of the block of CASES C1 above its base [mm], raw."""
-    base, block = (run["deviations"][:, program.nominal.locator_labels.index(f"{name}.Z")] for name in ("base", "block"))
+    base, block = (run["deviations"][:, program.nominal.locators.labels.index(f"{name}.Z")] for name in ("base", "block"))
     return block - base
 
 

@@ -6,7 +6,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.test_contact import R_t, simulate
+from tests.helpers import R_t, simulate
 from tolcontact.vocabulary import CORRECTED, Status
 
 EXACT = tc.Method(resolution="exact")

@@ -107,7 +107,7 @@ def test_realizations_are_counted_by_what_became_of_them(run):
 
 @pytest.mark.parametrize("wrong", [-2, 5, 6])
 def test_a_status_without_a_meaning_is_damage(wrong, run):
-    with pytest.raises(ArchiveError, match="some statuses have no meaning"):
+    with pytest.raises(ArchiveError, match="some statuses are unknown"):
         summary_of(run, status=[RESOLVED, wrong, RESOLVED])
 
 

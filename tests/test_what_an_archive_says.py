@@ -13,7 +13,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.test_contact import simulate
+from tests.helpers import simulate
 from tolcontact.errors import ArchiveError
 
 SEATED = {"resolution": "exact", "objective": "seating"}
@@ -180,6 +180,7 @@ def test_checksums_are_those_of_little_endian_numbers_and_of_utf8_texts(archive)
         field, found = file["field/upper"], 0
         for name, kind in (
             ("mean", "<f8"), ("six_sigma", "<f8"), ("magnitude_six_sigma_interval", "<f8"), ("realizations", "<i8"),
+            ("magnitude_realizations", "<i8"),
         ):  # fmt: skip
             found = zlib.crc32(np.asarray(field[name][...]).astype(kind).tobytes(), found)
         assert int(field["checksum"][...]) == found
