@@ -101,7 +101,10 @@ def is_flat(surface: Surface) -> bool:
     """Whether all of it lies in one plane."""
     normals = surface.corner_normals.reshape(-1, 3)
     n = normals.mean(axis=0)
-    heights = np.asarray(surface.mesh.vertices) @ (n / np.linalg.norm(n))
+    size = np.linalg.norm(n)
+    if size == 0:  # it looks all ways, as much to one as to the other
+        return False
+    heights = np.asarray(surface.mesh.vertices) @ (n / size)
     return bool(np.ptp(heights) < 1e-6 * surface.mesh.scale and (normals @ n).min() > 0)
 
 

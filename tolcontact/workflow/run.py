@@ -23,6 +23,7 @@ from tolcontact.statistics import BlockSums, DisplacementFields
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MAGNITUDES
 from tolcontact.workflow.forecast import announce
+from tolcontact.workflow.garbage import collect, collected_here
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
@@ -125,7 +126,8 @@ def run(
             else ArchiveWriter(path, program, asked, of_fields.sizes)
         ) as writer:
             announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-            _simulate(program, writer, of_fields, seed, progress)
+            with collected_here():
+                _simulate(program, writer, of_fields, seed, progress)
 
     if out is None:
         for word, value in {"overwrite": overwrite, "resume": resume}.items():
@@ -161,6 +163,7 @@ def _simulate(
                     written = time.monotonic()
             if progress:
                 progress(writer.rows)
+            collect()
         writer.write_fields(fields.fields())
     except KeyboardInterrupt:
         # It came at whatever instant: what is sure are the sums of the last checkpoint.
