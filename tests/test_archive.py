@@ -37,7 +37,7 @@ def test_it_follows_the_cf_conventions(archive):
     assert (root.status.cf == "resolved").sum() > 100
     with netCDF4.Dataset(archive) as file:
         assert file.dimensions["realization"].isunlimited()
-        assert file["rotation"].chunking()[0] == 1000
+        assert file["rotation"].chunking()[0] == 4096
         groups = [file, *file.groups.values(), *file["field"].groups.values()]
         for variable in (v for group in groups for v in group.variables.values()):
             assert variable.long_name
@@ -94,3 +94,16 @@ def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path)
     assert tc.summarize(some).identical(tc.summarize(every))
     with pytest.raises(tc.TolcontactError, match="expected one of: measures, poses, all"):
         tc.run(cases.stack(), samples=300, keep="everything")
+
+
+def test_a_model_without_contact_has_an_archive_too(tmp_path):
+    a = tc.Assembly("alone")
+    block = a.part("block", tc.Box(10, 20, 30))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=1), tolerance=1)
+    a.measure("corner", block.point(10, 20, 30), along="z", tolerance=1)
+    path = tmp_path / "alone.nc"
+    tc.run(a, samples=50, solver="daqp", out=path).close()
+    assert tc.summarize(path)["by_status"].values.tolist() == [50, 0, 0, 0, 0]
+    tc.run(a, samples=60, solver="daqp", out=path, resume=True).close()
+    with tc.open_archive(path) as tree:
+        assert tree.sizes["realization"] == 60 and [part.name for part in tc.model_of(tree).parts] == ["block"]

@@ -235,7 +235,7 @@ def _texts(stored: netCDF4.Variable) -> list[str]:
     else:
         stored.set_auto_chartostring(False)
         letters = np.ma.getdata(stored[...])
-        rows = letters.reshape(math.prod(letters.shape[:-1]), -1)
+        rows = letters.reshape(math.prod(letters.shape[:-1]), letters.shape[-1])
         found = [row.tobytes().rstrip(b"\0").decode("utf-8") for row in rows]
     for text in found:
         _check_text(stored.name, text)

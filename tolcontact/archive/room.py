@@ -10,12 +10,12 @@ import numpy as np
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.header import kept_rows
-from tolcontact.archive.variables import ROW_CHUNK
+from tolcontact.archive.variables import rows_together
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.vocabulary import Variable
 
-AT_ONCE = 50 * ROW_CHUNK  # rows that are laid out at once
+AT_ONCE = 8  # chunks that are laid out at once
 
 
 def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: int) -> None:
@@ -60,14 +60,16 @@ def size_in_words(count: float) -> str:
 
 def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
     """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
-    for first in range(start, stop, AT_ONCE):
-        some = slice(first, min(first + AT_ONCE, stop))
-        for variable in words.BY_REALIZATION:
-            stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
-            if stored is not None and 0 not in stored.shape[1:]:
-                nothing = np.nan if np.dtype(variable.kind).kind == "f" else words.UNFINISHED
-                stored[some] = np.full((some.stop - some.start, *stored.shape[1:]), nothing)
-        file[words.REALIZATION][some] = np.arange(some.start, some.stop)
+    for variable in words.BY_REALIZATION:
+        stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
+        if stored is not None and 0 not in stored.shape[1:]:
+            nothing = np.nan if np.dtype(variable.kind).kind == "f" else words.UNFINISHED
+            together = AT_ONCE * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
+            piece = np.full((together, *stored.shape[1:]), nothing, dtype=variable.kind)
+            for first in range(start, stop, together):
+                last = min(first + together, stop)
+                stored[first:last] = piece[: last - first]
+    file[words.REALIZATION][start:stop] = np.arange(start, stop)
     sums = file[words.ROW_CHECKSUM.name]
     blocks = slice(len(sums), -(-stop // int(file.block_rows)))
     if blocks.stop > blocks.start:

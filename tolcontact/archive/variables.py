@@ -1,5 +1,6 @@
 """Variables of the vocabulary in a netCDF file."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,22 +11,33 @@ from tolcontact import vocabulary as words
 from tolcontact.checksums import crc32
 from tolcontact.vocabulary import Variable
 
-ROW_CHUNK = 1000
+CHUNK = 1 << 22  # bytes: more would not stay in the library's cache
+LEAST_ROWS = 16
 BLOCK_CHUNK = 256
 
 
 def define(group: netCDF4.Dataset, variable: Variable) -> None:
     """A variable of numbers, without values yet."""
     options: dict[str, Any] = {}
-    grows = {words.REALIZATION: ROW_CHUNK, words.BLOCK: BLOCK_CHUNK}
-    if grows.keys() & set(variable.dims):
+    if {words.REALIZATION, words.BLOCK} & set(variable.dims):
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        options["chunksizes"] = [grows.get(d) or max(len(_dimension(group, d)), 1) for d in variable.dims]
+        fixed = [1 if d in (words.REALIZATION, words.BLOCK) else max(len(_dimension(group, d)), 1) for d in variable.dims]
+        rows = rows_together(np.dtype(variable.kind).itemsize * math.prod(fixed))
+        grows = {words.REALIZATION: rows, words.BLOCK: BLOCK_CHUNK}
+        options["chunksizes"] = [grows.get(d, size) for d, size in zip(variable.dims, fixed, strict=True)]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)
     created.setncatts(attributes)
+
+
+def rows_together(width: int) -> int:
+    """How many rows of so many bytes lie together in the file: those of a block, unless they are too many bytes."""
+    rows = words.BLOCK_ROWS
+    while rows > LEAST_ROWS and rows * width > CHUNK:
+        rows //= 2
+    return rows
 
 
 def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:

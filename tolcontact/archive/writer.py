@@ -18,7 +18,7 @@ import numpy as np
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import archived_poses, choose, nothing_checked
-from tolcontact.archive.checkpoints import last_checkpoint, write_checkpoint
+from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.header import Run, kept_rows, no_field, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.reader import opened
@@ -104,12 +104,16 @@ class ArchiveWriter:
         with _refusals_told(self._path):
             self._file.close()
 
-    def append(self, block: StoredBlock) -> None:
-        """Write the rows of a block, and hand them over to the system."""
+    def append(self, block: StoredBlock, sums: Sequence[np.ndarray]) -> None:
+        """Write the rows of a block, and hand them over to the system.
+
+        `sums` (state, number) for each part are those of the fields with this block. A killed run goes on from them, if the
+        block is whole.
+        """
         with _refusals_told(self._path):
             if block.stop > len(self._file.dimensions[words.REALIZATION]):
                 self._make_room_for_all()
-            self._append(block)
+            self._append(block, sums)
 
     def _make_room_for_all(self) -> None:
         self._file.close()
@@ -121,27 +125,20 @@ class ArchiveWriter:
         finally:  # a run may be stopped here, and still writes its fields
             self._file = _opened(self._path, "r+")
 
-    def _append(self, block: StoredBlock) -> None:
+    def _append(self, block: StoredBlock, sums: Sequence[np.ndarray]) -> None:
         rows = slice(block.start, block.stop)
         for variable, data in block.values.items():
             stored = self._stored(variable)
             if data.size and variable is not words.STATUS and stored is not None:
                 stored[rows] = data
         self._file[words.ROW_CHECKSUM.name][block.start // self._block_rows] = block.checksums
+        if block.stop % self._block_rows == 0:
+            self._place = 1 - self._place
+            write_checkpoint(self._file, Checkpoint(block.stop, self._place, list(sums)), self._parts)
         self._file.sync()
         self._file[words.STATUS.name][rows] = block.values[words.STATUS]
         self._file.sync()
         self.rows = block.stop
-
-    def is_at_checkpoint(self) -> bool:
-        """Whether a run may go on from here: blocks are whole."""
-        return self.rows % self._block_rows == 0
-
-    def check_point(self, sums: Sequence[np.ndarray]) -> None:
-        """Write the sums of the fields so far, (state, number) for each part, from which a killed run goes on."""
-        with _refusals_told(self._path):
-            self._place = 1 - self._place
-            write_checkpoint(self._file, self._place, self._parts, self.rows, sums)
 
     def write_fields(self, fields: Sequence[dict[words.Variable, Any]]) -> None:
         """Displacement fields: for each part the values of `FIELDS`."""
@@ -190,4 +187,6 @@ def _refusals_told(path: Path) -> Iterator[None]:
 
 
 def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
-    return netCDF4.Dataset(path, mode, format="NETCDF4")
+    file = netCDF4.Dataset(path, mode, format="NETCDF4")
+    file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
+    return file

@@ -154,13 +154,11 @@ def _simulate(
     written = time.monotonic()
     try:
         for rows, sums in map_blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
-            writer.append(rows)
             fields.merge(sums)
-            if writer.is_at_checkpoint():
-                writer.check_point(fields.numbers)
-                if time.monotonic() > written + FIELDS_EVERY:
-                    writer.write_fields(fields.fields())
-                    written = time.monotonic()
+            writer.append(rows, fields.numbers)
+            if time.monotonic() > written + FIELDS_EVERY:
+                writer.write_fields(fields.fields())
+                written = time.monotonic()
             if progress:
                 progress(writer.rows)
             collect()
