@@ -70,7 +70,7 @@ def assemblies(draw) -> tc.Assembly:
     assembly=assemblies(),
     solver=st.sampled_from(["qpoases", "daqp"]),
     resolution=st.sampled_from(["exact", "exact", "linearized"]),
-    objective=st.sampled_from(OBJECTIVES),
+    objective=st.sampled_from(tuple(OBJECTIVES)),
 )
 def test_certificates_hold(assembly, solver, resolution, objective):
     method = tc.Method(resolution=resolution, objective=objective)

@@ -1,6 +1,7 @@
 """An error that a model script raises is told with the script's line, whatever raised it and however the script is named."""
 
 import contextlib
+import importlib
 import os
 
 import pytest
@@ -82,3 +83,26 @@ def test_a_script_may_change_where_python_looks(tmp_path):
     path = tmp_path / "model.py"
     path.write_text("import sys\nsys.path.pop(0)\nimport tolcontact as tc\n\n\ndef assembly():\n    return tc.Assembly('A')\n")
     assert load_model(path).name == "A"
+
+
+LIKE_A_LIBRARY = """from __future__ import annotations
+
+import dataclasses
+
+import tolcontact as tc
+
+@dataclasses.dataclass
+class Size:
+    x: float = 1.0
+
+def assembly():
+    return tc.Assembly(f"sized {Size().x}")
+"""
+
+
+def test_a_script_may_be_called_like_a_library(tmp_path):
+    """And is not mistaken for it afterwards."""
+    path = tmp_path / "colorsys.py"
+    path.write_text(LIKE_A_LIBRARY)
+    assert load_model(path).name == "sized 1.0"
+    assert importlib.import_module("colorsys").rgb_to_hsv(0, 0, 0) == (0, 0, 0)

@@ -18,7 +18,7 @@ def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
     shift = rng.normal(size=3) * size * rng.choice([0, 1, 100])
     ranges = size * rng.choice([0, 1e-4, 1e-3, 1e-2, 3e-2], size=3, p=[0.15, 0.2, 0.3, 0.25, 0.1])
     resolution = str(rng.choice(["exact", "exact", "linearized"]))
-    objective = str(rng.choice(OBJECTIVES))
+    objective = str(rng.choice(tuple(OBJECTIVES)))
     a = tc.Assembly(f"scene {seed}")
     count = int(rng.integers(2, 5))
     below, top, parts = None, 0.0, []

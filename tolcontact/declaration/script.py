@@ -19,7 +19,8 @@ def load_model(path: Path) -> Assembly:
     """
     if not path.is_file():
         raise ScriptError(f'model script "{path}" does not exist')
-    spec = importlib.util.spec_from_file_location(path.stem, path.absolute())
+    # A name of its own: a model called random.py must not be what others then import as `random`.
+    spec = importlib.util.spec_from_file_location(f"model {path.stem}", path.absolute())
     if spec is None or spec.loader is None:
         raise ScriptError(f'model script "{path}" is not a Python file; expected a name that ends in .py')
     module = importlib.util.module_from_spec(spec)

@@ -74,7 +74,9 @@ def read_mesh(path: Path, kind: str) -> Arrays:
     except (Refused, MemoryError):
         raise
     except Exception as error:  # trimesh's readers raise whatever their format's parser raises
-        if isinstance(error, UnicodeDecodeError) or getattr(error, "name", "") in GUESSERS:
+        # Packages that guess encodings, if there are any, read garbled text as some other text.
+        garbled = isinstance(error, UnicodeDecodeError | json.JSONDecodeError)
+        if garbled or getattr(error, "name", "") in GUESSERS:
             raise Refused("is damaged: it does not contain text where it should; export it again") from error
         raise Refused(
             f"cannot be read as a mesh ({type(error).__name__}: {error}); export it again as STL, OBJ, PLY or GLB"
