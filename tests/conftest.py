@@ -1,9 +1,9 @@
-"""Fixtures of several test modules; and the shapes of arrays, which are checked in all tests."""
+"""Fixtures of several test modules; and the shapes of arrays, which are checked in all tests but the slow ones."""
 
 from pathlib import Path
 
 import pytest
-from jaxtyping import install_import_hook
+from jaxtyping import config, install_import_hook
 
 PACKAGE = Path(__file__).resolve().parents[1] / "tolcontact"
 ROOMS = (
@@ -29,3 +29,11 @@ def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("archive") / "stack.nc"
     tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path).close()
     return path
+
+
+@pytest.fixture(autouse=True)
+def shapes_are_checked(request):
+    """Checking takes half as long again where there are many small calls, so the slow tests go without."""
+    config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
+    yield
+    config.update("jaxtyping_disable", False)
