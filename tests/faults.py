@@ -39,7 +39,7 @@ SPARED = {"declaration", "discretization", "vocabulary", "workflow", "report", "
 SPARED |= {"quiet", "inspection", "taking", "reader", "version", "__main__", "__init__"}
 WEIGHTS = {"contact": 4, "compilation": 3, "statistics": 3, "archive": 3, "simulation": 2, "mechanics": 2}  # others 1
 PATIENCE, TIMES = 40.0, 10.0  # s, and times what it takes without a fault: then a test is stopped, and the fault is found
-OUTCOMES = ("found", "timeout", "survived", "not reached")
+OUTCOMES = ("found", "timeout", "survived", "not reached", "not run")
 
 FORKS = multiprocessing.get_context("forkserver")  # processes that begin with what takes seconds to import
 FORKS.set_forkserver_preload(["casadi", "igl", "netCDF4", "numba", "pandas", "pytest", "scipy.stats", "trimesh", "xarray"])
@@ -308,6 +308,8 @@ def tried(store: Store, copy: Path, fault: Fault, tests: list[str]) -> dict:
         shutil.copy2(ROOT / fault.file, spoiled)
         reports, late = records_in(folder / "log.jsonl"), folder / "late.txt"
         outcome = "survived" if not failed else "timeout" if late.exists() and late.read_text() else "found"
+    if failed and not reports:
+        outcome = "not run"  # it may have broken an import, or the tests could not begin: look
     last = reports[-1][0] if reports else "no test could be run"
     return fault.record(outcome=outcome, by=last if failed else "", tests=len({test for test, *_ in reports}))
 

@@ -4,6 +4,7 @@ import sys
 
 import pytest
 
+from tests.cases import MODELS
 from tests.helpers import SCRIPTS, call, run
 from tests.model_scripts import GOOD, HEADER, write_model
 
@@ -93,3 +94,12 @@ def test_a_model_script_runs_by_itself(tmp_path):
     model.write_text(model.read_text() + "\nif __name__ == '__main__':\n    tc.main(assembly)\n")
     done = run([sys.executable, model, "--samples", "50"])
     assert done.returncode == 0 and "height" in done.stdout
+
+
+@pytest.mark.parametrize(("fields", "said"), [("none", "not summed up"), ("50", "of the first 50 realizations"), ("all", None)])
+def test_the_summary_says_of_how_many_realizations_magnitudes_are(fields, said, tmp_path):
+    options = ["--samples", "100", "--solver", "daqp", "--surfaces", "0", "--fields", fields]
+    done = call(tmp_path, "run", MODELS / "ra1.py", *options)
+    below = done.stdout.split("over the surface of each part (mm)\n")[1].splitlines()
+    assert below[0] == said if said else below[0].startswith("part")
+    assert any(line.startswith("top") for line in below) == (fields != "none")

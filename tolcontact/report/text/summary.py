@@ -36,9 +36,11 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
     magnitudes = int(summary["magnitude_realizations"])
-    of = "" if magnitudes == count else f", of the first {grouped(magnitudes)} realizations"
-    yield Text(f"\n6 sigma of the displacement magnitude over the surface of each part (mm){of}", style="bold")
-    yield _field_table(summary)
+    yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
+    if magnitudes < count:
+        yield Text(f"of the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
+    if magnitudes:
+        yield _field_table(summary)
     yield Text("\ncontact", style="bold")
     for line in _contact_lines(summary, count):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
