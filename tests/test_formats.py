@@ -75,6 +75,6 @@ def test_an_earlier_format_is_not_resumed_and_the_file_is_left_alone(stored):
 
 @pytest.mark.parametrize("stored", [FORMAT], indirect=True, ids=lambda number: f"format {number}")
 def test_the_present_format_is_resumed(stored):
-    settings = {"seed": 1, "solver": "daqp", "method": EXACT, "surfaces": 4}
+    settings = {"seed": 1, "solver": "daqp", "method": EXACT, "surfaces": 4, "fields": 16_384}
     tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings).close()
     assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings), variables=["deviation", "status"])

@@ -110,7 +110,7 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
     """However the realizations are cut into blocks, and far from the origin, too; the magnitude is of the first ones."""
     nominal = discretize(cases.stack(cases.Frame(shift=(1000.0, 0.0, 0.0))))
     poses = random_poses(nominal, 700, np.random.default_rng(2))
-    fields = DisplacementFields(nominal, magnitudes)
+    fields = DisplacementFields(nominal, str(magnitudes))
     for first, last in ((0, 1), (1, 400), (400, 700)):
         fields.merge(fields.sums(poses[first:last], first))
     for index, (part, field) in enumerate(zip(nominal.parts, fields.fields(), strict=True)):
@@ -129,7 +129,7 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
 def test_sums_of_fields_go_on_from_where_they_were():
     nominal = discretize(cases.ra1())
     poses = random_poses(nominal, 60, np.random.default_rng(3))
-    whole, half, rest = (DisplacementFields(nominal, 50) for _ in range(3))
+    whole, half, rest = (DisplacementFields(nominal, "50") for _ in range(3))
     for fields, spans in ((whole, [(0, 20), (20, 40), (40, 60)]), (half, [(0, 20), (20, 40)])):
         for first, last in spans:
             fields.merge(fields.sums(poses[first:last], first))
@@ -141,7 +141,7 @@ def test_sums_of_fields_go_on_from_where_they_were():
 def test_without_magnitudes_components_stay_exact():
     nominal = discretize(cases.ra1())
     poses = random_poses(nominal, 30, np.random.default_rng(3))
-    fields = DisplacementFields(nominal, 0)
+    fields = DisplacementFields(nominal, "none")
     fields.merge(fields.sums(poses, 0))
     field = fields.fields()[1]
     u = displacements(nominal.parts[1], poses[:, 1, 1])

@@ -18,6 +18,7 @@ ROOMS = {
     "jaxtyping": ("arrays.py",),
     "llvmlite": ("compilation/functions/native.py",),
     "netCDF4": ("archive/",),
+    "h5py": ("archive/laid_out.py",),
     "typer": ("cli/",),
     "trimesh": ("discretization/",),
     "igl": ("discretization/",),

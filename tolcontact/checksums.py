@@ -1,9 +1,9 @@
 """Checksums: whether values are still those that were written."""
 
-import zlib
 from typing import Any
 
 import numpy as np
+from isal import isal_zlib
 
 from tolcontact.vocabulary import Variable
 
@@ -15,5 +15,5 @@ def crc32(variable: Variable, values: Any, after: int = 0) -> int:
     """
     if variable.kind is str:
         data = "".join(f"{text}\0" for text in np.ravel(np.array(values, dtype=str))).encode("utf-8", "surrogateescape")
-        return zlib.crc32(data, after)
-    return zlib.crc32(np.ascontiguousarray(values, dtype=np.dtype(variable.kind).newbyteorder("<")).data, after)
+        return isal_zlib.crc32(data, after)
+    return isal_zlib.crc32(np.ascontiguousarray(values, dtype=np.dtype(variable.kind).newbyteorder("<")).data, after)

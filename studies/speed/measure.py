@@ -300,12 +300,12 @@ def breakdown(samples: int) -> None:
                 whole = time.perf_counter() - start
                 with tempfile.TemporaryDirectory() as folder:
                     path = Path(folder) / "run.nc"
-                    fields = DisplacementFields(program.nominal, samples)
+                    fields = DisplacementFields(program.nominal, "all")
                     run = Run(seed=1, samples=samples // 4, keep="measures", surfaces=0, fields="all")
                     with ArchiveWriter(path, program, run, fields.sizes) as writer:
                         for block in blocks:
                             fields.merge(fields.sums(block.poses, block.start))
-                            writer.append(stored(block, writer.kept), fields.numbers)
+                            writer.append(stored(block, writer.kept))
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
             turns.append([*spent.values(), whole - sum(inside.values())])
         cells = 1e6 * np.median(turns, axis=0) / (samples // 4)

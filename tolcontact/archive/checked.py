@@ -15,7 +15,7 @@ def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
 
     A third of them penetrate most at their contact points, a third have most points that carry, the rest are drawn.
     """
-    rows = len(file.dimensions[words.REALIZATION])
+    rows = len(file.dimensions[words.REALIZATION]) if count else 0
     deepest, busiest, drawn = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
     lot = np.random.default_rng([seed, rows])
     for first, status, gap, carrying in _pieces(file, rows):
@@ -46,8 +46,10 @@ class _Largest:
         self.numbers, self._values = np.zeros(0, dtype=np.int64), np.zeros(0)
 
     def add(self, numbers: np.ndarray, values: np.ndarray) -> None:
-        numbers = np.concatenate([self.numbers, numbers[values > 0]])
-        values = np.concatenate([self._values, values[values > 0]])
+        """Take in values of later numbers."""
+        larger = values > (self._values[-1] if 0 < self._count == len(self._values) else 0.0)
+        numbers = np.concatenate([self.numbers, numbers[larger]])
+        values = np.concatenate([self._values, values[larger]])
         order = np.lexsort((numbers, -values))[: self._count]
         self.numbers, self._values = numbers[order], values[order]
 

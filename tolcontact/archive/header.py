@@ -3,7 +3,6 @@
 import datetime
 import json
 import platform
-import sys
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from typing import Any, NamedTuple
@@ -30,7 +29,7 @@ class Run(NamedTuple):
 
     keep       what is archived of each realization: one of `KEPT`
     surfaces   number of realizations that will be checked against the surfaces
-    fields     of how many realizations the magnitude of displacement fields is: a number, "all" or "none"
+    fields     of how many realizations the magnitude of displacement fields is: a number, "some", "all" or "none"
     """
 
     seed: int
@@ -38,11 +37,6 @@ class Run(NamedTuple):
     keep: str
     surfaces: int
     fields: str
-
-    @property
-    def magnitudes(self) -> int:
-        """Over how many realizations, the first ones, magnitudes are summed up."""
-        return int(self.fields) if self.fields.isdigit() else sys.maxsize if self.fields == "all" else 0
 
 
 def run_settings(program: Program, run: Run) -> dict[str, Any]:

@@ -64,6 +64,7 @@ def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
         stored = (file["sample"] if variable is words.DEVIATION else file).variables.get(variable.name)
         if stored is not None and 0 not in stored.shape[1:]:
             nothing = np.nan if np.dtype(variable.kind).kind == "f" else words.UNFINISHED
+            stored.set_var_chunk_cache(0)  # whole chunks go straight to the file
             together = AT_ONCE * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
             piece = np.full((together, *stored.shape[1:]), nothing, dtype=variable.kind)
             for first in range(start, stop, together):

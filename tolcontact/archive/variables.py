@@ -1,7 +1,6 @@
 """Variables of the vocabulary in a netCDF file."""
 
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import netCDF4
@@ -61,24 +60,6 @@ def lay_out(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
     define(group, variable)
     if np.size(values):
         group[variable.name][...] = values
-
-
-def overwrite(file: netCDF4.Dataset, values: Mapping[str, Mapping[Variable, Any]]) -> None:
-    """Overwrite what the checksums of some groups are of; `values` by their paths. A run that is killed meanwhile leaves -1."""
-    for path in values:
-        file[path][words.GROUP_CHECKSUM.name][...] = words.UNFINISHED
-    file.sync()
-    for path, of_group in values.items():
-        for variable, of_all in of_group.items():
-            if np.size(of_all):
-                file[path][variable.name][...] = of_all
-    file.sync()
-    for path, of_group in values.items():
-        found = 0
-        for variable, of_all in of_group.items():
-            found = crc32(variable, of_all, found)
-        file[path][words.GROUP_CHECKSUM.name][...] = found
-    file.sync()
 
 
 def _write_text(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:

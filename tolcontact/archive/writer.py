@@ -3,12 +3,13 @@
 A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
 name: header, and rows with the status "unfinished". Once the file stands under its own name, bytes are only overwritten in
 place, the status of a row after its data; whatever kills the process, the file opens, finished rows stay, and `resume` goes
-on after them. (Nothing waits for the disk: a machine that loses power may lose more.) To stand there soon, a long run begins
-with room for few rows; when these are full, a copy gets room for all, and takes its place.
+on after the last checkpoint. (Nothing waits for the disk: a machine that loses power may lose more.) To stand there soon, a
+long run begins with room for few rows; when these are full, a copy gets room for all, and takes its place.
 """
 
 import contextlib
 import shutil
+import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -21,21 +22,23 @@ from tolcontact.archive.checked import archived_poses, choose, nothing_checked
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.header import Run, kept_rows, no_field, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
+from tolcontact.archive.laid_out import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.room import check_room, lay_out_rows
 from tolcontact.archive.rows import check_rows
 from tolcontact.archive.stored import StoredBlock
-from tolcontact.archive.variables import overwrite
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
+
+CHECKPOINTS_EVERY = 2.0  # s, at least: with their fields they take some 50 ms for a part with 100 000 vertices
 
 
 class ArchiveWriter:
     """An archive being written, whose name is taken (see `taken`). Use it as a context manager.
 
-    rows      realizations that are in it with all that is known of them; the next block starts there
+    rows      realizations that are in it; the next block starts there
     samples   realizations that it was begun for
     kept      variables of each realization that it keeps
     """
@@ -73,95 +76,104 @@ class ArchiveWriter:
                 file.setncattr("samples", np.int64(samples))
                 others = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
-                # What follows stands for the rows of before.
-                nothing = {words.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
-                overwrite(file, {"surface": nothing_checked(run.surfaces, len(program.nominal.pairs)), **nothing})
+            # What follows stands for the rows of before.
+            nothing = {words.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
+            with contextlib.closing(LaidOut(part)) as values:
+                values.overwrite_together({"surface": nothing_checked(run.surfaces, len(program.nominal.pairs)), **nothing})
         writer._go_on(path, program.nominal)
         return writer
 
     def _go_on(self, path: Path, nominal: Nominal) -> None:
+        self._path, self._parts, self._pairs = path, [part.name for part in nominal.parts], len(nominal.pairs)
         with _refusals_told(path):
-            self._path, self._file = path, _opened(path, "r+")
-        self._parts, self._pairs = [part.name for part in nominal.parts], len(nominal.pairs)
-        self.kept = [variable for variable in words.BY_REALIZATION if self._stored(variable) is not None]
-        self.samples, self._block_rows = int(self._file.samples), int(self._file.block_rows)
+            self._values = LaidOut(path)
+            with _opened(path, "r") as file:
+                self._length, self._block_rows = len(file.dimensions[words.REALIZATION]), int(file.block_rows)
+                self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[words.CHECKED])
+        self.kept = [variable for variable in words.BY_REALIZATION if self._values.has(_group_of(variable), variable)]
         self.rows = self._place = 0
         self.take_up()
 
     def take_up(self) -> list[np.ndarray]:
         """Go back to the last checkpoint: its sums of the fields, (state, number) for each part; none if there is none."""
-        self.rows, self._place, sums = last_checkpoint(self._file, self._path, self._parts)
+        with _opened(self._path, "r") as file:
+            self.rows, self._place, sums = last_checkpoint(file, self._path, self._parts)
+        self._since = time.monotonic()
         return sums
-
-    def _stored(self, variable: words.Variable) -> netCDF4.Variable | None:
-        group = self._file["sample"] if variable is words.DEVIATION else self._file
-        return group.variables.get(variable.name)
 
     def __enter__(self) -> "ArchiveWriter":
         return self
 
     def __exit__(self, *error: object) -> None:
         with _refusals_told(self._path):
-            self._file.close()
+            self._values.close()
 
-    def append(self, block: StoredBlock, sums: Sequence[np.ndarray]) -> None:
-        """Write the rows of a block, and hand them over to the system.
-
-        `sums` (state, number) for each part are those of the fields with this block. A killed run goes on from them, if the
-        block is whole.
-        """
+    def append(self, block: StoredBlock) -> None:
+        """Write the rows of a block, and hand them over to the system."""
         with _refusals_told(self._path):
-            if block.stop > len(self._file.dimensions[words.REALIZATION]):
+            if block.stop > self._length:
                 self._make_room_for_all()
-            self._append(block, sums)
+            for variable, data in block.values.items():
+                if variable is not words.STATUS:
+                    self._values.overwrite(_group_of(variable), variable, data, block.start)
+            self._values.overwrite("", words.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
+            self._values.overwrite("", words.STATUS, block.values[words.STATUS], block.start)
+        self.rows = block.stop
 
     def _make_room_for_all(self) -> None:
-        self._file.close()
+        self._values.close()
         try:
             with _replacing(self._path) as part:
                 shutil.copyfile(self._path, part)
                 with _opened(part, "r+") as file:
-                    lay_out_rows(file, len(file.dimensions[words.REALIZATION]), self.samples)
+                    lay_out_rows(file, self._length, self.samples)
+            self._length = self.samples
         finally:  # a run may be stopped here, and still writes its fields
-            self._file = _opened(self._path, "r+")
+            self._values = LaidOut(self._path)
 
-    def _append(self, block: StoredBlock, sums: Sequence[np.ndarray]) -> None:
-        rows = slice(block.start, block.stop)
-        for variable, data in block.values.items():
-            stored = self._stored(variable)
-            if data.size and variable is not words.STATUS and stored is not None:
-                stored[rows] = data
-        self._file[words.ROW_CHECKSUM.name][block.start // self._block_rows] = block.checksums
-        if block.stop % self._block_rows == 0:
+    @property
+    def is_between_blocks(self) -> bool:
+        """Whether the last block is whole: only there can a run go on."""
+        return self.rows % self._block_rows == 0
+
+    @property
+    def is_checkpoint_due(self) -> bool:
+        """Whether it is time for a checkpoint: the last one is old, or no whole block will follow."""
+        is_old, is_last = time.monotonic() >= self._since + CHECKPOINTS_EVERY, self.rows + self._block_rows > self.samples
+        return self.is_between_blocks and (is_old or is_last)
+
+    def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
+        """The sums of the fields (state, number) for each part, over all rows so far. A killed run goes on from them."""
+        with _refusals_told(self._path):
             self._place = 1 - self._place
-            write_checkpoint(self._file, Checkpoint(block.stop, self._place, list(sums)), self._parts)
-        self._file.sync()
-        self._file[words.STATUS.name][rows] = block.values[words.STATUS]
-        self._file.sync()
-        self.rows = block.stop
+            write_checkpoint(self._values, Checkpoint(self.rows, self._place, list(sums)), self._parts)
+        self._since = time.monotonic()
 
     def write_fields(self, fields: Sequence[dict[words.Variable, Any]]) -> None:
         """Displacement fields: for each part the values of `FIELDS`."""
         with _refusals_told(self._path):
-            overwrite(self._file, {words.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)})
+            self._values.overwrite_together(
+                {words.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)}
+            )
 
     def chosen(self, seed: int) -> np.ndarray:
         """Numbers (row,) of the realizations that are to be checked against the surfaces."""
-        return choose(self._file, len(self._file["surface"].dimensions[words.CHECKED]), seed)
+        with _opened(self._path, "r") as file:
+            return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Corrected poses (row, part, 12) of some rows; None if they are not kept."""
-        return archived_poses(self._file, rows)
+        with _opened(self._path, "r") as file:
+            return archived_poses(file, rows)
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
         """What the check of some rows found, (row, pair) [mm]."""
-        group = self._file["surface"]
-        values = nothing_checked(len(group.dimensions[words.CHECKED]), self._pairs)
+        values = nothing_checked(self._checked, self._pairs)
         found = {words.CHECKED_REALIZATION: rows, words.SURFACE_PENETRATION: penetration, words.BESIDE: beside}
         for variable, of_rows in found.items():
             values[variable][: len(rows)] = of_rows
         with _refusals_told(self._path):
-            overwrite(self._file, {"surface": values})
+            self._values.overwrite_together({"surface": values})
 
 
 @contextlib.contextmanager
@@ -186,7 +198,12 @@ def _refusals_told(path: Path) -> Iterator[None]:
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
-def _opened(path: Path, mode: Literal["w", "r+"]) -> netCDF4.Dataset:
+def _group_of(variable: words.Variable) -> str:
+    """The path of the group that holds a variable of realizations."""
+    return "sample" if variable is words.DEVIATION else ""
+
+
+def _opened(path: Path, mode: Literal["w", "r+", "r"]) -> netCDF4.Dataset:
     file = netCDF4.Dataset(path, mode, format="NETCDF4")
     file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
     return file

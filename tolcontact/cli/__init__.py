@@ -19,7 +19,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 | `--resolution`, `--objective` | replace the model's own choice, see `tolcontact.contact` and `tolcontact.mechanics` |
 | `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
 | `--keep measures`, `poses` or `all` | what is archived of each realization |
-| `--fields` | how many realizations the magnitudes of displacement fields cover: a number, `all` or `none` |
+| `--fields` | how many realizations the magnitudes of displacement fields cover: a number, `some`, `all` or `none` |
 | `--surfaces` | how many realizations are checked between contact points, 64 by default |
 
 | exit code | meaning |

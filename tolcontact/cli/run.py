@@ -11,7 +11,7 @@ from tolcontact.cli.output import print_summary
 from tolcontact.cli.progress import log_shown, progress_bar, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
-from tolcontact.vocabulary import KEPT, MAGNITUDES
+from tolcontact.vocabulary import KEPT
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES
 from tolcontact.workflow.run import run as run_model
 
@@ -29,8 +29,9 @@ def run(
     resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"What to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
-        str, typer.Option(metavar="all|N|none", help="Number of realizations that the magnitudes of displacement fields cover.")
-    ] = str(MAGNITUDES),
+        str,
+        typer.Option(metavar="some|all|N|none", help="Number of realizations that magnitudes of displacement fields cover."),
+    ] = "some",
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,

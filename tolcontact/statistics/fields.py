@@ -5,6 +5,7 @@ those. Its magnitude is not: its moments are summed up point by point, over the 
 colour map; the interval says how sure it is. Blocks are summed up one by one, by whoever simulates them, and merged in order.
 """
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -16,7 +17,15 @@ from tolcontact.discretization import Nominal
 from tolcontact.statistics import intervals, kernel
 from tolcontact.vocabulary import CORRECTED, RAW, Variable
 
-SOME = 256  # realizations whose mean magnitude is near enough to that of all
+NEAR = 256  # realizations whose mean magnitude is near enough to that of all
+# "Some" realizations for magnitudes: more for parts with few points, and as many points in all as take a second or less.
+MOST, LEAST, POINTS = 16_384, 1024, 1 << 27
+
+
+def _magnitudes(fields: str, points: int) -> int:
+    """Over how many realizations, the first ones, the magnitudes at so many points are summed up."""
+    some = max(LEAST, min(MOST, POINTS // points))
+    return int(fields) if fields.isdigit() else {"some": some, "all": sys.maxsize, "none": 0}[fields]
 
 
 class FieldSums:
@@ -61,10 +70,10 @@ BlockSums = list[list[FieldSums]]  # of every part, in each state
 class DisplacementFields:
     """The fields of all parts of a model, in both states."""
 
-    def __init__(self, nominal: Nominal, magnitudes: int) -> None:
-        """Magnitudes are summed up over the first `magnitudes` realizations."""
-        self._magnitudes = magnitudes
+    def __init__(self, nominal: Nominal, fields: str) -> None:
+        """Magnitudes are summed up over as many realizations as `fields` says: a number, "some", "all" or "none"."""
         self._parts = [_Surface(part.vertices) for part in nominal.parts]
+        self._magnitudes = [_magnitudes(fields, len(part)) for part in self._parts]
         # A part that contact cannot move has one field.
         self._states = [[RAW, CORRECTED] if movers(nominal.assembly, part.part) else [RAW] for part in nominal.parts]
         self.start_over()
@@ -95,10 +104,9 @@ class DisplacementFields:
 
     def sums(self, poses: np.ndarray, start: int) -> BlockSums:
         """The sums of a block alone, of realizations `start` on, at poses (n, state, part, 12). Threads may share it."""
-        count = max(0, self._magnitudes - start)
         return [
-            [part.sums(poses[:, state, index], count) for state in states]
-            for index, (part, states) in enumerate(zip(self._parts, self._states, strict=True))
+            [part.sums(poses[:, state, index], max(0, count - start)) for state in states]
+            for index, (part, states, count) in enumerate(zip(self._parts, self._states, self._magnitudes, strict=True))
         ]
 
     def merge(self, sums: BlockSums) -> None:
@@ -124,8 +132,8 @@ class _Surface:
         return len(self._v)
 
     def sums(self, poses: np.ndarray, count: int) -> FieldSums:
-        """Sums over poses (n, 12), in the magnitude over the first `count` of them."""
-        sums, A = FieldSums(len(self)), np.empty((len(poses), 3, 4))
+        """Sums over poses (n, 12), in the magnitude over the first `count` of them; without it there are no sums of points."""
+        sums, A = FieldSums(len(self) if count else 0), np.empty((len(poses), 3, 4))
         kernel.affine_parts(poses, self._centre, A)
         kernel.add_scatter(A, sums.mean, sums.scatter)
         sums.count[:] = len(A)
@@ -136,8 +144,8 @@ class _Surface:
     def _add_magnitudes(self, A: np.ndarray, sums: FieldSums) -> None:
         # Powers are summed up from a shift near the mean, so that nothing cancels.
         shift, some, powers = np.zeros(len(self)), np.zeros((4, len(self))), np.zeros((4, len(self)))
-        kernel.add_magnitudes(A[:SOME], self._points, shift, some)
-        shift = some[0] / len(A[:SOME])
+        kernel.add_magnitudes(A[:NEAR], self._points, shift, some)
+        shift = some[0] / len(A[:NEAR])
         kernel.add_magnitudes(A, self._points, shift, powers)
         n, (first, second, third, fourth) = len(A), powers
         mean = first / n

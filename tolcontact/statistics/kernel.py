@@ -24,20 +24,23 @@ def affine_parts(poses, centre, A):  # type: ignore[no-untyped-def]
 @compiled
 def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
     """Write the mean (3, 4) of A (n, 3, 4), and add to scatter (3, 4, 4) the products of each row's deviations from it."""
+    n = A.shape[0]
     for i in range(3):
-        for a in range(4):
-            total = 0.0
-            for k in range(A.shape[0]):
-                total += A[k, i, a]
-            mean[i, a] = total / A.shape[0]
-        for k in range(A.shape[0]):
-            for a in range(4):
-                rest = A[k, i, a] - mean[i, a]
-                for b in range(a + 1):
-                    scatter[i, a, b] += rest * (A[k, i, b] - mean[i, b])
-        for a in range(4):
-            for b in range(a):
-                scatter[i, b, a] = scatter[i, a, b]
+        x = y = z = t = 0.0
+        for k in range(n):
+            x, y, z, t = x + A[k, i, 0], y + A[k, i, 1], z + A[k, i, 2], t + A[k, i, 3]
+        x, y, z, t = x / n, y / n, z / n, t / n
+        # Sums in names of their own stay in the processor's registers.
+        xx = xy = xz = xt = yy = yz = yt = zz = zt = tt = 0.0
+        for k in range(n):
+            a, b, c, d = A[k, i, 0] - x, A[k, i, 1] - y, A[k, i, 2] - z, A[k, i, 3] - t
+            xx, xy, xz, xt = xx + a * a, xy + a * b, xz + a * c, xt + a * d
+            yy, yz, yt, zz, zt, tt = yy + b * b, yz + b * c, yt + b * d, zz + c * c, zt + c * d, tt + d * d
+        mean[i, 0], mean[i, 1], mean[i, 2], mean[i, 3] = x, y, z, t
+        products = ((xx, xy, xz, xt), (xy, yy, yz, yt), (xz, yz, zz, zt), (xt, yt, zt, tt))
+        for p in range(4):
+            for q in range(4):
+                scatter[i, p, q] += products[p][q]
 
 
 @compiled

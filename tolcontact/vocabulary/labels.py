@@ -17,11 +17,10 @@ BLOCK, ROW_VARIABLE = "block", "row_variable"
 FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
-MAGNITUDES = 4 * BLOCK_ROWS  # realizations that the magnitude of displacement fields covers by default
 SOLVER, STATUS_MEANING, EXTENT = "solver", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 KEPT = ("measures", "poses", "all")
-FIELD_CHOICES = ("all", "none")  # besides a number
+FIELD_CHOICES = ("some", "all", "none")  # besides a number
 
 UNFINISHED = -1
 CHECKSUM = "crc32"  # attribute: checksum of a variable that is written once

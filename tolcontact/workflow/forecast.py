@@ -13,7 +13,7 @@ try:
 except ImportError:  # not on Windows, where memory is not known
     resource = None  # type: ignore[assignment]
 
-TRIAL = 4  # realizations
+TRIAL, ENOUGH = 4, 0.25  # realizations of the first trial, and s of the last: what begins takes milliseconds
 MANY = 1_000_000
 LONG = 60.0  # s: what takes less is not announced
 
@@ -21,13 +21,10 @@ log = logging.getLogger(__name__)
 
 
 def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
-    """Log, as a warning, what `samples` more realizations will take, if that is long: from a trial with few of them."""
+    """Log, as a warning, what `samples` more realizations will take, if that is long: from a trial with some of them."""
     if samples < MANY and block_rows(program) == BLOCK_ROWS:
         return
-    started = time.perf_counter()
-    list(simulate_blocks(program, samples=TRIAL, seed=seed, threads=1))
-    each = (time.perf_counter() - started) / TRIAL
-    seconds = each * samples / processors()
+    seconds = _of_one(program, seed) * samples / processors()
     if samples >= MANY or seconds > LONG:
         nominal = program.nominal
         points = sum(len(pair.P_m) for pair in nominal.pairs)
@@ -41,6 +38,18 @@ def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
             len(nominal.parts), len(nominal.pairs), points, samples, _duration(seconds), memory,
             size_in_words(bytes_of_rows(nominal, keep, samples)),
         )  # fmt: skip
+
+
+def _of_one(program: Program, seed: int) -> float:
+    """How long a realization takes [s]: of more and more, up to a block, until they take long enough."""
+    trial = TRIAL
+    while True:
+        started = time.perf_counter()
+        list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
+        took = time.perf_counter() - started
+        if took > ENOUGH or trial >= block_rows(program):
+            return took / trial
+        trial *= 8
 
 
 def _duration(seconds: float) -> str:

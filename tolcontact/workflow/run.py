@@ -1,7 +1,6 @@
 """From a declared assembly to an archive: the whole flow in one call."""
 
 import tempfile
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
@@ -21,13 +20,11 @@ from tolcontact.simulation import Block, map_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import BlockSums, DisplacementFields
 from tolcontact.statistics import summarize as statistics_of
-from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MAGNITUDES
+from tolcontact.vocabulary import FIELD_CHOICES, KEPT
 from tolcontact.workflow.forecast import announce
-from tolcontact.workflow.garbage import collect, collected_here
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
-FIELDS_EVERY = 2.0  # s: how old the fields of a run that is killed may be
 Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the others are the model's
@@ -89,7 +86,7 @@ def run(
     resume: bool = False,
     keep: str = "all",
     surfaces: int = SURFACES,
-    fields: int | str = MAGNITUDES,
+    fields: int | str = "some",
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
@@ -98,8 +95,8 @@ def run(
     model's own method).
     Without `out` the results are kept in memory only. `keep` states what is kept of each realization: "measures" (with gaps,
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
-    `fields` is the number of realizations, the first ones, that the magnitudes of displacement fields cover, "all" or "none";
-    their components are always exact, over all realizations.
+    `fields` is the number of realizations, the first ones, that the magnitudes of displacement fields cover, "all", "none", or
+    "some": 16 384, and fewer where a part has many vertices. Their components are always exact, over all realizations.
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
@@ -119,15 +116,14 @@ def run(
     def write(path: Path) -> None:
         program = model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
         asked = Run(seed, samples, keep, surfaces, str(fields))
-        of_fields = DisplacementFields(program.nominal, asked.magnitudes)
+        of_fields = DisplacementFields(program.nominal, asked.fields)
         with (
             ArchiveWriter.resume(path, program, asked)
             if resume and path.exists()
             else ArchiveWriter(path, program, asked, of_fields.sizes)
         ) as writer:
             announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-            with collected_here():
-                _simulate(program, writer, of_fields, seed, progress)
+            _simulate(program, writer, of_fields, seed, progress)
 
     if out is None:
         for word, value in {"overwrite": overwrite, "resume": resume}.items():
@@ -151,22 +147,26 @@ def _simulate(
     def prepared(block: Block) -> tuple[StoredBlock, BlockSums]:
         return stored(block, writer.kept), fields.sums(block.poses, block.start)
 
-    written = time.monotonic()
+    is_summed = bool(writer.rows)
     try:
         for rows, sums in map_blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
+            is_summed = False
             fields.merge(sums)
-            writer.append(rows, fields.numbers)
-            if time.monotonic() > written + FIELDS_EVERY:
+            writer.append(rows)
+            is_summed = True
+            if writer.is_checkpoint_due:
+                writer.write_checkpoint(fields.numbers)
                 writer.write_fields(fields.fields())
-                written = time.monotonic()
             if progress:
                 progress(writer.rows)
-            collect()
         writer.write_fields(fields.fields())
     except KeyboardInterrupt:
-        # It came at whatever instant: what is sure are the sums of the last checkpoint.
-        if sums_there := writer.take_up():
-            fields.go_on_from(sums_there)
+        if is_summed and writer.is_between_blocks:
+            writer.write_checkpoint(fields.numbers)
+        elif not is_summed and (sums_there := writer.take_up()):
+            fields.go_on_from(sums_there)  # it came at whatever instant: only the sums of the last checkpoint are sure
+            is_summed = True
+        if is_summed:
             writer.write_fields(fields.fields())
         raise
     chosen_rows = writer.chosen(seed)

@@ -38,7 +38,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     magnitudes = int(summary["magnitude_realizations"])
     yield Text("\n6 sigma of the displacement magnitude over the surface of each part (mm)", style="bold")
     if magnitudes < count:
-        yield Text(f"of the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
+        yield Text(f"of at least the first {grouped(magnitudes)} realizations" if magnitudes else "not summed up")
     if magnitudes:
         yield _field_table(summary)
     yield Text("\ncontact", style="bold")
