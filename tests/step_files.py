@@ -146,3 +146,22 @@ def step_of(*items):
 
 def step_block():
     return step_of(("solid", (0, 0, 0), (10, 20, 30), "block"))
+
+
+def assembly(*places):
+    """A file in which products stand at some places: (name, at) each."""
+    made = Step()
+    solids = {
+        "pin": [((0, 0, 0), (5, 5, 5))],
+        "set": [
+            ((0, 0, 0), (10, 10, 10)),
+            ((10, 0, 0), (20, 10, 10)),
+            ((0, 0, 20), (30, 30, 50), "", ((10, 10, 30), (20, 20, 40))),
+        ],
+    }
+    names = dict.fromkeys(name for name, _ in places)
+    products = {name: made.product(name, [made.solid(*solid) for solid in solids[name]]) for name in names}
+    whole = made.product("whole")
+    for k, (name, at) in enumerate(places):
+        made.place(products[name], whole, f"use {k}", at)
+    return str(made)

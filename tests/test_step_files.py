@@ -6,7 +6,7 @@ import pytest
 
 import tolcontact as tc
 from tests.shapes import refusal
-from tests.step_files import Step, corners, step_block, step_of
+from tests.step_files import Step, assembly, corners, step_block, step_of
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.shapes import shape
 
@@ -37,7 +37,7 @@ SEVERAL = {
 def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path):
     content, expected = SEVERAL[kind]
     said = refusal(tmp_path / "many.step", content)
-    assert "holds 2 bodies" in said and "export each as a file of its own" in said
+    assert "holds 2 bodies" in said and "or declare all with tc.parts_from" in said
     for words in expected:
         assert words in said
 
@@ -49,28 +49,10 @@ def test_names_in_a_file_do_not_spoil_a_message(tmp_path):
     assert "\x1b" not in said and "[31m red long long" in said and len(said) < 500
 
 
-def assembly(*places):
-    made = Step()
-    solids = {
-        "pin": [((0, 0, 0), (5, 5, 5))],
-        "set": [
-            ((0, 0, 0), (10, 10, 10)),
-            ((10, 0, 0), (20, 10, 10)),
-            ((0, 0, 20), (30, 30, 50), "", ((10, 10, 30), (20, 20, 40))),
-        ],
-    }
-    names = dict.fromkeys(name for name, _ in places)
-    products = {name: made.product(name, [made.solid(*solid) for solid in solids[name]]) for name in names}
-    whole = made.product("whole")
-    for k, (name, at) in enumerate(places):
-        made.place(products[name], whole, f"use {k}", at)
-    return str(made)
-
-
 def test_the_bodies_of_an_assembly_stand_in_their_places(tmp_path):
     said = refusal(tmp_path / "two.step", assembly(("pin", (0, 0, 0)), ("pin", (5, 0, 0))))
     assert "holds 2 bodies" in said
-    assert '1. "pin", 5 x 5 x 5 mm at (2.5, 2.5, 2.5)' in said and '2. "pin", 5 x 5 x 5 mm at (7.5, 2.5, 2.5)' in said
+    assert '1. "use 0", 5 x 5 x 5 mm at (2.5, 2.5, 2.5)' in said and '2. "use 1", 5 x 5 x 5 mm at (7.5, 2.5, 2.5)' in said
 
 
 def test_touching_solids_of_one_product_are_told_apart(tmp_path):

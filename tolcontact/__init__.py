@@ -42,7 +42,8 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | purpose | `tc.` |
 |---|---|
 | declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
-| choose faces | `Facing`, `Inside`, `Near`, `Brep` |
+| choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
+| STEP files | `bodies_in`, `faces_in`, `parts_from` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
 | run | `run`, `build`, `check`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
 | read results | `summarize`, `open_archive`, `model_of`, `Status` |

@@ -6,10 +6,12 @@ from .declaration import (
     Box,
     Brep,
     ContactPair,
+    Cylinder,
     Face,
     Facing,
     Force,
     Inside,
+    Largest,
     Locator,
     Measure,
     Mesh,
@@ -19,6 +21,7 @@ from .declaration import (
     Tolerance,
     three_two_one,
 )
+from .discretization import bodies_in, faces_in, parts_from
 from .errors import (
     ArchiveError,
     ContactWarning,
@@ -35,8 +38,9 @@ from .vocabulary import Status
 from .workflow import build, check, compare, run, summarize
 
 __all__ = [
-    "ArchiveError", "Assembly", "Box", "Brep", "ContactPair", "ContactWarning", "Face", "Facing", "Force", "Inside", "Locator",
-    "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Part", "Point", "Program", "ScriptError", "Status",
-    "TolcontactError", "Tolerance", "UnitsWarning", "__version__", "build", "check", "command_line", "compare", "main",
-    "model_of", "open_archive", "run", "simulate_blocks", "summarize", "three_two_one",
+    "ArchiveError", "Assembly", "Box", "Brep", "ContactPair", "ContactWarning", "Cylinder", "Face", "Facing", "Force",
+    "Inside", "Largest", "Locator", "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Part", "Point",
+    "Program", "ScriptError", "Status", "TolcontactError", "Tolerance", "UnitsWarning", "__version__", "bodies_in", "build",
+    "check", "command_line", "compare", "faces_in", "main", "model_of", "open_archive", "parts_from", "run",
+    "simulate_blocks", "summarize", "three_two_one",
 ]  # fmt: skip

@@ -6,6 +6,8 @@
     tolcontact summary FILE.nc                           print the summary of an archive
     tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
     tolcontact compare MODEL.py --resolution linearized,exact
+    tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
+    tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options. A script with `tc.main(assembly)` under its main guard takes those of `run`.
@@ -36,7 +38,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 (True, 0)
 """
 
-from tolcontact.cli import check, compare, run, summary
+from tolcontact.cli import bodies, check, compare, faces, run, summary
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["check", "command_line", "compare", "main", "run", "summary"]
+__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "run", "summary"]

@@ -44,6 +44,7 @@ def or_(names: Iterable[str]) -> str:
 
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
+StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]
 Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]

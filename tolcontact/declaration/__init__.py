@@ -144,7 +144,7 @@ from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Part, Point
-from tolcontact.declaration.selection import Brep, Facing, Inside, Near, Picked, Triangles
+from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 
 __all__ = [
@@ -152,10 +152,12 @@ __all__ = [
     "Box",
     "Brep",
     "ContactPair",
+    "Cylinder",
     "Face",
     "Facing",
     "Force",
     "Inside",
+    "Largest",
     "Locator",
     "Measure",
     "Mesh",

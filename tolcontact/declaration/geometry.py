@@ -39,16 +39,20 @@ class Mesh(Readable):
     `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m,
     `mesh.units` of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within
     2 um, beside the rounding of their coordinates to single precision, and keep their boundary representation for `tc.Brep`;
-    that needs the extra `tolcontact[step]`. A STEP file holds one body.
+    that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number (from 1) of
+    one, which is read in its own frame; the only body of a file is read where it stands.
     """
 
     source: Any
     units: str | None = None
+    body: str | int | None = None
 
     def faults(self) -> Iterator[str]:
+        if self.body is not None and not self._is_step:
+            yield f"mesh body is {self.body!r}; only STEP files hold bodies that have names and numbers; leave it out"
         if self.units is not None and self.units not in UNITS:
             yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
-        if self.units is not None and isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP:
+        if self.units is not None and self._is_step:
             yield f'"{self.source}" is a STEP file, which states its own units; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
@@ -59,7 +63,11 @@ class Mesh(Readable):
         elif not (hasattr(self.source, "vertices") and hasattr(self.source, "faces")):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"
 
+    @property
+    def _is_step(self) -> bool:
+        return isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP
+
     def __str__(self) -> str:
         if isinstance(self.source, str | Path):
-            return shown(f"mesh {Path(self.source).name}")
+            return shown(f"mesh {Path(self.source).name}" + (f" {self.body}" if self.body is not None else ""))
         return f"mesh of {len(getattr(self.source, 'faces', ()))} triangles"

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 FACE_ANGLE = math.radians(1.0)
+KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "general")  # of surfaces
 
 
 class Selection(Protocol):
@@ -119,26 +120,71 @@ class Near(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Brep(Readable):
-    """The face of a STEP file's boundary representation that passes through the point `at` [mm]."""
+    """The face of a STEP file's boundary representation that has a number (`tolcontact faces` lists them), or a point [mm]."""
 
-    at: Vector
+    number: int | None
+    at: Vector | None
 
-    def __init__(self, at: Any) -> None:
-        object.__setattr__(self, "at", vector(at))
+    def __init__(self, which: Any) -> None:
+        number = which if isinstance(which, int) and not isinstance(which, bool) else None
+        object.__setattr__(self, "number", number)
+        object.__setattr__(self, "at", None if number is not None else vector(which))
 
     def faults(self) -> Iterator[str]:
-        if not is_finite(self.at):
-            yield "a B-rep face needs a point on it, three finite numbers"
+        if self.at is not None and not is_finite(self.at):
+            yield "a B-rep face needs its number, or a point on it, three finite numbers"
 
     def __str__(self) -> str:
+        if self.at is None:
+            return f"B-rep face {self.number}"
         return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in self.at))
+
+
+@dataclass(frozen=True, repr=False)
+class Cylinder(Readable):
+    """Cylindrical faces of a STEP file; `radius` [mm] of those of one size, `inner` of holes (True) or of pins (False)."""
+
+    radius: float | None = None
+    inner: bool | None = None
+
+    def faults(self) -> Iterator[str]:
+        if self.radius is not None and not (is_length(self.radius) and self.radius > 0):
+            yield f"radius is {self.radius!r}; expected a length in mm above 0"
+        if not (self.inner is None or isinstance(self.inner, bool)):
+            yield f"inner is {self.inner!r}; expected True, False or None"
+
+    def __str__(self) -> str:
+        what = {None: "cylinders", True: "holes", False: "pins"}[self.inner]
+        return what + (f" of radius {self.radius:g} mm" if self.radius is not None else "")
+
+
+@dataclass(frozen=True, repr=False)
+class Largest(Readable):
+    """The largest B-rep face of a STEP file: of one `kind`, and facing a direction ("+x" to "-z", or a vector)."""
+
+    kind: str
+    direction: Any = None
+
+    @property
+    def axis(self) -> Vector | None:
+        """Unit vector."""
+        return None if self.direction is None else _direction(self.direction)
+
+    def faults(self) -> Iterator[str]:
+        if self.kind not in KINDS:
+            yield f"kind is {self.kind!r}; expected one of {', '.join(KINDS)}"
+        if self.axis is not None and not is_finite(self.axis):
+            yield f'unknown direction "{self.direction}"; expected one of {", ".join(DIRECTIONS)}, or a vector'
+
+    def __str__(self) -> str:
+        return f"largest {self.kind}" + ("" if self.direction is None else f" facing {self.direction}")
 
 
 def criterion(said: Any) -> Selection:
     """The criterion that a user means by a direction, indices, a function, or a criterion itself."""
     if isinstance(said, str):
         return Facing(said)
-    if isinstance(said, Facing | Triangles | Picked | Inside | Near | Brep):
+    if isinstance(said, Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest):
         return said
     if callable(said):
         return Picked(said)

@@ -61,9 +61,16 @@ meet at more than 30 degrees form an edge. Curved faces are as round as their tr
 ## STEP files
 
 STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad, and keep their
-boundary representation, which `tc.Brep` refers to. Coordinates pass through single precision: they are rounded to 1e-5 mm at
-100 mm, and 2e-4 mm at 1 m. A STEP file holds one body. If it holds several, the message lists them with names, sizes and
-places, so that you can export each one as a file of its own. References to other files are rejected.
+boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states a plane, cylinder,
+cone, sphere or torus, vertices lie on it in double precision; elsewhere they are rounded to what single precision resolves,
+1e-5 mm at 100 mm and 2e-4 mm at 1 m. If that would be more than a million triangles, or takes too long, faces are triangulated
+to within 60 um and 0.5 rad instead, and a warning says so.
+
+An assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them, `tc.Mesh(file, body=...)` is one
+of them in the frame of its product, and `tc.parts_from(model, file)` declares all of them, or those named, as parts in their
+places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
+directions, radii and areas. Where a file states no simple surface, a plane, cylinder or sphere is fitted to the vertices if
+none is farther off than 1 um, and how far is stated. References to other files are rejected.
 
 ## Files from others
 
@@ -71,9 +78,23 @@ Shape files are read by a separate process with a limit on time (30 s, and 20 s 
 file therefore ends as one message that names the file and what to do.
 """
 
+from tolcontact.discretization.brep_face import FaceInFile
+from tolcontact.discretization.cad import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
 
-__all__ = ["ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "discretize"]
+__all__ = [
+    "BodyInFile",
+    "ContactPoints",
+    "FaceInFile",
+    "Locators",
+    "Nominal",
+    "NominalPart",
+    "Offsets",
+    "bodies_in",
+    "discretize",
+    "faces_in",
+    "parts_from",
+]

@@ -6,14 +6,18 @@ import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Brep, Face, Facing, Inside, Near, Part, Picked, Triangles
+from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
+from tolcontact.declaration.selection import FACE_ANGLE
+from tolcontact.discretization.brep_face import describe
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files.reading import BREP
+from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.discretization.surface import Surface
 
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
 FLAT = 2e-4  # angle [rad] between neighbouring triangles of one flat face: what single precision leaves of it
+SAME_SIZE = 1e-6  # of a radius: those that differ by less are one size
+SHOWN = 12  # faces that a message lists
 LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that face each other
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
@@ -59,6 +63,8 @@ def triangles(face: Face, meshes: Meshes) -> np.ndarray:
                 chosen = chosen & _by_function(face, mesh, selection)
             case Brep():
                 chosen = chosen & _by_brep(face, mesh, selection)
+            case Cylinder() | Largest():
+                chosen = chosen & _by_kind(face, mesh, selection)
             case Near():
                 chosen = chosen & _by_nearness(face, meshes, selection)
     if not chosen.any():
@@ -86,11 +92,47 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
     return np.asarray(chosen)
 
 
-def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
+def _breps(face: Face, mesh: trimesh.Trimesh) -> np.ndarray:
+    """The B-rep face of each triangle, from 0."""
     brep = mesh.face_attributes.get(BREP)
     if brep is None:
         raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
-    brep = np.asarray(brep).ravel()
+    return np.asarray(brep).ravel()
+
+
+def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
+    brep, surfaces = _breps(face, mesh), mesh.metadata[SURFACES]
+    described = [describe(mesh, number, np.flatnonzero(brep == number), form) for number, form in enumerate(surfaces)]
+    if isinstance(selection, Cylinder):
+        radius, inner = selection.radius, selection.inner
+        found = [
+            each
+            for each in described
+            if each.kind == "cylinder" and each.radius is not None and inner in (None, each.is_inner)
+            and (radius is None or abs(each.radius - radius) <= SAME_SIZE * radius + each.residual)
+        ]  # fmt: skip
+    else:
+        facing = selection.axis
+        found = [
+            each
+            for each in described
+            if each.kind == selection.kind
+            and (facing is None or (each.direction is not None and np.dot(each.direction, facing) > np.cos(FACE_ANGLE)))
+        ]
+        found = sorted(found, key=lambda each: each.area)[-1:]
+    if not found:
+        kinds = "; ".join(f"{each}" for each in described[:SHOWN]) + ("; ..." if len(described) > SHOWN else "")
+        raise GeometryFault(f"face {face}: the part has no such face; its {len(described)} faces are: {kinds}")
+    return np.isin(brep, [each.number - 1 for each in found])
+
+
+def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
+    brep = _breps(face, mesh)
+    if selection.at is None:
+        count = len(mesh.metadata[SURFACES])
+        if selection.number is None or not 1 <= selection.number <= count:
+            raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
+        return np.asarray(brep == selection.number - 1)
     point = np.tile(selection.at, (len(brep), 1))
     distance = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, point) - point, axis=1)
     if distance.min() > BREP_REACH * mesh.scale:

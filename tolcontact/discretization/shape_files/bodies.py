@@ -1,11 +1,11 @@
-"""The bodies that a STEP file holds: which triangles are whose. A part is one of them. Lengths in mm.
+"""The bodies that a STEP file holds: which triangles are whose, and where they stand. A part is one of them. Lengths in mm.
 
-A piece is what stands at one place of the file's product structure; a product may hold several solids. Triangles come
-B-rep face by B-rep face, and solid by solid, so that a solid ends where what began with it is closed.
+A shape is what the file's product structure puts in its places; a product may hold several solids. Triangles come B-rep face
+by B-rep face, and solid by solid, so that a solid ends where what began with it is closed.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,11 +16,21 @@ from tolcontact.discretization.shape_files.step_text import Solid
 SHOWN = 12  # bodies that a message lists
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
-    """A body: its `name`, "" if it has none, and its corners (3,); None if its triangles are not known."""
+    """A body in its place.
+
+    name          unlike that of any other body of the file; "" if the file has none
+    path          names of the products that it is in, from the root on
+    place         (4, 4): from its own frame to that of the file [mm]
+    triangles     (face,) those of its shape that are its own; none if they are not known
+    lower, upper  (3,) corners in its place; None if its triangles are not known
+    """
 
     name: str
+    path: tuple[str, ...] = ()
+    place: np.ndarray = field(default_factory=lambda: np.eye(4))
+    triangles: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     lower: np.ndarray | None = None
     upper: np.ndarray | None = None
     is_open: bool = False
@@ -37,38 +47,69 @@ class Body:
 class Triangles:
     """Triangles of a STEP file: `corners` (face, 3, 3), and `faces` (face, 3) that share vertices wherever corners meet.
 
-    piece, brep          (face,) the piece, and the B-rep face within it
-    names                (piece,) what the file calls each piece
-    coloured             (piece,) bool: of several colours, by which its B-rep faces are ordered, and not by solids
+    shape, brep          (face,) the shape, in whose own frame it is, and the B-rep face within it
+    products             (shape,) what the file calls each shape
+    coloured             (shape,) bool: of several colours, by which its B-rep faces are ordered, and not by solids
     """
 
     corners: np.ndarray
     faces: np.ndarray
-    piece: np.ndarray
+    shape: np.ndarray
     brep: np.ndarray
-    names: np.ndarray
+    products: np.ndarray
     coloured: np.ndarray
 
 
-def bodies(triangles: Triangles, solids: Sequence[Solid]) -> list[Body]:
-    """The bodies of a file whose text names some `solids`."""
-    pieces = np.unique(triangles.piece)
-    if len(pieces) == 1:
-        count = int(triangles.brep.max()) + 1
-        if len(solids) == 1 and solids[0].faces >= count:
-            return [_body(triangles, solids[0].name or triangles.names[pieces[0]], np.arange(len(triangles.faces)))]
-        if sum(solid.faces for solid in solids) == count and not triangles.coloured[pieces[0]]:
-            first = np.cumsum([0, *(solid.faces for solid in solids)])
-            label = np.searchsorted(first, triangles.brep, side="right") - 1
-            return [_body(triangles, solid.name, np.flatnonzero(label == k)) for k, solid in enumerate(solids)]
+@dataclass(frozen=True)
+class Place:
+    """A `shape` stands at `place` (4, 4) [mm]; `path`: the names of what it is in, and its own."""
+
+    shape: int
+    place: np.ndarray
+    path: tuple[str, ...]
+
+
+def bodies(triangles: Triangles, places: Sequence[Place], solids: Sequence[Solid]) -> list[Body]:
+    """The bodies of a file whose text names some `solids`, in its order."""
+    of_shape: dict[int, list[tuple[np.ndarray, bool]]] = {}
+    alone = _of_one_place(triangles, places[0], solids) if len(places) == 1 else None
+    if alone is not None:
+        return list(_told_apart(alone))
     found: list[Body] = []
-    for k in pieces:
-        found.extend(
-            _body(triangles, triangles.names[k], *run) for run in _runs(triangles, np.flatnonzero(triangles.piece == k))
-        )
-    if len(pieces) == 1 and len(found) < len(solids):
-        return [Body(solid.name) for solid in solids]
-    return found
+    for place in places:
+        if place.shape not in of_shape:
+            of_shape[place.shape] = _runs(triangles, np.flatnonzero(triangles.shape == place.shape))
+        name = place.path[-1] if place.path and place.path[-1] else str(triangles.products[place.shape])
+        found.extend(_body(triangles, place, name, *run) for run in of_shape[place.shape])
+    if len(places) == 1 and len(found) < len(solids):
+        return list(_told_apart([Body(solid.name) for solid in solids]))
+    return list(_told_apart(found))
+
+
+def _of_one_place(triangles: Triangles, place: Place, solids: Sequence[Solid]) -> list[Body] | None:
+    """The bodies of a file in which one shape stands at one place; None if its text does not tell which they are."""
+    count = int(triangles.brep.max()) + 1
+    if len(solids) == 1 and solids[0].faces >= count:
+        name = solids[0].name or str(triangles.products[place.shape])
+        return [_body(triangles, place, name, np.arange(len(triangles.faces)))]
+    if sum(solid.faces for solid in solids) == count and not triangles.coloured[place.shape]:
+        first = np.cumsum([0, *(solid.faces for solid in solids)])
+        label = np.searchsorted(first, triangles.brep, side="right") - 1
+        return [_body(triangles, place, solid.name, np.flatnonzero(label == k)) for k, solid in enumerate(solids)]
+    return None
+
+
+def _told_apart(found: Sequence[Body]) -> Iterator[Body]:
+    """Bodies whose names differ: those that repeat are numbered in the file's order."""
+    names = {body.name for body in found}
+    used: set[str] = set()
+    for body in found:
+        name, number = body.name, 1
+        while name and (name in used or (number > 1 and name in names)):
+            number += 1
+            name = f"{body.name} ({number})"
+        used.add(name)
+        yield replace(body, name=name)
 
 
 def listed(found: Sequence[Body]) -> str:
@@ -77,15 +118,15 @@ def listed(found: Sequence[Body]) -> str:
     return first + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
 
 
-def _body(triangles: Triangles, name: str, chosen: np.ndarray, is_open: bool = False) -> Body:
+def _body(triangles: Triangles, place: Place, name: str, chosen: np.ndarray, is_open: bool = False) -> Body:
     if not len(chosen):
-        return Body(name)
-    corners = triangles.corners[chosen].reshape(-1, 3)
-    return Body(name, corners.min(axis=0), corners.max(axis=0), is_open)
+        return Body(name, place.path, place.place)
+    corners = triangles.corners[chosen].reshape(-1, 3) @ place.place[:3, :3].T + place.place[:3, 3]
+    return Body(name, place.path, place.place, chosen, corners.min(axis=0), corners.max(axis=0), is_open)
 
 
 def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]]:
-    """The bodies in the piece that consists of its `own` triangles, by their indices, without cavities. Is the body open?
+    """The bodies in the shape that consists of its `own` triangles, by their indices, cavities included. Is the body open?
 
     Sheets that do not close are one body together: surfaces of a part need not be sewn.
     """
@@ -96,7 +137,13 @@ def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]
     closed = [order[runs == k] for k in np.unique(runs[runs < len(ends_at)])]
     rest = order[runs == len(ends_at)]
     outer = [run for run in closed if _volume(triangles.corners[run]) >= 0]
-    outer.extend(run for run in closed if _volume(triangles.corners[run]) < 0 and not _within(triangles, run, outer))
+    for run in closed:
+        if _volume(triangles.corners[run]) < 0:
+            around = _around(triangles, run, outer)
+            if around is None:
+                outer.append(run)
+            else:
+                outer[around] = np.concatenate([outer[around], run])
     return [*((run, False) for run in outer), *([(rest, True)] if len(rest) else [])]
 
 
@@ -120,8 +167,11 @@ def _volume(corners: np.ndarray) -> float:
     return float(np.einsum("ij,ij->", about[:, 0], np.cross(about[:, 1], about[:, 2])) / 6)
 
 
-def _within(triangles: Triangles, run: np.ndarray, others: Sequence[np.ndarray]) -> bool:
-    """Whether the box around one run of triangles lies in that around another one."""
-    own = triangles.corners[run].reshape(-1, 3)
-    boxes = [triangles.corners[other].reshape(-1, 3) for other in others]
-    return any((box.min(axis=0) <= own.min(axis=0)).all() and (box.max(axis=0) >= own.max(axis=0)).all() for box in boxes)
+def _around(triangles: Triangles, run: np.ndarray, others: Sequence[np.ndarray]) -> int | None:
+    """The smallest of some other runs of triangles whose box holds that of a run; None if none does."""
+    own, found = triangles.corners[run].reshape(-1, 3), []
+    for k, other in enumerate(others):
+        box = triangles.corners[other].reshape(-1, 3)
+        if (box.min(axis=0) <= own.min(axis=0)).all() and (box.max(axis=0) >= own.max(axis=0)).all():
+            found.append((float(np.prod(np.ptp(box, axis=0))), k))
+    return min(found)[1] if found else None

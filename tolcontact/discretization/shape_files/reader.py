@@ -27,6 +27,10 @@ PAUSE = 0.02  # [s] between looks at what it has left
 PROGRAM = Path(__file__).with_name("worker.py")
 
 
+class TooSlow(GeometryFault):
+    """A file was not read in time: it is damaged, or its triangles are too fine."""
+
+
 @dataclass(frozen=True)
 class Request:
     """What is asked of the reader: files, their kinds ("stl", ..., "step"), how finely STEP is cut, and the most triangles."""
@@ -76,7 +80,8 @@ def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iter
             _awaited(process, START, folder / "ready")
             for k, (path, _) in enumerate(files):
                 if not _awaited(process, allowed[k], folder / f"{k}.npz", folder / f"{k}.txt"):
-                    yield GeometryFault(f'"{path}" {_end(process, folder, allowed[k])}')
+                    kind = TooSlow if process.poll() is None else GeometryFault
+                    yield kind(f'"{path}" {_end(process, folder, allowed[k])}')
                     return
                 yield _left(path, folder, k)
         finally:

@@ -1,7 +1,8 @@
 """Sources of shapes to triangle meshes in mm."""
 
+import logging
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,13 +14,13 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.discretization.edges import rim
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import reader, screening
-from tolcontact.discretization.shape_files.bodies import Triangles, bodies, listed
+from tolcontact.discretization.shape_files.product import STEP_ANGLE, STEP_CHORD, Product, check_numbers, product
 from tolcontact.discretization.shape_files.step_text import StepText
 
+COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
-STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
-FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
-BREP = "brep_index"  # the B-rep face of each triangle
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -32,10 +33,10 @@ class Shape:
 
 @dataclass(frozen=True)
 class Content:
-    """What a file holds, as `worker` reads it, and the content of its text if it is a STEP file."""
+    """What a file holds, as `worker` reads it, or what that means if it is a STEP file."""
 
     arrays: Mapping[str, np.ndarray]
-    text: StepText | None
+    product: Product | None
 
 
 Contents = Mapping[Path, Content | GeometryFault]
@@ -51,15 +52,40 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
             texts[path] = screening.screen(path, MAX_TRIANGLES)
         except GeometryFault as fault:
             found[path] = fault
-    request = reader.Request(tuple((path, screening.kind(path)) for path in texts), STEP_CHORD, STEP_ANGLE, MAX_TRIANGLES)
-    for path, read_in in zip(texts, reader.load(request), strict=True):
+    for path, read_in in _loaded(list(texts)).items():
         if isinstance(read_in, GeometryFault):
             found[path] = read_in
         elif "count" in read_in:
             found[path] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
         else:
-            found[path] = Content(read_in, texts[path])
+            found[path] = _content(path, read_in, texts[path])
     return found
+
+
+def _loaded(paths: Sequence[Path]) -> dict[Path, dict[str, np.ndarray] | GeometryFault]:
+    """What the reader makes of some files. STEP files that come out too fine are cut more coarsely."""
+    found: dict[Path, dict[str, np.ndarray] | GeometryFault] = {}
+    for coarser in COARSER:
+        files = tuple((path, screening.kind(path)) for path in paths)
+        request = reader.Request(files, coarser * STEP_CHORD, math.sqrt(coarser) * STEP_ANGLE, MAX_TRIANGLES)
+        found |= dict(zip(paths, reader.load(request), strict=True)) if paths else {}
+        if coarser > 1:
+            for path in paths:
+                if not _is_too_fine(found[path]):
+                    log.warning('"%s": triangles within %g mm, since finer ones are too many', path, coarser * STEP_CHORD)
+        paths = [path for path in paths if screening.kind(path) == "step" and _is_too_fine(found[path])]
+    return found
+
+
+def _is_too_fine(read_in: dict[str, np.ndarray] | GeometryFault) -> bool:
+    return isinstance(read_in, reader.TooSlow) if isinstance(read_in, GeometryFault) else "count" in read_in
+
+
+def _content(path: Path, arrays: Mapping[str, np.ndarray], text: StepText | None) -> Content | GeometryFault:
+    try:
+        return Content(arrays, None if text is None else product(path, arrays, text))
+    except GeometryFault as fault:
+        return fault
 
 
 def read(geometry: Mesh, contents: Contents) -> Shape:
@@ -74,11 +100,11 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     content = contents[Path(source)]
     if isinstance(content, GeometryFault):
         raise content
-    if content.text is not None:
-        return Shape(_from_step(geometry, content.arrays, content.text))
+    if content.product is not None:
+        return Shape(content.product.part(geometry.body))
     own = trimesh.Trimesh(content.arrays["vertices"], content.arrays["faces"], process=False)
     own.apply_scale(_scale(geometry, str(content.arrays["units"]) or None))
-    _check_numbers(own, geometry)
+    check_numbers(own.vertices, str(geometry))
     return Shape(_merged(own, content.arrays["piece"]), unsure=not geometry.units)
 
 
@@ -90,7 +116,7 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     if len(own.faces) > MAX_TRIANGLES:
         raise GeometryFault(screening.too_many(geometry, len(own.faces), MAX_TRIANGLES))
     own.apply_scale(_scale(geometry, getattr(source, "units", None)))
-    _check_numbers(own, geometry)
+    check_numbers(own.vertices, str(geometry))
     own.merge_vertices(merge_tex=True, merge_norm=True)
     return own
 
@@ -106,17 +132,6 @@ def _scale(geometry: Mesh, own: str | None) -> float:
         raise GeometryFault(
             f'{geometry} declares the unit "{said}", which is not known; state another one: tc.Mesh(..., units="mm")'
         ) from error
-
-
-def _check_numbers(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
-    if not np.isfinite(mesh.vertices).all():
-        raise GeometryFault(f"{geometry} has vertices that are not finite; export it again")
-    far = float(np.abs(mesh.vertices).max(initial=0))
-    if far > FAR:
-        raise GeometryFault(
-            f"{geometry} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or in other "
-            "units: export it again, or state its units"
-        )
 
 
 def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
@@ -139,38 +154,3 @@ def _merged(own: trimesh.Trimesh, piece: np.ndarray) -> trimesh.Trimesh:
         vertices.append(body.vertices)
         count += len(body.vertices)
     return trimesh.Trimesh(np.concatenate(vertices), faces, process=False)
-
-
-def _from_step(geometry: Mesh, arrays: Mapping[str, np.ndarray], text: StepText) -> trimesh.Trimesh:
-    """The one body of a STEP file. Its B-rep faces are the mesh's face attribute BREP."""
-    path = Path(geometry.source)
-    if not len(arrays["faces"]):
-        raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
-    mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
-    mesh.apply_scale(UNITS["m"])
-    _check_numbers(mesh, geometry)
-    # It has passed through single precision. Rounding to what that resolves brings round lengths back, and flat faces.
-    resolved = UNITS["m"] * float(np.spacing(np.float32(np.abs(mesh.vertices).max(initial=0) / UNITS["m"])))
-    power = 10.0 ** math.floor(math.log10(resolved))
-    step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolved)
-    mesh.vertices = np.round(np.round(mesh.vertices / step) * step, 12)
-    mesh.merge_vertices(merge_tex=True, merge_norm=True)
-    # Of edges shorter than that step, triangles with two corners in one place are left. They are none.
-    whole = (mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)
-    piece, brep = arrays["piece"][whole], arrays["brep"][whole]
-    if not whole.all():
-        mesh.update_faces(whole)
-    found = bodies(Triangles(mesh.triangles, mesh.faces, piece, brep, arrays["names"], arrays["coloured"]), text.solids)
-    if len(found) > 1:
-        raise GeometryFault(
-            f'"{path}" holds {len(found)} bodies, but a part is one body; export each as a file of its own: {listed(found)}'
-        )
-    gaps = len(rim(mesh.faces)) if text.solids else 0
-    if gaps:
-        raise GeometryFault(
-            f'"{path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-            f"{len(np.unique(brep))} of {text.solids[0].faces} faces could be read); repair it in CAD, or export it again"
-        )
-    mesh.units = "mm"
-    mesh.face_attributes[BREP] = brep
-    return mesh

@@ -108,10 +108,13 @@ def plain(content: bytes) -> bytes:
 
 
 def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
-    """All pieces of a STEP file in their places [m]: one per place where a product with a shape of its own stands.
+    """The shapes of a STEP file, each in its own frame [m], and the places where they stand.
 
-    Beside `joined`, `brep` (face,) numbers the B-rep faces within their piece, `names` (piece,) are the file's, and
-    `coloured` (piece,) marks those of several colours, which have their B-rep faces out of order.
+    Of the shapes: `joined`, where a piece is a shape, and `brep` (face,) the B-rep face within it; `products` (shape,) are the
+    file's names; `coloured` (shape,) marks those of several colours, which have their B-rep faces out of order; `surfaces`
+    (shape,) is what is known of their B-rep faces, in JSON.
+    Of the places, in the file's order: `shape` (place,) stands there, moved by `transforms` (place, 4, 4); `paths` (place,)
+    name the products that it is in, and itself, in JSON.
     """
     if cascadio is None:
         raise Refused('is a STEP file, which needs the package cascadio; install it with: pip install "tolcontact[step]"')
@@ -120,17 +123,38 @@ def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
     failed = cascadio.step_to_glb(str(path), str(converted), tol_linear=chord, tol_angular=angle, include_brep=True)
     if failed or not converted.is_file():
         raise Refused("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
-    found, breps, names, coloured = [], [], [], []
     glb = Glb(converted.read_bytes())
-    for name, transform, mesh in glb.places():
-        corners, faces, brep = glb.piece(mesh)
-        if len(faces):
-            found.append((trimesh.transform_points(corners, transform), faces))
+    known: dict[tuple, int] = {}
+    shapes: list[tuple[np.ndarray, np.ndarray]] = []
+    breps: list[np.ndarray] = []
+    products: list[str] = []
+    coloured: list[bool] = []
+    surfaces: list[str] = []
+    places: list[tuple[int, np.ndarray, str]] = []
+    for names, transform, mesh in glb.places():
+        corners, faces, brep, said = glb.piece(mesh)
+        if not len(faces):
+            continue
+        same = (mesh.get("name", ""), corners.tobytes(), faces.tobytes(), brep.tobytes(), said)  # it stands elsewhere, too
+        if same not in known:
+            known[same] = len(shapes)
+            shapes.append((corners, faces))
             breps.append(brep)
-            names.append(name)
+            products.append(mesh.get("name", ""))
             coloured.append(sum(is_surface(primitive) for primitive in mesh["primitives"]) > 1)
-    brep = np.concatenate([np.zeros(0, dtype=np.int64), *breps])
-    return {**joined(found), "brep": brep, "names": np.array(names, dtype=str), "coloured": np.array(coloured, dtype=bool)}
+            surfaces.append(said)
+        places.append((known[same], transform, json.dumps(names)))
+    return {
+        **joined(shapes),
+        "chord": np.array(chord),
+        "brep": np.concatenate([np.zeros(0, dtype=np.int64), *breps]),
+        "products": np.array(products, dtype=str),
+        "coloured": np.array(coloured, dtype=bool),
+        "surfaces": np.array(surfaces, dtype=str),
+        "shape": np.array([shape for shape, _, _ in places], dtype=np.int64),
+        "transforms": np.array([transform for _, transform, _ in places]).reshape(-1, 4, 4),
+        "paths": np.array([names for _, _, names in places], dtype=str),
+    }
 
 
 def is_surface(primitive: dict[str, Any]) -> bool:
@@ -146,39 +170,44 @@ class Glb:
         self.tree = json.loads(content[20 : 20 + length])
         self.binary = content[28 + length :]
 
-    def places(self) -> list[tuple[str, np.ndarray, dict[str, Any]]]:
-        """Name, transform (4, 4) and mesh of each node that has a mesh, in the file's order."""
+    def places(self) -> list[tuple[list[str], np.ndarray, dict[str, Any]]]:
+        """Names from the root on, transform (4, 4) and mesh of each node that has a mesh, in the file's order."""
         nodes, found = self.tree.get("nodes", []), []
-        waiting = [(k, np.eye(4), "") for k in reversed(self.tree["scenes"][0].get("nodes", []))]
+        waiting: list[tuple[int, np.ndarray, list[str]]] = [
+            (k, np.eye(4), []) for k in reversed(self.tree["scenes"][0].get("nodes", []))
+        ]
         while waiting:
-            index, above, parent = waiting.pop()
+            index, above, parents = waiting.pop()
             node = nodes[index]
             transform = above @ np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T
             name = node.get("name", "")
+            names = parents if name.startswith("=>[") else [*parents, name]  # the kernel's label of a nameless shape
             if "mesh" in node:
-                mesh = self.tree["meshes"][node["mesh"]]
-                own = parent if name.startswith("=>[") else mesh.get("name", "")  # the kernel's label of a nameless shape
-                found.append((own, transform, mesh))
-            waiting.extend((k, transform, name) for k in reversed(node.get("children", [])))
+                found.append((names, transform, self.tree["meshes"][node["mesh"]]))
+            waiting.extend((k, transform, names) for k in reversed(node.get("children", [])))
         return found
 
-    def piece(self, mesh: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Vertices (vertex, 3) [m], faces (face, 3) and B-rep faces (face,) of a mesh, whose colours stand apart."""
+    def piece(self, mesh: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
+        """Vertices (vertex, 3) [m], faces (face, 3), B-rep faces (face,) of a mesh, whose colours stand apart; and theirs."""
         corners, faces, breps = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        count = numbers = 0
+        count = 0
+        surfaces: list[dict[str, Any] | None] = []
         for primitive in mesh["primitives"]:
             if not is_surface(primitive):
                 continue
             own = self.array(primitive["attributes"]["POSITION"]).astype(float)
             triangles = self.array(primitive["indices"]).astype(np.int64).reshape(-1, 3)
             told = primitive.get("extensions", {}).get("TM_brep_faces")
-            brep = self.array(told["faceIndices"]).astype(np.int64).ravel() if told else sharing(triangles, len(own))
+            brep = self.array(told["faceIndices"]).astype(np.int64).ravel() if told else np.zeros(0, dtype=np.int64)
+            if len(brep) != len(triangles):  # cascadio gives one of several colours of a product what is another one's
+                told, brep = None, sharing(triangles, len(own))
             corners.append(own)
             faces.append(triangles + count)
-            breps.append(brep + numbers)
+            breps.append(brep + len(surfaces))
             count += len(own)
-            numbers += int(brep.max(initial=-1)) + 1
-        return np.concatenate(corners), np.concatenate(faces), np.concatenate(breps)
+            known = told["faces"] if told else []
+            surfaces.extend([*known, *[None] * (int(brep.max(initial=-1)) + 1 - len(known))])
+        return np.concatenate(corners), np.concatenate(faces), np.concatenate(breps), json.dumps(surfaces)
 
     def array(self, index: int) -> np.ndarray:
         """An accessor's numbers (row, column)."""

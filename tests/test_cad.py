@@ -1,0 +1,210 @@
+"""Assemblies from STEP files, and faces that know their surfaces."""
+
+import itertools
+import json
+import logging
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.optimize import approx_fprime
+from typer.testing import CliRunner
+
+import tolcontact as tc
+from tests import cases
+from tests.step_files import assembly, step_block
+from tolcontact.cli.app import app
+from tolcontact.discretization import discretize
+from tolcontact.discretization.analytic import Form, believed, onto
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.fitting import fitted
+from tolcontact.discretization.shape_files import BREP, SURFACES, reading
+from tolcontact.discretization.shapes import shape
+
+COVER = cases.MODELS / "cover.step"
+TILTED = np.array([1.0, 2.0, 2.0]) / 3
+FORMS = [
+    Form("plane", np.array([1.0, 2, 3]), TILTED),
+    Form("cylinder", np.array([1.0, 2, 3]), TILTED, radius=5),
+    Form("cone", np.array([1.0, 2, 3]), TILTED, angle=0.4),
+    Form("sphere", np.array([1.0, 2, 3]), TILTED, radius=5),
+    Form("torus", np.array([1.0, 2, 3]), TILTED, radius=5, minor=2),
+]
+POINTS = np.random.default_rng(1).normal(scale=10, size=(50, 3))
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.kind)
+def test_distances_have_unit_gradients_and_end_on_the_surface(form):
+    value, slope = form.distance(POINTS)
+    numeric = [approx_fprime(p, lambda q: form.distance(q[None])[0][0], 1e-6) for p in POINTS]
+    assert np.abs(slope - numeric).max() < 1e-4
+    assert np.linalg.norm(slope, axis=1) == pytest.approx(1)
+    foot = form.project(POINTS)
+    assert np.abs(form.distance(foot)[0]).max() < 1e-12
+    assert np.linalg.norm(foot - POINTS, axis=1) == pytest.approx(np.abs(value), abs=1e-9)
+
+
+@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.kind)
+def test_a_form_moves_with_its_part(form):
+    R, t = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3], np.array([3.0, -1, 2])
+    assert form.placed(R, t).distance(POINTS @ R.T + t)[0] == pytest.approx(form.distance(POINTS)[0], abs=1e-12)
+
+
+def test_vertices_are_put_back_where_surfaces_meet():
+    """The corner of three planes, an edge of a plane and a cylinder; what is too far off stays."""
+    x, y, z = (Form("plane", np.zeros(3), axis) for axis in np.eye(3))
+    round_ = Form("cylinder", np.zeros(3), np.array([0.0, 0, 1]), radius=2.0)
+    vertices = np.array([[1e-6, -2e-6, 3e-6], [2 + 1e-6, 0.0, 2e-6], [5.0, 5.0, 1e-6], [9.0, 9.0, 0.5]])
+    faces, brep = np.array([[0, 0, 0], [0, 0, 0], [0, 1, 2], [1, 1, 1], [3, 3, 3]]), np.array([0, 1, 2, 3, 2])
+    found = onto(vertices, faces, brep, [x, y, z, round_], 1e-3)
+    assert found == pytest.approx(np.array([[0, 0, 0], [2, 0, 0], [5, 5, 0], [9, 9, 0.5]]), abs=1e-12)
+    assert believed(found, faces, brep, [x, y, z, round_], 1e-3) == [x, y, None, round_]
+
+
+def test_surfaces_are_fitted_where_a_file_states_none():
+    rng = np.random.default_rng(2)
+    for radius, mesh in (
+        (7.5, trimesh.creation.cylinder(7.5, 20, sections=60)),
+        (3.0, trimesh.creation.icosphere(3, radius=3.0)),
+    ):
+        R = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+        side = np.abs(mesh.face_normals[:, 2]) < 0.5 if radius == 7.5 else np.ones(len(mesh.faces), dtype=bool)
+        used = np.unique(mesh.faces[side])
+        vertices = mesh.vertices[used] @ R.T + [10.0, 20.0, -5.0] + rng.normal(scale=1e-6, size=(len(used), 3))
+        form = fitted(vertices, mesh.face_normals[side] @ R.T, 1e-4)
+        assert form.kind == ("cylinder" if radius == 7.5 else "sphere")
+        assert form.radius == pytest.approx(radius, abs=2e-6) and 0 < form.residual < 1e-5
+    box = trimesh.creation.box()
+    assert fitted(box.vertices, box.face_normals, 1e-4) is not None  # eight corners lie on a sphere: normals say nothing of it
+    assert fitted(rng.normal(size=(30, 3)), rng.normal(size=(30, 3)), 1e-4) is None
+
+
+def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():
+    mesh = shape(tc.Mesh(COVER)).mesh
+    brep = np.asarray(mesh.face_attributes[BREP])
+    for number, form in enumerate(mesh.metadata[SURFACES]):
+        own = mesh.vertices[np.unique(mesh.faces[brep == number])]
+        assert np.abs(form.distance(own)[0]).max() < 1e-11
+    assert mesh.is_watertight
+
+
+def test_the_faces_of_a_part_say_what_they_are():
+    found = tc.faces_in(COVER)
+    assert [face.number for face in found] == list(range(1, 16))
+    holes = [face for face in found if face.kind == "cylinder" and face.is_inner]
+    assert [face.radius for face in holes] == pytest.approx([4.05] * 3, abs=1e-12)
+    assert found[1].direction == pytest.approx((0, 0, 1)) and found[4].direction == pytest.approx((0, 0, -1))
+    assert all(face.residual == 0 for face in found)
+    assert holes[0].area == pytest.approx(2 * np.pi * 4.05 * 8, rel=1e-3)
+
+
+def triangles(*criteria):
+    model = tc.Assembly("one")
+    cover = model.part("cover", tc.Mesh(COVER), fixed=True)
+    model.measure("corner", cover.point(0, 0, 0), along="z")
+    return discretize(model).triangles(cover.face(*criteria))
+
+
+def test_faces_are_chosen_by_number_kind_and_size():
+    assert triangles(tc.Brep(2)) == triangles(tc.Largest("plane", "+z")) == triangles(tc.Brep((60, 10, 8)))
+    holes = sorted(triangles(tc.Brep(11)) + triangles(tc.Brep(13)) + triangles(tc.Brep(15)))
+    assert triangles(tc.Cylinder(radius=4.05)) == triangles(tc.Cylinder(inner=True)) == holes
+    corners = sorted(itertools.chain(*(triangles(tc.Brep(number)) for number in (3, 4, 8, 9))))
+    assert triangles(tc.Cylinder(radius=6)) == triangles(tc.Cylinder(inner=False)) == corners
+    for wrong in (tc.Brep(16), tc.Brep(0), tc.Cylinder(radius=4.06), tc.Largest("sphere")):
+        with pytest.raises(GeometryFault, match=r"face cover .*(faces 1 to 15|no such face)"):
+            triangles(wrong)
+    assert "expected one of plane" in next(tc.Largest("round").faults())
+
+
+@pytest.fixture
+def file(tmp_path):
+    path = tmp_path / "stack.step"
+    path.write_text(assembly(("pin", (0, 0, 0)), ("set", (100, 0, 0)), ("pin", (0, 0, 5))))
+    return path
+
+
+def test_bodies_of_an_assembly_have_names_places_and_sizes(file):
+    found = tc.bodies_in(file)
+    assert [body.name for body in found] == ["use 0", "use 1", "use 1 (2)", "use 1 (3)", "use 2"]
+    assert [body.number for body in found] == [1, 2, 3, 4, 5] and found[0].path == ("whole", "use 0")
+    assert (
+        found[4].at == (0, 0, 5) and found[4].lower == pytest.approx((0, 0, 5)) and found[4].upper == pytest.approx((5, 5, 10))
+    )
+    assert found[2].lower == pytest.approx((110, 0, 0)) and found[3].faces == 12  # with its cavity
+    own = shape(tc.Mesh(file, body="use 2")).mesh
+    assert own.bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))  # in the frame of its product
+    assert shape(tc.Mesh(file, body=5)).mesh.vertices == pytest.approx(own.vertices)
+
+
+def test_an_assembly_is_declared_from_its_file_alone(file):
+    model = tc.Assembly("stack")
+    parts = tc.parts_from(model, file, ["use 0", "use 2"])
+    assert list(parts) == ["use 0", "use 2"] == [part.name for part in model.parts]
+    upper, lower = parts["use 2"], parts["use 0"]
+    scheme = tc.three_two_one(upper.face(tc.Largest("plane", "-z")), upper.face("-y"), upper.face("-x"), inset=0.5)
+    model.locate(upper, scheme, tolerance=0.2)
+    model.locate(lower, tc.three_two_one(lower.face("-z"), lower.face("-y"), lower.face("-x"), inset=0.5), tolerance=0.1)
+    model.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"))
+    model.measure("gap", lower.point(2.5, 2.5, 5), to=upper.point(2.5, 2.5, 0), along="z", tolerance=0.3)
+    results = tc.run(model, samples=300, seed=1, solver="daqp", surfaces=16)
+    assert (results["status"] <= 1).all()
+    raw, corrected = (results["measured"].sel(state=state, measure="gap") for state in ("raw", "corrected"))
+    assert float(raw.min()) < -0.05 and float(corrected.min()) > -1e-9  # the upper one stands on the lower one
+    assert len(tc.parts_from(tc.Assembly("all"), file)) == 5
+
+
+def test_what_a_file_does_not_hold_is_told(file, tmp_path):
+    with pytest.raises(tc.ModelError, match=r'holds no body "use 9"; it holds "use 0", "use 1"'):
+        tc.parts_from(tc.Assembly("stack"), file, ["use 9"])
+    with pytest.raises(tc.ModelError, match="does not exist"):
+        tc.parts_from(tc.Assembly("stack"), tmp_path / "none.step")
+    (tmp_path / "ball.stl").write_bytes(trimesh.creation.icosphere(1).export(file_type="stl"))
+    with pytest.raises(tc.OptionError, match="not a STEP file"):
+        tc.bodies_in(tmp_path / "ball.stl")
+    with pytest.raises(tc.OptionError, match="holds 5 bodies, but a part is one body; name one"):
+        tc.faces_in(file)
+    model = tc.Assembly("ball")
+    model.part("ball", tc.Mesh(tmp_path / "ball.stl", body="ball"), fixed=True)
+    with pytest.raises(tc.ModelError, match="only STEP files hold bodies"):
+        tc.build(model)
+
+
+def test_names_that_no_part_may_have_are_changed(tmp_path):
+    path = tmp_path / "odd.step"
+    path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))).replace("use 0", "M6/12").replace("use 1", "-x ?"))
+    model = tc.Assembly("odd")
+    parts = tc.parts_from(model, path)
+    assert list(parts) == ["M6_12", "body 2 -x ?"]
+    assert not [fault for fault in model.faults() if "name must" in fault]
+
+
+def test_the_command_line_lists_bodies_and_faces(file):
+    listed = CliRunner().invoke(app, ["bodies", str(file)])
+    assert listed.stdout.splitlines()[:2] == ["whole", "  1. use 0: 5 x 5 x 5 mm, 6 faces"]
+    bodies = json.loads(CliRunner().invoke(app, ["bodies", str(file), "--json"]).stdout)
+    assert [body["name"] for body in bodies][-1] == "use 2" and bodies[-1]["at"] == [0, 0, 5]
+    listed = CliRunner().invoke(app, ["faces", str(file), "--body", "use 2"]).stdout
+    assert len(listed.splitlines()) == 6 and "1. plane, along (0, 0, -1), 25 mm2" in listed
+    faces = json.loads(CliRunner().invoke(app, ["faces", str(file), "--body", "5", "--json"]).stdout)
+    assert sum(face["area"] for face in faces) == pytest.approx(150)
+
+
+def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(monkeypatch, caplog):
+    whole = len(shape(tc.Mesh(COVER)).mesh.faces)
+    monkeypatch.setattr(reading, "MAX_TRIANGLES", whole - 1)
+    with caplog.at_level(logging.WARNING):
+        coarse = shape(tc.Mesh(COVER)).mesh
+    assert len(coarse.faces) < whole / 2 and coarse.is_watertight
+    assert "triangles within 0.06 mm, since finer ones are too many" in caplog.text
+    monkeypatch.setattr(reading, "MAX_TRIANGLES", 10)
+    with pytest.raises(tc.ModelError, match="more than the limit of 10"):
+        triangles("+z")
+
+
+def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
+    (tmp_path / "one.step").write_text(assembly(("pin", (7, 0, 0))))
+    assert shape(tc.Mesh(tmp_path / "one.step")).mesh.bounds == pytest.approx(np.array([[7, 0, 0], [12, 5, 5]]))
+    assert shape(tc.Mesh(tmp_path / "one.step", body=1)).mesh.bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))
+    (tmp_path / "block.step").write_text(step_block())
+    assert tc.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)

@@ -1,0 +1,29 @@
+"""tolcontact bodies."""
+
+import json
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from tolcontact.cli.app import StepFile, app
+from tolcontact.discretization import bodies_in
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print them as JSON.")]
+
+
+@app.command()
+def bodies(file: StepFile, as_json: AsJson = False) -> None:
+    """List the bodies of a STEP file: numbers, names, sizes and faces, in its product tree."""
+    found = bodies_in(file)
+    if as_json:
+        typer.echo(json.dumps([asdict(body) for body in found]))
+        return
+    above: tuple[str, ...] = ()
+    for body in found:
+        *products, _ = body.path or ("",)
+        for depth, name in enumerate(products):
+            if above[: depth + 1] != tuple(products[: depth + 1]):
+                typer.echo(f"{'  ' * depth}{name}")
+        above = tuple(products)
+        typer.echo(f"{'  ' * len(products)}{body}")

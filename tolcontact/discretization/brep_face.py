@@ -1,0 +1,70 @@
+"""A face of a STEP file's boundary representation, described. Lengths in mm."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from tolcontact.declaration.vectors import Vector
+from tolcontact.discretization.analytic import Form
+from tolcontact.readable import Readable
+
+
+@dataclass(frozen=True, repr=False)
+class FaceInFile(Readable):
+    """A B-rep face of a body, in the body's own frame.
+
+    number      from 1 in the file's order, for `tc.Brep`
+    kind        plane, cylinder, cone, sphere, torus, or "general"
+    point       a point on it [mm]
+    direction   outward normal of a plane; axis of a cylinder, cone or torus; None of others
+    radius      [mm] of a cylinder or sphere, or of a torus' circle; None of others
+    is_inner    whether a round face is a hollow: its outside lies towards its axis or centre
+    area        [mm2], of its triangles
+    residual    [mm] how far its vertices lie off it at most, if it was fitted to them; 0 if the file states it
+    """
+
+    number: int
+    kind: str
+    point: Vector
+    direction: Vector | None
+    radius: float | None
+    is_inner: bool
+    area: float
+    residual: float = 0.0
+
+    def __str__(self) -> str:
+        words = [f"{self.number}. {'inner ' if self.is_inner else ''}{self.kind}"]
+        if self.radius is not None:
+            words.append(f"radius {self.radius:.6g} mm")
+        if self.direction is not None:
+            words.append("along ({:g}, {:g}, {:g})".format(*(round(c, 6) + 0.0 for c in self.direction)))
+        if self.residual:
+            words.append(f"fitted within {self.residual:.1g} mm")
+        return ", ".join([*words, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
+
+
+def describe(mesh: trimesh.Trimesh, number: int, own: np.ndarray, form: Form | None) -> FaceInFile:
+    """The face of a number, from 0, that consists of the triangles `own` (face,) of a part, and lies on `form`."""
+    areas, normals = np.asarray(mesh.area_faces)[own], np.asarray(mesh.face_normals)[own]
+    largest = int(areas.argmax())
+    point = np.asarray(mesh.triangles_center)[own[largest]]
+    if form is None:
+        return FaceInFile(number + 1, "general", _vector(point), None, None, False, float(areas.sum()))
+    point = form.project(point[None])[0]
+    _, outward = form.distance(point[None] + 1e-6 * normals[largest])
+    is_inward = float(outward[0] @ normals[largest]) < 0
+    direction = None if form.kind == "sphere" else form.axis
+    if form.kind == "plane" and is_inward:
+        direction = -form.axis
+    radius = form.radius if form.kind in ("cylinder", "sphere", "torus") else None
+    is_inner = is_inward and form.kind != "plane"
+    return FaceInFile(
+        number + 1, form.kind, _vector(point), None if direction is None else _vector(direction), radius, is_inner,
+        float(areas.sum()), form.residual,
+    )  # fmt: skip
+
+
+def _vector(numbers: np.ndarray) -> Vector:
+    x, y, z = (float(number) + 0.0 for number in numbers)
+    return x, y, z

@@ -1,0 +1,77 @@
+"""The plane, cylinder or sphere on which given vertices lie, where a file does not state one. Lengths in mm."""
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from tolcontact.discretization.analytic import Form
+
+LARGE = 1e4  # radii, in sizes of what they are fitted to: more is a plane's rounding
+
+
+def fitted(vertices: np.ndarray, normals: np.ndarray, within: float) -> Form | None:
+    """The surface that no vertex (vertex, 3) [mm] is farther off than `within` [mm]; None if none of these kinds is.
+
+    normals   (face, 3) of the triangles between them
+    """
+    if len(vertices) < 4:
+        return None
+    for attempt in (_plane, _cylinder, _sphere):
+        form = attempt(vertices, normals)
+        if form is not None and form.residual <= within:
+            return form
+    return None
+
+
+def _plane(vertices: np.ndarray, normals: np.ndarray) -> Form:
+    centre = vertices.mean(axis=0)
+    axis = np.linalg.svd(vertices - centre, full_matrices=False)[2][2]
+    return _with_residual(Form("plane", centre, axis), vertices)
+
+
+def _cylinder(vertices: np.ndarray, normals: np.ndarray) -> Form | None:
+    """Normals of a cylinder are all across its axis, which therefore is the direction that they have least of."""
+    _, spread, directions = np.linalg.svd(normals, full_matrices=False)
+    if spread[1] < 1e-3 * spread[0]:
+        return None
+    first, second, axis = directions
+    centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
+    across = (vertices - centre) @ np.column_stack([first, second])
+    x, y, r = _circle(across)
+
+    def form(numbers: np.ndarray) -> Form:
+        tilt, turn, x, y, radius = numbers
+        along = axis + tilt * first + turn * second
+        along /= np.linalg.norm(along)
+        return Form("cylinder", centre + x * first + y * second, along, radius=abs(float(radius)))
+
+    found = least_squares(
+        lambda numbers: form(numbers).distance(vertices)[0], [0.0, 0.0, x, y, r], x_scale=[1e-3, 1e-3, size, size, size],
+        xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50,
+    )  # fmt: skip
+    return _with_residual(form(found.x), vertices) if abs(found.x[4]) < LARGE * size else None
+
+
+def _sphere(vertices: np.ndarray, normals: np.ndarray) -> Form | None:
+    centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
+    apart = vertices - centre
+    solved = np.linalg.lstsq(np.column_stack([2 * apart, np.ones(len(apart))]), (apart**2).sum(axis=1), rcond=None)[0]
+    start = [*solved[:3], np.sqrt(max(solved[3] + (solved[:3] ** 2).sum(), 0.0))]
+    if not start[3] < LARGE * size:
+        return None
+    found = least_squares(
+        lambda numbers: np.linalg.norm(apart - numbers[:3], axis=1) - numbers[3], start, x_scale=size,
+        xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50,
+    )  # fmt: skip
+    form = Form("sphere", centre + found.x[:3], np.array([0.0, 0.0, 1.0]), radius=abs(float(found.x[3])))
+    return _with_residual(form, vertices)
+
+
+def _circle(points: np.ndarray) -> tuple[float, float, float]:
+    """Centre and radius of the circle next to `points` (point, 2), by algebra."""
+    solved = np.linalg.lstsq(np.column_stack([2 * points, np.ones(len(points))]), (points**2).sum(axis=1), rcond=None)[0]
+    x, y, rest = (float(number) for number in solved)
+    return x, y, float(np.sqrt(max(rest + x**2 + y**2, 0.0)))
+
+
+def _with_residual(form: Form, vertices: np.ndarray) -> Form:
+    return form.fitted_to(float(np.abs(form.distance(vertices)[0]).max()))
