@@ -150,7 +150,7 @@ def test_an_assembly_is_declared_from_its_file_alone(file):
     results = tc.run(model, samples=300, seed=1, solver="daqp", surfaces=16)
     assert (results["status"] <= 1).all()
     raw, corrected = (results["measured"].sel(state=state, measure="gap") for state in ("raw", "corrected"))
-    assert float(raw.min()) < -0.05 and float(corrected.min()) > -1e-9  # the upper one stands on the lower one
+    assert float(raw.min()) < -0.05 and float(corrected.min()) > -0.005  # points beside each other, faces tilted
     assert len(tc.parts_from(tc.Assembly("all"), file)) == 5
 
 
