@@ -11,6 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
+from tolcontact.archive import bytes_of_rows
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
@@ -107,3 +108,14 @@ def test_a_model_without_contact_has_an_archive_too(tmp_path):
     tc.run(a, samples=60, solver="daqp", out=path, resume=True).close()
     with tc.open_archive(path) as tree:
         assert tree.sizes["realization"] == 60 and [part.name for part in tc.model_of(tree).parts] == ["block"]
+
+
+@pytest.mark.parametrize("keep", ["measures", "poses", "all"])
+def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
+    path = tmp_path / "run.nc"
+    program = tc.build(cases.stack(), solver="daqp")
+    tc.run(program, samples=50, out=path, keep=keep, surfaces=0).close()
+    with netCDF4.Dataset(path) as file:
+        rows = [v for group in (file, file["sample"]) for v in group.variables.values() if "realization" in v.dimensions]
+        stored = sum(v.dtype.itemsize * v.size for v in rows)
+    assert bytes_of_rows(program.nominal, keep, 50) == stored

@@ -126,9 +126,7 @@ def _rows(tree: xr.DataTree) -> Rows:
 
 def _numbers(tree: xr.DataTree) -> np.ndarray:
     """Numbers (realization,) of the realizations."""
-    if words.REALIZATION in tree.coords:
-        return np.asarray(tree.coords[words.REALIZATION].values)
-    return np.arange(tree.sizes[words.REALIZATION])
+    return np.asarray(tree.to_dataset()[words.REALIZATION].values)
 
 
 def _meaning(status: int) -> str:

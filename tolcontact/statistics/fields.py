@@ -41,14 +41,13 @@ class FieldSums:
         self.of_magnitude, self.magnitude, self.moments = of_magnitude, moments[0], tuple(moments[1:])
 
     def merge(self, other: "FieldSums") -> None:
-        """Take in the sums of other realizations, those that come next. Chan et al., Pébay (2008)."""
+        """Take in the sums of other realizations, at least one, those that come next. Chan et al., Pébay (2008)."""
         n, m = self.count, other.count
-        if m > 0:
-            share = m / (n + m)
-            step = other.mean - self.mean
-            self.scatter += other.scatter + n * share * np.einsum("ia,ib->iab", step, step)
-            self.mean += step * share
-            self.count += m
+        share = m / (n + m)
+        step = other.mean - self.mean
+        self.scatter += other.scatter + n * share * np.einsum("ia,ib->iab", step, step)
+        self.mean += step * share
+        self.count += m
         if other.of_magnitude > 0:
             self._merge_magnitudes(other)
 

@@ -1,0 +1,77 @@
+"""Read STEP files of other people, and say of each what came out: python -m studies.cad.read_files FOLDER.
+
+Prints a table in Markdown. Each file is read in a process of its own, whose time and memory (of its reader process) are told.
+"""
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+import tolcontact as tc
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.shape_files import read_files
+from tolcontact.discretization.shape_files.product import Product
+
+PATIENCE = 600.0  # s
+
+
+def off(product: Product) -> dict[str, float]:
+    """How far vertices lie off the surfaces that the file states, by their kind [mm]."""
+    worst: dict[str, float] = {}
+    vertices = np.asarray(product.mesh.vertices)
+    for k, forms in enumerate(product.forms):
+        for number, form in enumerate(forms):
+            own = np.unique(product.mesh.faces[(product.shape == k) & (product.brep == number)])
+            if form is not None and own.size:
+                worst[form.kind] = max(worst.get(form.kind, 0.0), float(np.abs(form.distance(vertices[own])[0]).max()))
+    return worst
+
+
+def read(path: Path) -> dict:
+    """What became of a file."""
+    start = time.perf_counter()
+    content = read_files([tc.Mesh(path)])[path]
+    record = {"seconds": time.perf_counter() - start, "MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3}
+    if isinstance(content, GeometryFault):
+        return record | {"message": str(content).replace(str(path), path.name)}
+    product = content.product
+    assert product is not None
+    return record | {
+        "bodies": len(product.bodies),
+        "faces": sum(len(np.unique(product.brep[body.triangles])) for body in product.bodies),
+        "analytic": sum(form is not None for forms in product.forms for form in forms),
+        "of": sum(map(len, product.forms)),
+        "triangles": len(product.brep),
+        "off": off(product),
+    }
+
+
+def main() -> None:
+    if sys.argv[1] == "--one":
+        print(json.dumps(read(Path(sys.argv[2]))))
+        return
+    print("| file | bodies | faces | of shapes, analytic | triangles | s | MB | vertices off [mm] |")
+    print("|---|---:|---:|---:|---:|---:|---:|---|")
+    for path in sorted(Path(sys.argv[1]).glob("*.st*p")):
+        command = [sys.executable, "-m", "studies.cad.read_files", "--one", str(path)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        if done.returncode:
+            print(f"| {path.name} | the process ended with {done.returncode}: {done.stderr.strip()[-200:]} |", flush=True)
+            continue
+        found = json.loads(done.stdout.strip().splitlines()[-1])
+        end = f"{found['seconds']:.1f} | {found['MB']:.0f} |"
+        if "message" in found:
+            print(f"| {path.name} | {found['message'][:160]} | | | | {end} |", flush=True)
+            continue
+        offs = ", ".join(f"{kind} {most:.0e}" for kind, most in found["off"].items())
+        counts = f"{found['bodies']} | {found['faces']} | {found['analytic']} of {found['of']} | {found['triangles']}"
+        print(f"| {path.name} | {counts} | {end} {offs} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
