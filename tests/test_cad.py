@@ -192,11 +192,13 @@ def test_the_command_line_lists_bodies_and_faces(file):
 
 def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(monkeypatch, caplog):
     whole = len(shape(tc.Mesh(COVER)).mesh.faces)
+    monkeypatch.setattr(reading, "_known", {})
     monkeypatch.setattr(reading, "MAX_TRIANGLES", whole - 1)
     with caplog.at_level(logging.WARNING):
         coarse = shape(tc.Mesh(COVER)).mesh
     assert len(coarse.faces) < whole / 2 and coarse.is_watertight
     assert "triangles within 0.06 mm, since finer ones are too many" in caplog.text
+    monkeypatch.setattr(reading, "_known", {})
     monkeypatch.setattr(reading, "MAX_TRIANGLES", 10)
     with pytest.raises(tc.ModelError, match="more than the limit of 10"):
         triangles("+z")
@@ -208,3 +210,14 @@ def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
     assert shape(tc.Mesh(tmp_path / "one.step", body=1)).mesh.bounds == pytest.approx(np.array([[0, 0, 0], [5, 5, 5]]))
     (tmp_path / "block.step").write_text(step_block())
     assert tc.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)
+
+
+def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
+    path = tmp_path / "part.step"
+    path.write_text(step_block())
+    before = tc.bodies_in(path)[0].upper
+    monkeypatch.setattr(reading.reader, "load", None)
+    assert tc.bodies_in(path)[0].upper == before  # from memory
+    monkeypatch.undo()
+    path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))))
+    assert len(tc.bodies_in(path)) == 2

@@ -66,11 +66,14 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
     )
 
 
-def parts_from(model: Assembly, path: str | Path, names: Sequence[str] | None = None) -> dict[str, Part]:
-    """Declare the bodies of a STEP file as parts of a model, each in its place; of all, or of those named. By their names.
+def parts_from(
+    model: Assembly, path: str | Path, names: Sequence[str] | None = None, *, fixed: bool | None = None
+) -> dict[str, Part]:
+    """Declare the bodies of a STEP file as parts of a model, each in its place: all, or those named. By their names.
 
     A part is called like the body in the file, without the signs that no part may have in its name; where names repeat, the
     second is called "name (2)" and so on. The part's own frame is that of its product, the same for all of its places.
+    `fixed` is as of a Part.
     Raises ModelError if the file cannot be read, or holds no body of a name.
     """
     try:
@@ -84,7 +87,7 @@ def parts_from(model: Assembly, path: str | Path, names: Sequence[str] | None = 
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
     chosen = found if names is None else [known[name] for name in wanted]
     return {
-        name: model.part(name, Mesh(path, body=body.number), at=body.at, rotation=body.rotation)
+        name: model.part(name, Mesh(path, body=body.number), at=body.at, rotation=body.rotation, fixed=fixed)
         for body in chosen
         if (name := _part_name(body))
     }

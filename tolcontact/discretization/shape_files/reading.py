@@ -20,6 +20,8 @@ from tolcontact.discretization.shape_files.step_text import StepText
 COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 
+REMEMBERED = 4  # STEP files
+
 log = logging.getLogger(__name__)
 
 
@@ -40,6 +42,8 @@ class Content:
 
 
 Contents = Mapping[Path, Content | GeometryFault]
+State = tuple[str, int, int, int]
+_known: dict[State | None, Content] = {}
 
 
 def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
@@ -48,6 +52,9 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
     found: dict[Path, Content | GeometryFault] = {}
     texts: dict[Path, StepText | None] = {}
     for path in dict.fromkeys(Path(source) for source in sources if isinstance(source, str | Path)):
+        if (known := _known.get(_state_of(path))) is not None:
+            found[path] = known
+            continue
         try:
             texts[path] = screening.screen(path, MAX_TRIANGLES)
         except GeometryFault as fault:
@@ -59,7 +66,26 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
             found[path] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
         else:
             found[path] = _content(path, read_in, texts[path])
+            _remember(path, found[path])
     return found
+
+
+def _state_of(path: Path) -> State | None:
+    """By what one notices that a file has changed; None if there is none."""
+    try:
+        now = path.stat()
+    except OSError:
+        return None
+    return str(path.absolute()), now.st_mtime_ns, now.st_ino, now.st_size
+
+
+def _remember(path: Path, content: Content | GeometryFault) -> None:
+    """Keep what was read of a STEP file: its bodies are listed, declared and discretized one after the other."""
+    state = _state_of(path)
+    if isinstance(content, Content) and content.product is not None and state is not None:
+        while len(_known) >= REMEMBERED:
+            _known.pop(next(iter(_known)), None)
+        _known[state] = content
 
 
 def _loaded(paths: Sequence[Path]) -> dict[Path, dict[str, np.ndarray] | GeometryFault]:

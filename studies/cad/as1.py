@@ -1,0 +1,66 @@
+"""The assembly "as1" of the STEP implementor forum, declared from its file: plate, two brackets, rod, bolts and nuts.
+
+The brackets stand on the plate, the nuts of the rod bear on the brackets' backs. Bolts, their nuts and the rod are not
+toleranced: they stay where the file has them. Measured are the gap between the brackets' feet, how flush their tops are, and
+the room between the rod's nuts. A tolerance is the full width of its zone [mm].
+
+    tolcontact run studies/cad/as1.py --samples 10000
+    python -m studies.cad.as1 FIGURE.png         draws the assembly
+"""
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import to_rgb
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+import tolcontact as tc
+
+FILE = Path(__file__).with_name("as1-oc-214.stp")
+MOVING = ["l-bracket_1", "l-bracket_1 (2)", "nut_1", "nut_2"]
+PLACED = 0.4
+COLOURS = {"plate": "#b8c4d0", "l-bracket": "#5b8cb8", "rod": "#c9a227", "nut": "#c0563b", "bolt": "#8a8f98"}
+
+
+def assembly() -> tc.Assembly:
+    model = tc.Assembly("as1", method=tc.Method(resolution="exact", objective="all points"))
+    fixed = tc.parts_from(model, FILE, [body.name for body in tc.bodies_in(FILE) if body.name not in MOVING], fixed=True)
+    near, far, far_nut, near_nut = tc.parts_from(model, FILE, MOVING).values()
+    top = fixed["plate_1"].face(tc.Largest("plane", "+z"))
+    for bracket in (near, far):
+        foot, back = bracket.face(tc.Largest("plane", "-y")), bracket.face(tc.Largest("plane", "-x"))
+        model.locate(bracket, tc.three_two_one(foot, back, bracket.face("-z"), inset=5), tolerance=PLACED)
+        model.contact(f"foot of {bracket.name}", moving=foot, reference=top)
+    for nut, bracket, side in ((far_nut, far, "-z"), (near_nut, near, "+z")):
+        bearing = nut.face(tc.Largest("plane", side))
+        model.locate(nut, tc.three_two_one(bearing, nut.face("-y"), nut.face("-x"), inset=2), tolerance=PLACED)
+        model.contact(f"{nut.name} on {bracket.name}", moving=bearing, reference=bracket.face(tc.Largest("plane", "-x")))
+    model.measure("gap of the feet", near.point(50, 5, 50), to=far.point(50, 5, 50), along="x", tolerance=1)
+    model.measure("flush of the tops", near.point(5, 60, 50), to=far.point(5, 60, 50), along="z", tolerance=1)
+    model.measure("between the nuts", near_nut.point(10, 7.5, 3), to=far_nut.point(10, 7.5, 0), along="x", tolerance=1)
+    return model
+
+
+def draw(figure: Path) -> None:
+    """A picture of the assembly, a colour for each product."""
+    program = tc.build(assembly(), solver="daqp")
+    axes = plt.figure(figsize=(6, 4.5), dpi=110).add_subplot(projection="3d", proj_type="ortho")
+    corners, colours = [], []
+    for part in program.nominal.parts:
+        triangles = part.vertices[part.faces]  # small ones: they are drawn from the back to the front
+        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        light = normals @ (-0.4, -0.6, 0.7) / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)
+        corners.append(triangles)
+        colours.append((0.55 + 0.45 * np.clip(light, 0, 1))[:, None] * to_rgb(COLOURS.get(part.name.split("_")[0], "grey")))
+    axes.add_collection3d(Poly3DCollection(np.concatenate(corners), facecolors=np.concatenate(colours), linewidths=0))
+    axes.set(xlim=(-10, 190), ylim=(-20, 170), zlim=(-5, 85))
+    axes.set_box_aspect((200, 190, 90))
+    axes.set_axis_off()
+    axes.view_init(elev=28, azim=-62)
+    plt.savefig(figure, bbox_inches="tight")
+
+
+if __name__ == "__main__":
+    draw(Path(sys.argv[1])) if len(sys.argv) > 1 and sys.argv[1].endswith(".png") else tc.main(assembly)
