@@ -8,6 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, contents
 from tolcontact import vocabulary
+from tolcontact.archive import writer
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 
@@ -57,3 +58,12 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
     with pytest.raises(ArchiveError, match="exists"):
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
     assert archive.read_bytes() == before
+
+
+@pytest.mark.parametrize(("every", "written"), [(0.0, [4096, 8192]), (1e9, [8192])])
+def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_last(every, written, tmp_path, monkeypatch):
+    found = []
+    monkeypatch.setattr(writer, "CHECKPOINTS_EVERY", every)
+    monkeypatch.setattr(writer, "write_checkpoint", lambda archive, checkpoint, parts: found.append(checkpoint.rows))
+    tc.run(cases.stack(), samples=9000, seed=3, solver="daqp", out=tmp_path / "run.nc", keep="measures", surfaces=0).close()
+    assert found == written

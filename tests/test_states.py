@@ -1,0 +1,36 @@
+"""What the numbers of an answer mean: certified, in conflict, or none."""
+
+import numpy as np
+
+from tolcontact.compilation import ACCURACY
+from tolcontact.contact.state import State
+
+
+def state(residual, slack, *, doubtful=False):
+    one, none = np.zeros(1), np.zeros((1, 0))
+    return State(
+        poses=np.zeros((1, 2, 12)), relative=np.zeros((1, len(slack), 12)), residual=np.array([residual]),
+        slack=np.array([slack]), astray=one, iterations=np.ones(1, dtype=int), second_answers=np.zeros(1, dtype=int),
+        multipliers=none, gap_min=np.zeros((1, len(slack))), searched=np.zeros(1, dtype=bool),
+        doubtful=np.array([doubtful]), slots=[],
+    )  # fmt: skip
+
+
+def test_a_residual_up_to_the_accuracy_is_an_answer():
+    assert state(ACCURACY, [0.0, 0.0]).solved.tolist() == [True]
+    assert state(1.01 * ACCURACY, [0.0, 0.0]).solved.tolist() == [False]
+
+
+def test_a_conflict_is_believed_if_it_exceeds_what_was_left_undone():
+    assert state(0.001, [0.0, 0.002]).solved.tolist() == [True]
+    assert state(0.001, [0.0005, 0.0]).solved.tolist() == [False]
+
+
+def test_a_conflict_is_penetration_beyond_the_accuracy_in_any_pair():
+    assert state(0.0, [0.0, 2 * ACCURACY]).in_conflict.tolist() == [True]
+    assert state(0.0, [ACCURACY, ACCURACY]).in_conflict.tolist() == [False]
+
+
+def test_answers_are_ranked_certified_before_conflicts_before_none():
+    answers = [state(0.0, [0.0]), state(0.0, [0.01]), state(1.0, [0.0]), state(0.0, [0.0], doubtful=True)]
+    assert [int(answer.rank[0]) for answer in answers] == [0, 1, 2, 2]
