@@ -18,7 +18,7 @@ from tolcontact.discretization import discretize
 from tolcontact.discretization.analytic import Form, believed, onto
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.fitting import fitted
-from tolcontact.discretization.shape_files import BREP, SURFACES, reading
+from tolcontact.discretization.shape_files import BREP, SURFACES, product, reading
 from tolcontact.discretization.shapes import shape
 
 COVER = cases.MODELS / "cover.step"
@@ -151,6 +151,8 @@ def test_an_assembly_is_declared_from_its_file_alone(file):
     assert (results["status"] <= 1).all()
     raw, corrected = (results["measured"].sel(state=state, measure="gap") for state in ("raw", "corrected"))
     assert float(raw.min()) < -0.05 and float(corrected.min()) > -0.005  # points beside each other, faces tilted
+    again = tc.run(tc.model_of(results), samples=300, seed=1, solver="daqp", surfaces=0)
+    assert np.array_equal(again["measured"].values, results["measured"].values)
     assert len(tc.parts_from(tc.Assembly("all"), file)) == 5
 
 
@@ -221,3 +223,15 @@ def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
     monkeypatch.undo()
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))))
     assert len(tc.bodies_in(path)) == 2
+
+
+def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
+    with pytest.raises(GeometryFault, match="mirrored or scaled"):
+        product._in_mm(tmp_path, np.diag([1.0, 1.0, -1.0, 1.0]))
+    with pytest.raises(GeometryFault, match="mirrored or scaled"):
+        product._in_mm(tmp_path, np.diag([1.0, 1.0, 1.001, 1.0]))
+    turned = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3], [0.1, 0.2, 0.3])
+    turned32 = turned.astype(np.float32).astype(float)
+    place = product._in_mm(tmp_path, turned32)
+    assert place[:3, :3] @ place[:3, :3].T == pytest.approx(np.eye(3), abs=1e-14)
+    assert place[:3, 3] == pytest.approx(1e3 * turned[:3, 3], abs=1e-4)

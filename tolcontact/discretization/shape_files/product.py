@@ -19,6 +19,7 @@ from tolcontact.discretization.shape_files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
 FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
+RIGID = 1e-5  # how far a motion may stretch lengths, having passed through single precision
 OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it
 FIT = STEP_CHORD / 2  # [mm] vertices of a face that are no farther off a plane, cylinder or sphere are on one
 BREP = "brep_index"  # attribute of a mesh: the B-rep face of each triangle
@@ -127,7 +128,7 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         vertices[used] = onto(own, faces, brep[chosen], known[-1], off)
     mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
     places = [
-        Place(int(stands), _in_mm(transform), tuple(json.loads(str(names))))
+        Place(int(stands), _in_mm(path, transform), tuple(json.loads(str(names))))
         for stands, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
     ]
     triangles = Triangles(
@@ -164,10 +165,17 @@ def _merged(mesh: trimesh.Trimesh, shape: np.ndarray) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.asarray(mesh.vertices)[first], place.ravel()[np.asarray(mesh.faces)], process=False)
 
 
-def _in_mm(transform: np.ndarray) -> np.ndarray:
-    """A rigid motion (4, 4) [mm] from one [m] that passed through single precision: a rotation again, and round lengths."""
+def _in_mm(path: Path, transform: np.ndarray) -> np.ndarray:
+    """A rigid motion (4, 4) [mm] from one [m] that passed through single precision: a rotation again, and round lengths.
+
+    Raises GeometryFault if it mirrors or scales.
+    """
     place = np.eye(4)
-    U, _, V = np.linalg.svd(transform[:3, :3])
+    U, scales, V = np.linalg.svd(transform[:3, :3])
+    if np.abs(scales - 1).max() > RIGID or np.linalg.det(transform[:3, :3]) < 0:
+        raise GeometryFault(
+            f'"{path}" places a body mirrored or scaled, which bodies of a rigid assembly are not; export it as it is'
+        )
     place[:3, :3] = U @ V
     place[:3, 3] = _resolved(UNITS["m"] * transform[:3, 3]) if transform[:3, 3].any() else 0.0
     return place
