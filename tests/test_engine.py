@@ -14,7 +14,7 @@ from tolcontact.compilation.plugins import plugin
 from tolcontact.contact.scan import PairScan, pair_scan
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.gap import gap_matrix
-from tolcontact.mechanics.gap_map import gap_map
+from tolcontact.mechanics.gap_map import _corners, gap_map
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.blocks import _observe, simulate_block
@@ -157,3 +157,8 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
                 (points, depth), expected = (scan.deepest(poses, block.deviations, mask) for scan in (compiled, plain))
                 assert (points == expected[0]).all() and (depth == expected[1]).all()
         assert plain.deepest(relative[:, index], block.deviations)[1].max() > 0.01
+
+
+@pytest.mark.parametrize(("coordinates", "corners"), [([[3.0, 1.0, 2.0, 5.0]], [1, 3]), ([], [0]), ([[2.0, 2.0]], [0])])
+def test_on_a_line_the_two_ends_can_be_the_deepest(coordinates, corners):
+    assert _corners(np.array(coordinates)).tolist() == corners

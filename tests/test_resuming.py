@@ -67,3 +67,12 @@ def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_las
     monkeypatch.setattr(writer, "write_checkpoint", lambda archive, checkpoint, parts: found.append(checkpoint.rows))
     tc.run(cases.stack(), samples=9000, seed=3, solver="daqp", out=tmp_path / "run.nc", keep="measures", surfaces=0).close()
     assert found == written
+
+
+def test_a_resumed_run_goes_on_after_the_newest_checkpoint(tmp_path, monkeypatch):
+    monkeypatch.setattr(writer, "CHECKPOINTS_EVERY", 0.0)
+    path, settings = tmp_path / "run.nc", {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}
+    for samples, after in ((9000, None), (9001, 8192), (13_000, 8192), (13_001, 12_288)):
+        tc.run(cases.stack(), samples=samples, out=path, resume=True, **settings).close()
+        with netCDF4.Dataset(path) as file:
+            assert after is None or file.history.splitlines()[-1].endswith(f"resumed after {after} realizations")
