@@ -30,7 +30,7 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
 
 
 def test_a_run_may_be_killed_at_any_of_its_writes(tmp_path):
-    done = run(script("kill_at_each_write", tmp_path, 7), timeout=600)
+    done = run(script("kill_at_each_write", tmp_path, 15), timeout=600)
     assert done.returncode == 0, done.stderr
 
 
