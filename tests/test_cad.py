@@ -235,3 +235,20 @@ def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
     place = product._in_mm(tmp_path, turned32)
     assert place[:3, :3] @ place[:3, :3].T == pytest.approx(np.eye(3), abs=1e-14)
     assert place[:3, 3] == pytest.approx(1e3 * turned[:3, 3], abs=1e-4)
+
+
+def test_the_largest_round_face_is_along_an_axis_whichever_way_it_points():
+    assert triangles(tc.Largest("cylinder", "+z")) == triangles(tc.Largest("cylinder", "-z")) == triangles(tc.Brep(11))
+    with pytest.raises(GeometryFault, match="no such face"):
+        triangles(tc.Largest("cylinder", "x"))
+
+
+def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file):
+    for wrong in (True, 1.5):
+        assert "expected the name of a body, or its number" in " ".join(tc.Mesh(file, body=wrong).faults())
+    with pytest.raises(TypeError, match="expected a list of the names"):
+        tc.parts_from(tc.Assembly("stack"), file, "use 0")
+    file.write_text(file.read_text().replace("use 0", "\x1b[31m red"))
+    listed = CliRunner().invoke(app, ["bodies", str(file)]).stdout
+    assert "red" in listed and "\x1b" not in listed
+    assert "\x1b" not in "".join(tc.parts_from(tc.Assembly("stack"), file))

@@ -145,8 +145,9 @@ class ArchiveWriter:
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
         """The sums of the fields (state, number) for each part, over all rows so far. A killed run goes on from them."""
         with _refusals_told(self._path):
-            self._place = 1 - self._place
-            write_checkpoint(self._values, Checkpoint(self.rows, self._place, list(sums)), self._parts)
+            place = 1 - self._place
+            write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)
+            self._place = place  # not before: one that is interrupted is written again, the other one stays
         self._since = time.monotonic()
 
     def write_fields(self, fields: Sequence[dict[words.Variable, Any]]) -> None:

@@ -8,6 +8,7 @@ import typer
 
 from tolcontact.cli.app import StepFile, app
 from tolcontact.discretization import bodies_in
+from tolcontact.errors import shown
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print them as JSON.")]
 
@@ -24,6 +25,6 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
         *products, _ = body.path or ("",)
         for depth, name in enumerate(products):
             if above[: depth + 1] != tuple(products[: depth + 1]):
-                typer.echo(f"{'  ' * depth}{name}")
+                typer.echo(f"{'  ' * depth}{shown(name)}")
         above = tuple(products)
         typer.echo(f"{'  ' * len(products)}{body}")

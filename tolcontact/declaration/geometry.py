@@ -38,8 +38,7 @@ class Mesh(Readable):
 
     `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m,
     `mesh.units` of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within
-    2 um, beside the rounding of their coordinates to single precision, and keep their boundary representation for `tc.Brep`;
-    that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number (from 1) of
+    2 um, and keep their boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number (from 1) of
     one, which is read in its own frame; the only body of a file is read where it stands.
     """
 
@@ -50,6 +49,8 @@ class Mesh(Readable):
     def faults(self) -> Iterator[str]:
         if self.body is not None and not self._is_step:
             yield f"mesh body is {self.body!r}; only STEP files hold bodies that have names and numbers; leave it out"
+        if isinstance(self.body, bool) or not isinstance(self.body, str | int | None):
+            yield f"mesh body is {self.body!r}; expected the name of a body, or its number from 1"
         if self.units is not None and self.units not in UNITS:
             yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
         if self.units is not None and self._is_step:

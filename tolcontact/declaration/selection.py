@@ -126,7 +126,7 @@ class Brep(Readable):
     at: Vector | None
 
     def __init__(self, which: Any) -> None:
-        number = which if isinstance(which, int) and not isinstance(which, bool) else None
+        number = int(which) if hasattr(which, "__index__") and not isinstance(which, bool) else None
         object.__setattr__(self, "number", number)
         object.__setattr__(self, "at", None if number is not None else vector(which))
 
@@ -154,13 +154,16 @@ class Cylinder(Readable):
             yield f"inner is {self.inner!r}; expected True, False or None"
 
     def __str__(self) -> str:
-        what = {None: "cylinders", True: "holes", False: "pins"}[self.inner]
+        what = {None: "cylinders", True: "inner cylinders", False: "outer cylinders"}[self.inner]
         return what + (f" of radius {self.radius:g} mm" if self.radius is not None else "")
 
 
 @dataclass(frozen=True, repr=False)
 class Largest(Readable):
-    """The largest B-rep face of a STEP file: of one `kind`, and facing a direction ("+x" to "-z", or a vector)."""
+    """The largest B-rep face of one `kind` of a STEP file; with a `direction` ("+x" to "-z", or a vector) of those along it.
+
+    Planes look that way, cylinders, cones and tori have their axis along it, whichever way it points.
+    """
 
     kind: str
     direction: Any = None

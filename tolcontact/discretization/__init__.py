@@ -62,9 +62,10 @@ meet at more than 30 degrees form an edge. Curved faces are as round as their tr
 
 STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad, and keep their
 boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states a plane, cylinder,
-cone, sphere or torus, vertices lie on it in double precision; elsewhere they are rounded to what single precision resolves,
-1e-5 mm at 100 mm and 2e-4 mm at 1 m. If that would be more than a million triangles, or takes too long, faces are triangulated
-to within 60 um and 0.5 rad instead, and a warning says so.
+cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces that meet in a vertex come to each
+other); elsewhere they are rounded to what single precision resolves, 1e-5 mm at 100 mm and 2e-4 mm at 1 m. If that would be
+more than a million triangles, or takes too long, faces are triangulated to within 60 um and 0.5 rad instead, and a warning
+says so.
 
 An assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them, `tc.Mesh(file, body=...)` is one
 of them in the frame of its product, and `tc.parts_from(model, file)` declares all of them, or those named, as parts in their

@@ -62,10 +62,6 @@ class Form:
         """It turned by R (3, 3), then moved by t (3,) [mm]."""
         return replace(self, origin=R @ self.origin + t, axis=R @ self.axis)
 
-    def fitted_to(self, residual: float) -> "Form":
-        """It, with what vertices lie off it [mm]."""
-        return replace(self, residual=residual)
-
     def project(self, points: np.ndarray) -> np.ndarray:
         """The nearest points of the surface (point, 3) [mm]."""
         for _ in range(2):  # once is exact but for rounding

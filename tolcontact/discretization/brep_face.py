@@ -7,7 +7,12 @@ import trimesh
 
 from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.fitting import fitted
+from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.readable import Readable
+
+FIT = 1e-3  # [mm] a face none of whose vertices is farther off a plane, cylinder or sphere is on one
+DESCRIBED = "described"
 
 
 @dataclass(frozen=True, repr=False)
@@ -44,27 +49,35 @@ class FaceInFile(Readable):
         return ", ".join([*words, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
-def describe(mesh: trimesh.Trimesh, number: int, own: np.ndarray, form: Form | None) -> FaceInFile:
-    """The face of a number, from 0, that consists of the triangles `own` (face,) of a part, and lies on `form`."""
+def described(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
+    """The B-rep faces of a part that is from a STEP file. It keeps them: fitting surfaces takes time."""
+    if DESCRIBED not in mesh.metadata:
+        brep = np.asarray(mesh.face_attributes[BREP]).ravel()
+        order = np.argsort(brep, kind="stable")
+        groups = np.split(order, np.searchsorted(brep[order], np.arange(1, len(mesh.metadata[SURFACES]))))
+        surfaces = enumerate(zip(groups, mesh.metadata[SURFACES], strict=True), start=1)
+        mesh.metadata[DESCRIBED] = tuple(_described(mesh, number, own, form) for number, (own, form) in surfaces)
+    return mesh.metadata[DESCRIBED]  # type: ignore[no-any-return]
+
+
+def _described(mesh: trimesh.Trimesh, number: int, own: np.ndarray, form: Form | None) -> FaceInFile:
+    """The face of a number that consists of the triangles `own` (face,), on the `form` that the file states."""
     areas, normals = np.asarray(mesh.area_faces)[own], np.asarray(mesh.face_normals)[own]
+    form = form or fitted(np.asarray(mesh.vertices)[np.unique(mesh.faces[own])], normals, FIT)
     largest = int(areas.argmax())
-    point = np.asarray(mesh.triangles_center)[own[largest]]
+    point, area = np.asarray(mesh.triangles_center)[own[largest]], float(areas.sum())
     if form is None:
-        return FaceInFile(number + 1, "general", _vector(point), None, None, False, float(areas.sum()))
+        return FaceInFile(number, "general", in_words(point), None, None, False, area)
     point = form.project(point[None])[0]
     _, outward = form.distance(point[None] + 1e-6 * normals[largest])
     is_inward = float(outward[0] @ normals[largest]) < 0
-    direction = None if form.kind == "sphere" else form.axis
-    if form.kind == "plane" and is_inward:
-        direction = -form.axis
+    direction = None if form.kind == "sphere" else in_words(-form.axis if form.kind == "plane" and is_inward else form.axis)
     radius = form.radius if form.kind in ("cylinder", "sphere", "torus") else None
     is_inner = is_inward and form.kind != "plane"
-    return FaceInFile(
-        number + 1, form.kind, _vector(point), None if direction is None else _vector(direction), radius, is_inner,
-        float(areas.sum()), form.residual,
-    )  # fmt: skip
+    return FaceInFile(number, form.kind, in_words(point), direction, radius, is_inner, area, form.residual)
 
 
-def _vector(numbers: np.ndarray) -> Vector:
+def in_words(numbers: np.ndarray) -> Vector:
+    """Three numbers as a script writes them."""
     x, y, z = (float(number) + 0.0 for number in numbers)
     return x, y, z

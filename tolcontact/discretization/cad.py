@@ -10,14 +10,13 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.vectors import Vector
-from tolcontact.discretization.brep_face import FaceInFile, describe
+from tolcontact.discretization.brep_face import FaceInFile, described, in_words
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files import BREP, SURFACES, read_files
+from tolcontact.discretization.shape_files import read_files
+from tolcontact.discretization.shape_files.bodies import SHOWN
 from tolcontact.discretization.shape_files.product import Product
-from tolcontact.errors import ModelError, OptionError
+from tolcontact.errors import STEERING, ModelError, OptionError, shown
 from tolcontact.readable import Readable
-
-LARGEST = 12  # bodies whose names a message lists
 
 
 @dataclass(frozen=True, repr=False)
@@ -26,7 +25,7 @@ class BodyInFile(Readable):
 
     number, name   from 1 in the file's order; unlike that of any other body of it
     path           names of the products that it is in, from the root on
-    lower, upper   corners of the box around it in its place [mm]
+    lower, upper   corners of the box around it in its place [mm]; None if its triangles cannot be told from others
     at, rotation   where its own frame stands, as of a Part [mm, rad]
     faces          number of its B-rep faces
     is_open        whether its faces do not close
@@ -35,16 +34,19 @@ class BodyInFile(Readable):
     number: int
     name: str
     path: tuple[str, ...]
-    lower: Vector
-    upper: Vector
+    lower: Vector | None
+    upper: Vector | None
     at: Vector
     rotation: Vector
     faces: int
     is_open: bool
 
     def __str__(self) -> str:
+        called = f"{self.number}. {shown(self.name) or 'without a name'}"
+        if self.lower is None or self.upper is None:
+            return f"{called}: its faces cannot be told from those of others"
         size = " x ".join(f"{up - low:.4g}" for low, up in zip(self.lower, self.upper, strict=True))
-        return f"{self.number}. {self.name or 'without a name'}: {size} mm, {self.faces} faces"
+        return f"{called}: {'open, ' if self.is_open else ''}{size} mm, {self.faces} faces"
 
 
 def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
@@ -60,10 +62,7 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
         mesh = held.part(body)
     except GeometryFault as fault:
         raise OptionError(str(fault)) from fault
-    brep = np.asarray(mesh.face_attributes[BREP])
-    return tuple(
-        describe(mesh, number, np.flatnonzero(brep == number), form) for number, form in enumerate(mesh.metadata[SURFACES])
-    )
+    return described(mesh)
 
 
 def parts_from(
@@ -74,8 +73,10 @@ def parts_from(
     A part is called like the body in the file, without the signs that no part may have in its name; where names repeat, the
     second is called "name (2)" and so on. The part's own frame is that of its product, the same for all of its places.
     `fixed` is as of a Part.
-    Raises ModelError if the file cannot be read, or holds no body of a name.
+    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if the names are one text.
     """
+    if isinstance(names, str):
+        raise TypeError(f"names is {names!r}; expected a list of the names of bodies")
     try:
         found = bodies_in(path)
     except OptionError as error:
@@ -83,7 +84,7 @@ def parts_from(
     wanted = list(names) if names is not None else [body.name for body in found]
     known = {body.name: body for body in found}
     if missing := [name for name in wanted if name not in known]:
-        listed = ", ".join(f'"{body.name}"' for body in found[:LARGEST]) + (", ..." if len(found) > LARGEST else "")
+        listed = ", ".join(f'"{body.name}"' for body in found[:SHOWN]) + (", ..." if len(found) > SHOWN else "")
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
     chosen = found if names is None else [known[name] for name in wanted]
     return {
@@ -94,7 +95,7 @@ def parts_from(
 
 
 def _part_name(body: BodyInFile) -> str:
-    plain = re.sub(r"[/\x00-\x1f\x7f]", "_", body.name).strip()
+    plain = re.sub(r"[/\t\n]", "_", STEERING.sub("_", body.name)).strip()
     return plain if re.match(r"\w", plain) else f"body {body.number} {plain}".strip()
 
 
@@ -111,14 +112,9 @@ def _product(path: str | Path) -> Product:
 
 
 def _body(held: Product, number: int) -> BodyInFile:
-    body, nowhere = held.bodies[number - 1], np.full(3, np.nan)
-    lower, upper = (nowhere if corner is None else corner for corner in (body.lower, body.upper))
+    body = held.bodies[number - 1]
+    lower, upper = (None if corner is None else in_words(corner) for corner in (body.lower, body.upper))
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
     faces = len(np.unique(held.brep[body.triangles]))
-    corners, place = (_vector(lower), _vector(upper)), (_vector(body.place[:3, 3]), _vector(rotation))
-    return BodyInFile(number, body.name, body.path, *corners, *place, faces, body.is_open)
-
-
-def _vector(numbers: np.ndarray) -> Vector:
-    x, y, z = (float(number) + 0.0 for number in numbers)
-    return x, y, z
+    place = in_words(body.place[:3, 3]), in_words(rotation)
+    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open)

@@ -1,5 +1,6 @@
 """Faces: the triangles of a part that meet all of a face's criteria, as a surface of their own. Part's own frame, mm."""
 
+import math
 from collections.abc import Mapping
 
 import numpy as np
@@ -8,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
-from tolcontact.discretization.brep_face import describe
+from tolcontact.declaration.vectors import Vector
+from tolcontact.discretization.brep_face import FaceInFile, described
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.discretization.surface import Surface
@@ -101,29 +103,31 @@ def _breps(face: Face, mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
-    brep, surfaces = _breps(face, mesh), mesh.metadata[SURFACES]
-    described = [describe(mesh, number, np.flatnonzero(brep == number), form) for number, form in enumerate(surfaces)]
+    brep = _breps(face, mesh)
+    known = described(mesh)
     if isinstance(selection, Cylinder):
         radius, inner = selection.radius, selection.inner
         found = [
             each
-            for each in described
+            for each in known
             if each.kind == "cylinder" and each.radius is not None and inner in (None, each.is_inner)
             and (radius is None or abs(each.radius - radius) <= SAME_SIZE * radius + each.residual)
         ]  # fmt: skip
     else:
-        facing = selection.axis
-        found = [
-            each
-            for each in described
-            if each.kind == selection.kind
-            and (facing is None or (each.direction is not None and np.dot(each.direction, facing) > np.cos(FACE_ANGLE)))
-        ]
+        found = [each for each in known if each.kind == selection.kind and _is_along(each, selection.axis)]
         found = sorted(found, key=lambda each: each.area)[-1:]
     if not found:
-        kinds = "; ".join(f"{each}" for each in described[:SHOWN]) + ("; ..." if len(described) > SHOWN else "")
-        raise GeometryFault(f"face {face}: the part has no such face; its {len(described)} faces are: {kinds}")
+        kinds = "; ".join(f"{each}" for each in known[:SHOWN]) + ("; ..." if len(known) > SHOWN else "")
+        raise GeometryFault(f"face {face}: the part has no such face; its {len(known)} faces are: {kinds}")
     return np.isin(brep, [each.number - 1 for each in found])
+
+
+def _is_along(face: FaceInFile, direction: Vector | None) -> bool:
+    """Whether a face looks in a direction, or has its axis along it, whichever way; any does, if there is none."""
+    if direction is None or face.direction is None:
+        return direction is None
+    cosine = float(np.dot(face.direction, direction))
+    return (cosine if face.kind == "plane" else abs(cosine)) > math.cos(FACE_ANGLE)
 
 
 def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:

@@ -1,5 +1,7 @@
 """The plane, cylinder or sphere on which given vertices lie, where a file does not state one. Lengths in mm."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -74,4 +76,4 @@ def _circle(points: np.ndarray) -> tuple[float, float, float]:
 
 
 def _with_residual(form: Form, vertices: np.ndarray) -> Form:
-    return form.fitted_to(float(np.abs(form.distance(vertices)[0]).max()))
+    return replace(form, residual=float(np.abs(form.distance(vertices)[0]).max()))

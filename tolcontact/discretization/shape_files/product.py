@@ -13,7 +13,6 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.discretization.analytic import Form, believed, forms, onto
 from tolcontact.discretization.edges import rim
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files.bodies import Body, Place, Triangles, bodies, listed
 from tolcontact.discretization.shape_files.step_text import StepText
 
@@ -21,9 +20,8 @@ STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay
 FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
 RIGID = 1e-5  # how far a motion may stretch lengths, having passed through single precision
 OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it
-FIT = STEP_CHORD / 2  # [mm] vertices of a face that are no farther off a plane, cylinder or sphere are on one
 BREP = "brep_index"  # attribute of a mesh: the B-rep face of each triangle
-SURFACES = "surfaces"  # and the surface of each B-rep face, None if it is not analytic
+SURFACES = "surfaces"  # and the surface of each B-rep face, None if the file states none
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +79,9 @@ class Product:
         mesh = trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = brep.ravel()
-        mesh.metadata[SURFACES] = [form or self._fitted(mesh, brep.ravel() == k) for k, form in enumerate(surfaces)]
+        mesh.metadata[SURFACES] = surfaces
         self._check_closed(mesh, brep)
         return mesh
-
-    def _fitted(self, mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:
-        """The surface of a B-rep face, of the triangles `own` (face,), of which the file does not state a simple one."""
-        return fitted(mesh.vertices[np.unique(mesh.faces[own])], np.asarray(mesh.face_normals)[own], FIT)
 
     def _check_closed(self, mesh: trimesh.Trimesh, brep: np.ndarray) -> None:
         gaps = len(rim(mesh.faces)) if self.text.solids and len(self.bodies) == 1 else 0

@@ -51,8 +51,10 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
     sources = [geometry.source for geometry in geometries if isinstance(geometry, Mesh)]
     found: dict[Path, Content | GeometryFault] = {}
     texts: dict[Path, StepText | None] = {}
+    states: dict[Path, State | None] = {}
     for path in dict.fromkeys(Path(source) for source in sources if isinstance(source, str | Path)):
-        if (known := _known.get(_state_of(path))) is not None:
+        states[path] = _state_of(path)  # before it is read: it may change meanwhile
+        if (known := _known.get(states[path])) is not None:
             found[path] = known
             continue
         try:
@@ -66,7 +68,7 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
             found[path] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
         else:
             found[path] = _content(path, read_in, texts[path])
-            _remember(path, found[path])
+            _remember(states[path], found[path])
     return found
 
 
@@ -79,9 +81,8 @@ def _state_of(path: Path) -> State | None:
     return str(path.absolute()), now.st_mtime_ns, now.st_ino, now.st_size
 
 
-def _remember(path: Path, content: Content | GeometryFault) -> None:
+def _remember(state: State | None, content: Content | GeometryFault) -> None:
     """Keep what was read of a STEP file: its bodies are listed, declared and discretized one after the other."""
-    state = _state_of(path)
     if isinstance(content, Content) and content.product is not None and state is not None:
         while len(_known) >= REMEMBERED:
             _known.pop(next(iter(_known)), None)

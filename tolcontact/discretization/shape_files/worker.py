@@ -6,6 +6,7 @@ starts quickly.
 """
 
 import contextlib
+import hashlib
 import io
 import json
 import os
@@ -124,7 +125,7 @@ def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
     if failed or not converted.is_file():
         raise Refused("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
     glb = Glb(converted.read_bytes())
-    known: dict[tuple, int] = {}
+    known: dict[bytes, int] = {}
     shapes: list[tuple[np.ndarray, np.ndarray]] = []
     breps: list[np.ndarray] = []
     products: list[str] = []
@@ -135,15 +136,18 @@ def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
         corners, faces, brep, said = glb.piece(mesh)
         if not len(faces):
             continue
-        same = (mesh.get("name", ""), corners.tobytes(), faces.tobytes(), brep.tobytes(), said)  # it stands elsewhere, too
-        if same not in known:
-            known[same] = len(shapes)
+        same = hashlib.blake2b(json.dumps([mesh.get("name", ""), said]).encode())  # if it stands elsewhere, too
+        for array in (corners, faces, brep):
+            same.update(np.ascontiguousarray(array).data)
+        digest = same.digest()
+        if digest not in known:
+            known[digest] = len(shapes)
             shapes.append((corners, faces))
             breps.append(brep)
             products.append(mesh.get("name", ""))
             coloured.append(sum(is_surface(primitive) for primitive in mesh["primitives"]) > 1)
             surfaces.append(said)
-        places.append((known[same], transform, json.dumps(names)))
+        places.append((known[digest], transform, json.dumps(names)))
     return {
         **joined(shapes),
         "chord": np.array(chord),
