@@ -36,10 +36,10 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  
 class Mesh(Readable):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
-    `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m,
-    `mesh.units` of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within
-    2 um, and keep their boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number (from 1) of
-    one, which is read in its own frame; the only body of a file is read where it stands.
+    `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m, `mesh.units`
+    of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within 2 um, and keep their
+    boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body`
+    is the name or the number (from 1) of one, which is read in its own frame; the only body of a file is read where it stands.
     """
 
     source: Any
