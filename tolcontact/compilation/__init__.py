@@ -49,8 +49,9 @@ to length 1 and increments to mm, so that residuals and tolerances have a meanin
 10 000 times are compiled to machine code, which gives the same results to the last bit as CasADi's interpreter.
 """
 
+from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import ACCURACY, usable_plugins
 from tolcontact.compilation.program import ContactGroup, Program, compile_program
 from tolcontact.compilation.rows import SLOTS
 
-__all__ = ["ACCURACY", "SLOTS", "ContactGroup", "Program", "compile_program", "usable_plugins"]
+__all__ = ["ACCURACY", "SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_plugins"]

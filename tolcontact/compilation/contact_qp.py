@@ -26,7 +26,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, Motion, increments, linear, published, quadratic, rigid
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap_map import GapMap
-from tolcontact.mechanics.groups import Group, round_pairs
+from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.objective import energy, proximity
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.setting import Setting
@@ -65,7 +65,9 @@ class ContactProgram:
         return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
-def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], method: Method, plugin: Plugin) -> ContactProgram:
+def contact_program(
+    nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin
+) -> ContactProgram:
     """The Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` rows.
 
     Where few points of a pair can be the deepest each of them has a row, always. The `v` other pairs have SLOTS rows each, for
@@ -96,7 +98,7 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
                          the whole correction
     astray               how far two-sided locators, if they are held, are from their place at `corrected` [mm]
     """
-    standing = tuple(standing_points(gaps[index], method) for index in group.pairs)
+    standing = tuple(standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs)
     inputs = _inputs(nominal, group, standing)
     setting = Setting(
         nominal,
@@ -116,8 +118,9 @@ def contact_program(nominal: Nominal, group: Group, gaps: Sequence[GapMap], meth
     goal = energy(setting, moved)
     Q, pull = (setting.at_rest(each) for each in ca.hessian(goal.value, setting.z))
     if method.is_exact:
+        Q += rows.wrap / goal.scale
         Q, pull = with_curvature(setting, goal, rows, motion.by(quadratic), Q, pull, inputs)
-        if method.is_iterated or round_pairs(nominal, group):
+        if method.is_iterated or curved_pairs(nominal, group):
             Q += inputs["caution"] * setting.curvature(proximity(setting, now, moved)) / group.length
     exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
     problem = conditioned(setting, Q, pull, rows, exact)

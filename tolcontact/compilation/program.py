@@ -11,7 +11,7 @@ from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.tape import Tape
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import GapMap, gap_map
@@ -20,6 +20,7 @@ from tolcontact.mechanics.measures import measured
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of, relative
 from tolcontact.mechanics.quiet import MAKING, quiet
+from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
 from tolcontact.readable import Readable
@@ -42,7 +43,8 @@ class Program(Readable):
 
     place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
     observe      poses -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         one per pair: its gaps at X_RM
+    gaps         one per pair: its gaps at X_RM, if they are affine in it; None of round faces, which have
+    round_gaps   X_RM -> gaps (realization, point) by number of the pair
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     tapes        the users' own expressions by measure name
@@ -53,7 +55,8 @@ class Program(Readable):
     plugin: Plugin
     place: NamedFunction
     observe: NamedFunction
-    gaps: tuple[GapMap, ...]
+    gaps: tuple[GapMap | None, ...]
+    round_gaps: dict[int, NamedFunction]
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     tapes: dict[str, Tape]
@@ -62,7 +65,10 @@ class Program(Readable):
         nominal, method = self.nominal, self.method
         rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
         rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
-        rows += [f"  contact {pair.name}: {len(pair.P_m)} contact points" for pair in nominal.pairs]
+        rows += [
+            f"  contact {pair.name}: {len(pair.P_m)} contact points{' of round faces, exact at any pose' if pair.round else ''}"
+            for pair in nominal.pairs
+        ]
         rows += [
             f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
@@ -92,7 +98,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
         )
         groups = contact_groups(nominal)
-        gaps = tuple(gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
+        gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
+        of_round = {k: _gaps_only(pair.round) for k, pair in enumerate(nominal.pairs) if pair.round}
         if method.minimizes.presses:
             _check_forces(nominal, groups)
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
@@ -103,6 +110,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
             observe=NamedFunction.dense(observe),
             gaps=gaps,
+            round_gaps={k: NamedFunction.dense(function) for k, function in of_round.items()},
             groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
             nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
             tapes={
@@ -111,6 +119,12 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 if not measure.points
             },
         )
+
+
+def _gaps_only(points: RoundPoints) -> ca.Function:
+    X_RM = ca.SX.sym("X_RM", ENTRIES)
+    gaps, *_ = round_gaps(points)(X_RM, ca.SX.zeros(len(points)))
+    return ca.Function("round_gaps", [X_RM], [gaps], ["X_RM"], ["gaps"])
 
 
 def _ready(group: Group, program: ContactProgram) -> ContactGroup:

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ContactPoints
+from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics.gap import gap
 from tolcontact.mechanics.gap_map import GapMap
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
@@ -29,6 +30,8 @@ class Rows:
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
     bends       (12 * pair, 1): sums of the reactions of before times the gaps' gradients by the entries of X_RM
+    bow, wrap   (z, z): sums of the reactions of before times the second derivatives of gaps that are not linear in X_RM
+                (see round_gaps)
     """
 
     slopes: ca.SX
@@ -37,13 +40,18 @@ class Rows:
     pairs: np.ndarray
     relative: ca.SX
     bends: ca.SX
+    bow: ca.SX
+    wrap: ca.SX
 
     def __len__(self) -> int:
         return len(self.pairs)
 
 
-def standing_points(gaps: GapMap, method: Method) -> np.ndarray | None:
-    """The points of a pair that always have a row: those that can be the deepest, if they are few and stay the same."""
+def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | None:
+    """The points of a pair that always have a row: those of round faces, or that can be the deepest, if they are few and stay
+    the same."""
+    if gaps is None:
+        return np.arange(len(pair.P_m))
     return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else None
 
 
@@ -58,21 +66,32 @@ def contact_rows(
     slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     slopes: list[ca.SX] = []
     gaps, filled, pairs, relative, bends = ([] for _ in range(5))
+    bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
     for k, (before, after) in enumerate(zip(setting.relative(now), setting.relative(moved), strict=True)):
         by_z = setting.slope(after.vector())
         relative.append(before.vector() + by_z @ setting.z)
-        points = standing[k]
+        points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
+        if pair.round is not None:
+            reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
+            of_points, by_entries, second, closing = round_gaps(pair.round)(before.vector(), reactions)
+            slopes.append(by_entries @ by_z)
+            gaps.append(of_points - _heights(pair.offsets, setting.deviations))
+            filled.append(ca.SX.ones(len(pair.round)))
+            pairs += [k] * len(pair.round)
+            bends.append(by_entries.T @ reactions)
+            bow += by_z.T @ second @ by_z
+            wrap += by_z.T @ closing @ by_z
+            continue
         if points is None:
             chosen, bend = list(itertools.islice(slots, SLOTS)), next(slot_bends)
         else:
-            pair = setting.nominal.pairs[setting.group.pairs[k]]
             chosen, bend = _always(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
         for P_m, P_r, n_r, is_filled in chosen:
             X = ca.SX.sym("X_RM", ENTRIES)
             g = gap(pose_of(X), P_m, P_r, n_r)
             gradient = ca.substitute(ca.jacobian(g, X), X, before.vector())
             if points is not None:
-                bend += gradient.T * inputs["reactions"][len(slopes)]
+                bend += gradient.T * inputs["reactions"][len(pairs)]
             slopes.append(gradient @ by_z)
             gaps.append(ca.substitute(g, X, before.vector()))
             filled.append(is_filled)
@@ -85,6 +104,8 @@ def contact_rows(
         pairs=np.array(pairs),
         relative=ca.vertcat(*relative),
         bends=ca.vertcat(*bends),
+        bow=bow,
+        wrap=wrap,
     )
 
 
@@ -99,6 +120,12 @@ def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[
     P_m, P_r, n_r = (ca.SX(ca.DM(each[points].T)) for each in (pair.P_m, pair.P_r, pair.n_r))
     offsets = pair.offsets.take(points)
     if offsets.columns.size:
-        heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
-        P_r = P_r + n_r @ ca.diag(heights)
+        P_r = P_r + n_r @ ca.diag(_heights(offsets, deviations))
     return list(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))
+
+
+def _heights(offsets: Offsets, deviations: ca.SX) -> ca.SX:
+    """How far the points of a pair stand out (point, 1) [mm]."""
+    if not offsets.columns.size:
+        return ca.SX.zeros(offsets.matrix.shape[1])
+    return ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]

@@ -8,9 +8,10 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.projection import project, reach
-from tolcontact.contact.scan import PairScan, least_gaps, pair_scan
+from tolcontact.contact.round_scan import RoundScan
+from tolcontact.contact.scan import PairScan, Scan, least_gaps, pair_scan
 from tolcontact.contact.state import State
-from tolcontact.mechanics import round_pairs
+from tolcontact.mechanics import curved_pairs
 
 CLUSTERS = 6
 
@@ -24,7 +25,7 @@ class Seen(NamedTuple):
     moments   (realization, side, moment) of the points that count in the objective
     """
 
-    scans: list[PairScan]
+    scans: list[Scan]
     least: Float[Array, "realization pair"]
     active: Int[Array, "realization pair"]
     moments: Float[Array, "realization side moment"]
@@ -46,19 +47,26 @@ class Candidates:
         self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
         self._standing, self._spans = group.program.standing, group.program.spans
         self._varying = [k for k, points in enumerate(self._standing) if points is None]
-        self._every, self._some = [], []
+        self._every: list[Scan] = []
+        self._some: list[Scan] = []
         for position, index in enumerate(group.group.pairs):
             pair, gaps = program.nominal.pairs[index], program.gaps[index]
             tables = [side.table for side in group.group.sides if side.pair == position]
+            if gaps is None:
+                of_round = RoundScan(tuple(tables), pair.P_m, pair.offsets, program.round_gaps[index])
+                self._every.append(of_round)
+                self._some.append(of_round)
+                continue
             self._every.append(pair_scan(pair, gaps, tables, CLUSTERS))
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice
             self._some.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if corners else self._every[-1])
         is_iterated = self._method.is_iterated
-        self.round = round_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
-        self._reaches = {k: reach(self._every[k]) for k in (range(len(self._pairs)) if is_iterated else self.round)}
+        self.curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
+        again = [k for k, pair in enumerate(self._pairs) if pair.round is None] if is_iterated else self.curved
+        self._reaches = {k: reach(self._every[k]) for k in again}
 
-    def scans(self, relative: Float[Array, "realization pair 12"], *, anew: bool = False) -> list[PairScan]:
+    def scans(self, relative: Float[Array, "realization pair 12"], *, anew: bool = False) -> list[Scan]:
         """Scans of the points that may carry; projected again if the method requires it.
 
         `anew`: those against curved faces are projected again in any case.
@@ -96,7 +104,7 @@ class Candidates:
 
     def may_carry(
         self,
-        scans: Sequence[PairScan],
+        scans: Sequence[Scan],
         relative: Float[Array, "realization pair 12"],
         deviations: Float[Array, "realization locator"],
     ) -> list[Bool[Array, "realization _"] | None]:
@@ -104,7 +112,7 @@ class Candidates:
         if self._method.is_closed:
             return [None for _ in scans]
         return [
-            None if self._pairs[k].is_supports else scan.gaps(relative[:, k], deviations) < self._method.activity
+            None if self._pairs[k].is_supports or self._pairs[k].round else scan.gaps(relative[:, k], deviations) < self._method.activity
             for k, scan in enumerate(scans)
         ]
 

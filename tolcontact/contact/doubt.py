@@ -11,7 +11,7 @@ from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.state import State, Task
 from tolcontact.discretization import Nominal
-from tolcontact.mechanics import Group, round_pairs
+from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
 ADRIFT = 10  # sizes of the parts: one that came so far has found nothing to rest on
@@ -32,7 +32,7 @@ class Doubt:
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._open = min(INSIDE * size, SHARE * nominal.assembly.finest())
         self._round = {}
-        for k in round_pairs(nominal, group):
+        for k in curved_pairs(nominal, group):
             surface, points = self._group_pairs[k].surface, self._group_pairs[k].P_m
             self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]

@@ -38,7 +38,8 @@ def repeat(step: LinearStep, doubt: Doubt, task: Task, state: State, stride: flo
     left, best = Unsettled(task, state), None
     for kind in STEPS:
         last = step.take(left.task, left.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
-        moves = (kind.firmness > 1) | ((last.size > AT_REST) & ((last.scaled > NOISE) | (not kind.newton)))
+        knows_curvature = kind.newton or step.knows_walls
+        moves = (kind.firmness > 1) | ((last.size > AT_REST) & ((last.scaled > NOISE) | (not knows_curvature)))
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(last.size, last.scaled)

@@ -134,7 +134,7 @@ class ContactResolver:
 
     def _look_round(self, task: Task, state: State) -> None:
         """Doubt answers in which contact points have slid into a curved face, along planes that are not its own there."""
-        for k in self._candidates.round:
+        for k in self._candidates.curved:
             rolled = np.flatnonzero(self._doubt.rolled(k, state))
             if rolled.size:
                 relative = state.relative[rolled, k]
@@ -155,7 +155,7 @@ class ContactResolver:
     def _start_elsewhere(self, task: Task, state: State, starts: np.ndarray) -> None:
         """Try again what is not certified, or far, from other starts. Keep what is better."""
         left = np.flatnonzero((state.rank > 0) | ~self._doubt.is_near(task, state))
-        for start in ROUND if self._candidates.round else FLAT:
+        for start in ROUND if self._candidates.curved else FLAT:
             if not left.size:
                 return
             part = task.take(left)

@@ -36,15 +36,52 @@ class Deepest(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class PairScan:
+class Scan:
+    """The contact points of a pair.
+
+    tables             moment tables (moment, point) of the sides that enter the objective
+    P_m                (point, 3), nominal
+    offsets            of the points
+    """
+
+    tables: tuple[Float[Array, "moment point"], ...]
+    P_m: Float[Array, "point 3"]
+    offsets: Offsets
+
+    def take(self, some: np.ndarray) -> "Scan":
+        """The scan for some of the realizations: here all have the same contact points."""
+        return self
+
+    def gaps(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+    ) -> Float[Array, "realization point"]:
+        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
+        raise NotImplementedError
+
+    def survey(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
+    ) -> "Survey":
+        """The points whose gap is below `activity`."""
+        active = self.gaps(relative, deviations) < activity
+        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
+        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
+        return Survey(active.sum(axis=1), moments)
+
+    def least(
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+    ) -> Float[Array, " realization"]:
+        """The least gap of all points (realization,) [mm]."""
+        return np.asarray(self.gaps(relative, deviations).min(axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class PairScan(Scan):
     """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
 
     basis              (13, r),
     columns            (k,), and
     coordinates        (r + k, point): gaps [mm] = [[X_RM, 1] @ basis, deviations[columns]] @ coordinates
-    tables             moment tables (moment, point) of the sides that enter the objective
-    P_m, P_r, n_r      (point, 3)
-    offsets            of the points
+    P_r, n_r           (point, 3)
     leaves             (leaf + 1,): the first point of each leaf, and the end
     branches           (branch + 1,): the first leaf of each branch, and the end
     clusters           (cluster + 1,): the first branch of each cluster, and the end
@@ -53,23 +90,15 @@ class PairScan:
     basis: Float[Array, "entry r"]
     columns: Int[Array, " k"]
     coordinates: Float[Array, "coordinate point"]
-    tables: tuple[Float[Array, "moment point"], ...]
-    P_m: Float[Array, "point 3"]
     P_r: Float[Array, "point 3"]
     n_r: Float[Array, "point 3"]
-    offsets: Offsets
     leaves: Int[Array, " _"]
     branches: Int[Array, " _"]
     clusters: Int[Array, " _"]
 
-    def take(self, some: np.ndarray) -> "PairScan":
-        """The scan for some of the realizations: here all have the same contact points."""
-        return self
-
     def gaps(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
     ) -> Float[Array, "realization point"]:
-        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
         slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
         for entry, row in zip(relative.T, self.basis[:-1], strict=True):
             slopes += entry[:, None] * row
@@ -88,21 +117,6 @@ class PairScan:
         if self.columns.size:
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
-
-    def survey(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
-    ) -> "Survey":
-        """The points whose gap is below `activity`."""
-        active = self.gaps(relative, deviations) < activity
-        sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
-        moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
-        return Survey(active.sum(axis=1), moments)
-
-    def least(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
-    ) -> Float[Array, " realization"]:
-        """The least gap of all points (realization,) [mm]."""
-        return np.asarray(self.gaps(relative, deviations).min(axis=1))
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
         """The deepest point of each cluster; depth 0 if none is inside.
@@ -233,7 +247,7 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
 
 
 def least_gaps(
-    scans: Sequence[PairScan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]
+    scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]
 ) -> Float[Array, "realization pair"]:
     """Least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ACCURACY, SLOTS
-from tolcontact.contact.scan import PairScan
+from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
 
 CARRIES = 1e-4  # of the largest reaction of a realization: smaller ones only oppose the regularization
@@ -35,7 +35,7 @@ class Task:
     deviations: Float[Array, "n locator"]
     moments: Float[Array, "n side moment"]
     may_carry: list[Bool[Array, "n _"] | None]
-    scans: Sequence[PairScan]
+    scans: Sequence[Scan]
 
     def __len__(self) -> int:
         return len(self.raw)

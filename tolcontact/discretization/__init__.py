@@ -79,14 +79,17 @@ Shape files are read by a separate process with a limit on time (30 s, and 20 s 
 file therefore ends as one message that names the file and what to do.
 """
 
+from tolcontact.discretization.analytic import ANALYTIC
 from tolcontact.discretization.brep_face import FaceInFile
 from tolcontact.discretization.cad import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.round_points import RoundPoints
 
 __all__ = [
+    "ANALYTIC",
     "BodyInFile",
     "ContactPoints",
     "FaceInFile",
@@ -94,6 +97,7 @@ __all__ = [
     "Nominal",
     "NominalPart",
     "Offsets",
+    "RoundPoints",
     "bodies_in",
     "discretize",
     "faces_in",

@@ -63,7 +63,7 @@ def described(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
 def _described(mesh: trimesh.Trimesh, number: int, own: np.ndarray, form: Form | None) -> FaceInFile:
     """The face of a number that consists of the triangles `own` (face,), on the `form` that the file states."""
     areas, normals = np.asarray(mesh.area_faces)[own], np.asarray(mesh.face_normals)[own]
-    form = form or fitted(np.asarray(mesh.vertices)[np.unique(mesh.faces[own])], normals, FIT)
+    form = form or fitted(np.asarray(mesh.triangles)[own], FIT)
     largest = int(areas.argmax())
     point, area = np.asarray(mesh.triangles_center)[own[largest]], float(areas.sum())
     if form is None:

@@ -3,7 +3,7 @@
 import logging
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from tolcontact.discretization.fault import GeometryFault, where
 from tolcontact.discretization.nominal import ContactPoints, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.overlap import overlap_corners, rim_points
+from tolcontact.discretization.round_contact import round_points
+from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
 from tolcontact.errors import ContactWarning, shown
@@ -37,6 +39,9 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     target = patch(pair.reference, meshes).placed(*reference.placement)
     placed_own = own.placed(*moving.placement)
+    found = round_points(placed_own, target, reach) if pair.points is None and pair.spacing is None else []
+    if found:
+        return _of_round(assembly, pair, moving, reference, found, placed_own, target)
     if isinstance(pair.points, str):
         sampled = own_vertices(own.mesh)
     else:
@@ -49,7 +54,7 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
             P_m = np.concatenate([P_m, overlap_corners(placed_own, target)])
     elif math.isfinite(finest):
         P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
-    P_m = distinct(P_m, SAME * moving.mesh.scale)
+    P_m = placed_own.project(distinct(P_m, SAME * moving.mesh.scale))[0] if placed_own.forms else distinct(P_m, SAME * moving.mesh.scale)
     P_r, n_r, over = target.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)
     kept = over & (distance <= reach)
@@ -77,6 +82,32 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
         surface=target,
         own=placed_own,
         facets=facet_error(placed_own, target, reach),
+    )
+
+
+def _of_round(
+    assembly: Assembly,
+    pair: ContactPair,
+    moving: NominalPart,
+    reference: NominalPart,
+    found: Sequence[RoundPoint],
+    own: Surface,
+    target: Surface,
+) -> ContactPoints:
+    """The contact points of balls or shafts: where they touch, as seen from the nominal place."""
+    P_m, P_r, n_r = (np.array(each) for each in zip(*(point.nominal() for point in found), strict=True))
+    return ContactPoints(
+        pair.name,
+        assembly.parts.index(moving.part),
+        assembly.parts.index(reference.part),
+        P_m,
+        P_r,
+        n_r,
+        Offsets.none(len(found)),
+        surface=target,
+        own=own,
+        facets=sum(max((form.residual for form in face.forms), default=0.0) for face in (own, target)),
+        round=RoundPoints.of(found),
     )
 
 

@@ -84,10 +84,15 @@ def sampling_error(chosen: np.ndarray, every: np.ndarray, target: Surface, *, un
 def facet_error(own: Surface, target: Surface, within: float) -> float:
     """How far [mm] the flat triangles of two faces may lie off the round surfaces that they approximate, near each other.
 
-    The height of an arc over a chord of length l whose ends turn by an angle is l times the angle / 8.
+    The height of an arc over a chord of length l whose ends turn by an angle is l times the angle / 8. What stands for a known
+    surface is as far off as that was fitted.
     """
     total = 0.0
     for face, other in ((own, target), (target, own)):
+        total += max((form.residual for form in face.forms), default=0.0)
+        face = face.unknown
+        if not len(face.mesh.faces):
+            continue
         corners, normals = np.asarray(face.mesh.triangles), face.corner_normals
         along, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
         height = np.abs((along * turn).sum(axis=2)).max(axis=1) / 8

@@ -94,4 +94,4 @@ def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
     points = np.unique(np.asarray(vertices), axis=0)
     if len(points) > MOST:
         points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
-    return Side(face, body, points)
+    return Side(face, body, face.project(points)[0] if face.forms else points)

@@ -12,6 +12,7 @@ from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.brep_face import FaceInFile, described
 from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.known_forms import known_forms
 from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.discretization.surface import Surface
 
@@ -32,8 +33,10 @@ def patch(face: Face, meshes: Meshes) -> Surface:
     Raises GeometryFault if there is none, or if its outside is undefined.
     """
     mesh = meshes[face.part]
-    used, faces = np.unique(mesh.faces[triangles(face, meshes)], return_inverse=True)
-    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False))
+    chosen = triangles(face, meshes)
+    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
+    forms, form_of = known_forms(mesh, chosen)
+    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False), None, forms, form_of)
     for selection in face.selections:
         if isinstance(selection, Inside):
             own = _cut(own, selection, CUT_MARGIN * mesh.scale)
@@ -189,7 +192,8 @@ def _cut(own: Surface, box: Inside, margin: float) -> Surface:
         return Surface(cut, np.zeros((0, 3, 3)))
     # A cut does not change the face: the normals are still those of the whole, also where its triangles end now.
     origin, _ = own.nearest(cut.triangles_center)
-    return Surface(cut, np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1))
+    normals = np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
+    return Surface(cut, normals, own.forms, own.form_of[origin])
 
 
 def _double(own: trimesh.Trimesh) -> int:

@@ -1,4 +1,4 @@
-"""The plane, cylinder or sphere on which given vertices lie, where a file does not state one. Lengths in mm."""
+"""The plane, cylinder, cone or sphere on which given triangles' corners lie, where a file does not state one. Lengths in mm."""
 
 from dataclasses import replace
 
@@ -7,32 +7,39 @@ from scipy.optimize import least_squares
 
 from tolcontact.discretization.analytic import Form
 
+LEAST = 1e-4  # rad: a cone's angle to its axis, and to the plane across it
 LARGE = 1e4  # radii, in sizes of what they are fitted to: more is a plane's rounding
 
 
-def fitted(vertices: np.ndarray, normals: np.ndarray, within: float) -> Form | None:
-    """The surface that no vertex (vertex, 3) [mm] is farther off than `within` [mm]; None if none of these kinds is.
+def fitted(triangles: np.ndarray, within: float) -> Form | None:
+    """The surface that no corner of `triangles` (face, 3, 3) [mm] is farther off than `within` [mm]; None if none is.
 
-    normals   (face, 3) of the triangles between them
+    Between two rings of vertices there is room for a sphere as well as for a cone: it is taken for the simpler one.
     """
+    vertices = np.unique(triangles.reshape(-1, 3), axis=0)
     if len(vertices) < 4:
         return None
-    for attempt in (_plane, _cylinder, _sphere):
-        form = attempt(vertices, normals)
+    for attempt in (_plane, _cylinder, _cone, _sphere):
+        form = attempt(vertices, triangles)
         if form is not None and form.residual <= within:
             return form
     return None
 
 
-def _plane(vertices: np.ndarray, normals: np.ndarray) -> Form:
+def _normals(triangles: np.ndarray) -> np.ndarray:
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    return np.asarray(normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300))
+
+
+def _plane(vertices: np.ndarray, triangles: np.ndarray) -> Form:
     centre = vertices.mean(axis=0)
     axis = np.linalg.svd(vertices - centre, full_matrices=False)[2][2]
     return _with_residual(Form("plane", centre, axis), vertices)
 
 
-def _cylinder(vertices: np.ndarray, normals: np.ndarray) -> Form | None:
+def _cylinder(vertices: np.ndarray, triangles: np.ndarray) -> Form | None:
     """Normals of a cylinder are all across its axis, which therefore is the direction that they have least of."""
-    _, spread, directions = np.linalg.svd(normals, full_matrices=False)
+    _, spread, directions = np.linalg.svd(_normals(triangles), full_matrices=False)
     if spread[1] < 1e-3 * spread[0]:
         return None
     first, second, axis = directions
@@ -53,7 +60,33 @@ def _cylinder(vertices: np.ndarray, normals: np.ndarray) -> Form | None:
     return _with_residual(form(found.x), vertices) if abs(found.x[4]) < LARGE * size else None
 
 
-def _sphere(vertices: np.ndarray, normals: np.ndarray) -> Form | None:
+def _cone(vertices: np.ndarray, triangles: np.ndarray) -> Form | None:
+    """Normals of a cone make one angle with its axis, and its tangent planes meet in its apex."""
+    normals = _normals(triangles)
+    _, spread, directions = np.linalg.svd(normals - normals.mean(axis=0), full_matrices=False)
+    if spread[1] < 1e-3 * spread[0]:
+        return None
+    first, second, axis = directions
+    size = float(np.ptp(vertices, axis=0).max())
+    apex = np.linalg.lstsq(normals, (normals * triangles[:, 0]).sum(axis=1), rcond=None)[0]
+    axis = axis * np.sign((vertices - apex).mean(axis=0) @ axis)
+    along = (vertices - apex) @ axis
+    angle = float(np.arctan2(np.linalg.norm(vertices - apex - along[:, None] * axis, axis=1), along).mean())
+
+    def form(numbers: np.ndarray) -> Form:
+        direction = axis + numbers[0] * first + numbers[1] * second
+        return Form("cone", apex + numbers[2:5], direction / np.linalg.norm(direction), angle=float(numbers[5]))
+
+    if not (LEAST < angle < np.pi / 2 - LEAST and np.linalg.norm(apex - vertices[0]) < LARGE * size):
+        return None
+    found = least_squares(
+        lambda numbers: form(numbers).distance(vertices)[0], [0.0, 0.0, 0.0, 0.0, 0.0, angle],
+        x_scale=[1e-3, 1e-3, size, size, size, 1e-3], xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50,
+    )  # fmt: skip
+    return _with_residual(form(found.x), vertices) if 0 < found.x[5] < np.pi / 2 else None
+
+
+def _sphere(vertices: np.ndarray, triangles: np.ndarray) -> Form | None:
     centre, size = vertices.mean(axis=0), float(np.ptp(vertices, axis=0).max())
     apart = vertices - centre
     solved = np.linalg.lstsq(np.column_stack([2 * apart, np.ones(len(apart))]), (apart**2).sum(axis=1), rcond=None)[0]

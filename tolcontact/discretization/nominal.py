@@ -11,6 +11,7 @@ from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import triangles
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.surface import Surface
 
 
@@ -51,7 +52,8 @@ class ContactPoints:
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     Their `offsets` are the locators' deviations. They have no faces; of a pair of faces `surface` is the reference face in
     its nominal place, and `own` the moving one.
-    `facets` [mm] is how far their triangles may lie off the round faces that they approximate.
+    `facets` [mm] is how far their triangles may lie off the round faces that they approximate. Where `round` says that a ball or
+    a shaft touches walls, gaps are not those of fixed points: they follow from it at any pose.
     """
 
     name: str
@@ -64,6 +66,7 @@ class ContactPoints:
     surface: Surface | None = None
     own: Surface | None = None
     facets: float = 0.0
+    round: RoundPoints | None = None
 
     @property
     def is_supports(self) -> bool:

@@ -1,12 +1,15 @@
 """Faces as surfaces: nearest points on them, with normals (paper, 2.2)."""
 
+from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import igl
 import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
+from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.edges import on_rim, rim
 
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
@@ -18,10 +21,20 @@ class Surface:
 
     corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated.
                      Without them they follow from the facets around.
+    forms            surfaces that are known exactly; where a triangle stands for one of them, feet and normals are its own
+    form_of          (face,): the number of the form that each triangle stands for; -1: the triangle itself is all that is known
     """
 
-    def __init__(self, mesh: trimesh.Trimesh, corner_normals: np.ndarray | None = None) -> None:
+    def __init__(
+        self,
+        mesh: trimesh.Trimesh,
+        corner_normals: np.ndarray | None = None,
+        forms: Sequence[Form] = (),
+        form_of: np.ndarray | None = None,
+    ) -> None:
         self.mesh = mesh
+        self.forms = tuple(forms)
+        self.form_of = np.full(len(mesh.faces), -1) if form_of is None else form_of
         self._given = corner_normals
         self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
@@ -29,7 +42,40 @@ class Surface:
     @cached_property
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
-        return _corner_normals(self.mesh) if self._given is None else self._given
+        normals = np.array(_corner_normals(self.mesh) if self._given is None else self._given)
+        for form, own, outside in self._known:
+            _, slope = form.distance(np.asarray(self.mesh.triangles)[own].reshape(-1, 3))
+            exact = np.linalg.norm(slope, axis=1) > 0.5  # not in the apex of a cone
+            normals[own] = np.where(exact[:, None], outside * slope, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
+        return normals
+
+    @cached_property
+    def _known(self) -> list[tuple[Form, np.ndarray, float]]:
+        """Forms, the triangles that stand for each, and 1 or -1: whether their outside is the form's, or they are hollow."""
+        centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
+        found = []
+        for number, form in enumerate(self.forms):
+            own = np.flatnonzero(self.form_of == number)
+            if own.size:
+                _, slope = form.distance(centres[own])
+                found.append((form, own, 1.0 if (slope * facets[own]).sum() > 0 else -1.0))
+        return found
+
+    @property
+    def pieces(self) -> "list[Piece]":
+        """What lies on each of its forms."""
+        return [Piece(form, outside < 0, self.part(own)) for form, own, outside in self._known]
+
+    @property
+    def unknown(self) -> "Surface":
+        """The triangles that stand for no form."""
+        return self.part(np.flatnonzero(self.form_of < 0))
+
+    def part(self, faces: np.ndarray) -> "Surface":
+        """Some of its triangles."""
+        used, renumbered = np.unique(self._faces[faces], return_inverse=True)
+        mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
+        return Surface(mesh, self.corner_normals[faces], self.forms, self.form_of[faces])
 
     @cached_property
     def curvature(self) -> float:
@@ -68,12 +114,24 @@ class Surface:
         """Outward unit normals (point, 3) at `points` (point, 3) [mm] on the given triangles (point,)."""
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
-        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        for form, some, outside in self._stand_for(triangle):
+            _, slope = form.distance(points[some])
+            exact = np.linalg.norm(slope, axis=1) > 0.5
+            normals[some] = np.where(exact[:, None], outside * slope, normals[some])
+        return np.asarray(normals)
+
+    def _stand_for(self, triangle: np.ndarray) -> list[tuple[Form, np.ndarray, float]]:
+        """Forms, which of some triangles (point,) stand for each, and 1 or -1, as in `_known`."""
+        if not self.forms:
+            return []
+        numbers = self.form_of[triangle]
+        return [(form, np.flatnonzero(numbers == self.form_of[own[0]]), outside) for form, own, outside in self._known]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
         """The surface turned by R (3, 3), then moved by t (3,) [mm]."""
         moved = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
-        return Surface(moved, self.corner_normals @ R.T)
+        return Surface(moved, self.corner_normals @ R.T, [form.placed(R, t) for form in self.forms], self.form_of)
 
     def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         return np.asarray(trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points))
@@ -86,33 +144,55 @@ class Surface:
         normals are interpolated between the corners of a facet: they change steadily as a point moves.
         """
         triangle, nearest = self.nearest(points)
-        over = self._overhang(points, triangle, nearest) <= max(margin, 1e-6 * self.mesh.scale)
-        return nearest, self.normals(triangle, nearest), over
+        sideways, at_rim = self._sideways(points, triangle, nearest)
+        over = ~at_rim | (sideways <= max(margin, 1e-6 * self.mesh.scale))
+        feet = np.array(nearest)
+        for form, some, _ in self._stand_for(triangle):
+            feet[some] = form.project(np.where(at_rim[some, None], nearest[some], points[some]))
+        return feet, self.normals(triangle, feet), over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """How far `points` (point, 3) [mm] lie behind the surface (point,) [mm]; 0 in front of it, and beside it."""
         triangle, nearest = self.nearest(points)
         offset = nearest - points
-        behind = np.flatnonzero((offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1) > 0)
-        over = self._overhang(points[behind], triangle[behind], nearest[behind]) <= 1e-6 * self.mesh.scale
-        depth = np.zeros(len(points))
-        depth[behind[over]] = np.linalg.norm(offset[behind[over]], axis=1)
-        return depth
+        height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
+        depth = np.linalg.norm(offset, axis=1)
+        for form, some, outside in self._stand_for(triangle):
+            height[some] = outside * form.distance(points[some])[0]
+            depth[some] = np.abs(height[some])
+        behind = np.flatnonzero(height < 0)
+        sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
+        over = ~at_rim | (sideways <= 1e-6 * self.mesh.scale)
+        found = np.zeros(len(points))
+        found[behind[over]] = depth[behind[over]]
+        return found
 
     def overhang(self, points: np.ndarray) -> np.ndarray:
         """How far `points` (point, 3) [mm] stand beside the surface (point,) [mm]: 0 over it."""
-        return self._overhang(points, *self.nearest(points))
+        sideways, at_rim = self._sideways(points, *self.nearest(points))
+        return np.where(at_rim, sideways, 0.0)
 
-    def _overhang(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-        facet = np.asarray(self.mesh.face_normals)[triangle]
+    def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far points stand beside their nearest ones, across the normal there (point,) [mm]; whether those are on the rim."""
+        normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
+        for form, some, _ in self._stand_for(triangle):
+            normal[some] = form.distance(nearest[some])[1]
         offset = points - nearest
-        sideways = np.linalg.norm(offset - (offset * facet).sum(axis=1, keepdims=True) * facet, axis=1)
+        sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
         coordinates = self._barycentric(triangle, nearest)
         # Edge j of a triangle runs from corner j to corner j+1, so it faces corner j+2: there that coordinate is zero. A
         # triangle may also touch the rim with a corner only.
         at_rim = (np.abs(coordinates[:, [2, 0, 1]]) < 1e-9) & self._rim_edges[triangle]
         at_rim |= (coordinates > 1 - 1e-9) & self._rim_corners[triangle]
-        return np.where(at_rim.any(axis=1), sideways, 0.0)
+        return sideways, at_rim.any(axis=1)
+
+
+class Piece(NamedTuple):
+    """What of a face lies on one form; hollow if the material is around it."""
+
+    form: Form
+    is_hollow: bool
+    surface: Surface
 
 
 def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:

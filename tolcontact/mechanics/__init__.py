@@ -83,7 +83,7 @@ drives into contact; `"initial"` is the paper's set, of the points that penetrat
 
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap_map import GapMap
-from tolcontact.mechanics.groups import Group, round_pairs
+from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.pose import ENTRIES
 
-__all__ = ["ENTRIES", "MOMENTS", "GapMap", "Group", "round_pairs"]
+__all__ = ["ENTRIES", "MOMENTS", "GapMap", "Group", "curved_pairs"]

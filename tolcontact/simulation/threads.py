@@ -12,7 +12,7 @@ from typing import TypeVar
 
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver
-from tolcontact.mechanics import round_pairs
+from tolcontact.mechanics import curved_pairs
 from tolcontact.simulation.block import Block
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.variation.draws import draw
@@ -86,7 +86,7 @@ def block_rows(program: Program) -> int:
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS
-    if program.method.is_exact and any(round_pairs(program.nominal, group.group) for group in program.groups):
+    if program.method.is_exact and any(curved_pairs(program.nominal, group.group) for group in program.groups):
         rows = CURVED_ROWS
     while rows > LEAST_ROWS and rows * bodies**3 > BLOCK_ROWS * LARGE**3:
         rows //= 2

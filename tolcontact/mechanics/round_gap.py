@@ -1,0 +1,156 @@
+"""Gaps of round faces at any pose: a ball's centre, or the ends of a shaft's axis, beside a wall.
+
+A wall that is around a shaft, or flat, keeps it on one side of tangent planes. In the direction e of such a plane, seen from
+the shaft, the shaft's end with centre c, axis a and radius r reaches as far as e.c + r sqrt(1 - (e.a)^2), if it ends there: the
+farthest point of a circle. Where the wall ends, in a plane with normal u across e, the shaft goes on, and reaches as far as
+e.c + r sqrt(1 + (e.a / u.a)^2), with c where the axis meets that plane: the farthest point of an ellipse. Of all tangent planes
+of a hollow cylinder the one counts that is nearest.
+"""
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.discretization import ANALYTIC, RoundPoints
+from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+
+ROUNDS = 3  # of Newton's method, from the tangent that is nearest to an upright shaft
+LARGEST = 0.5  # rad: step of it
+ASIDE = 1e-13  # mm: what a point on an axis is taken to be beside it
+CLOSE = 1e-3  # of the ball's or shaft's radius: freedom that curvature is taken for at least
+STRAIGHT = 1e-9
+
+
+def round_gaps(points: RoundPoints) -> ca.Function:
+    """Function of X_RM (12) and reactions (point), with the results
+
+    gaps     (point) [mm]
+    slopes   (point, 12): their derivatives by X_RM
+    bow      (12, 12): the sum of reactions times their second derivatives, but for
+    wrap     (12, 12): the sum of reactions times how hollow walls close in around what slides along them; positive
+                       semidefinite, and to be subtracted from `bow`
+    """
+    X, reactions = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("reactions", len(points))
+    gaps, slopes = [], []
+    bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
+    for k in range(len(points)):
+        gap, slope, bend, closing = (_of_tangents if _has_tangents(points, k) else _of_ball)(points, k, X)
+        gaps.append(gap)
+        slopes.append(slope)
+        bow += reactions[k] * bend
+        wrap += reactions[k] * closing
+    outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
+    return ca.Function("round_gaps", [X, reactions], [*outputs.values()], ["X_RM", "reactions"], [*outputs])
+
+
+def _has_tangents(points: RoundPoints, k: int) -> bool:
+    return ANALYTIC[points.kind[k]] == "plane" or bool(points.axis[k].any())
+
+
+def _in_wall_frame(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Centre and axis (3, 1) of the ball or shaft, as the part that has the wall sees them."""
+    pose = pose_of(X)
+    if not points.on_moving[k]:
+        pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
+    return pose.apply(ca.DM(points.centre[k])), pose.R @ ca.DM(points.axis[k])
+
+
+def _of_tangents(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """Gap, slope (1, 12), second derivative (12, 12) and what that is less by the wall's closing in (12, 12), beside a plane, or of a shaft in a hollow cylinder."""
+    c, a = _in_wall_frame(points, k, X)
+    o, w, r = ca.DM(points.origin[k]), points.direction[k], float(points.radius[k])
+    tilt = ca.SX(0)
+    if points.cut[k].any():
+        u = ca.DM(points.cut[k])
+        c = c + a * (ca.dot(u, ca.DM(points.centre[k]) - c) / ca.dot(u, a))
+        tilt = 1 / ca.dot(u, a) ** 2
+    elif points.axis[k].any():
+        tilt = ca.SX(-1)
+    e, t, delta = ca.SX.sym("e", 3), ca.SX.sym("t", 3), ca.SX.sym("delta")
+    across = e * ca.cos(delta) + t * ca.sin(delta)
+    gap = float(points.wall_radius[k]) - ca.dot(across, c - o) - r * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
+    slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
+    second, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
+    if ANALYTIC[points.kind[k]] == "plane":
+        where = [-w, np.zeros(3), 0]
+        return (*ca.substitute([gap, slope, second], [e, t, delta], where), ca.SX.zeros(ENTRIES, ENTRIES))
+    there, is_free = _nearest_tangent(points, k, ca.Function("slide", [X, e, t], ca.substitute([slide, stiffness], [delta], [ca.SX(0)])), X, c - o)
+    least = max(abs(float(points.wall_radius[k]) - r), CLOSE * r)
+    closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
+    where = [there, ca.cross(ca.DM(w), there), ca.SX(0)]
+    return tuple(ca.substitute([gap, slope, second, closing], [e, t, delta], where))  # type: ignore[return-value]
+
+
+def _nearest_tangent(points: RoundPoints, k: int, slide: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if that is where the wall ends, else 1.
+
+    slide   Function of X_RM, e and t: first and second derivative of the gap as e turns towards t
+    q       (3, 1) from the wall's axis to the shaft's
+    """
+    w, x = ca.DM(points.direction[k]), ca.DM(points.towards[k])
+    q = q - w * ca.dot(w, q) + ASIDE * x
+    e, is_free = _within(points, k, q / ca.norm_2(q))
+    least = CLOSE * float(points.radius[k]) * 1e-3
+    for _ in range(ROUNDS):
+        t = ca.cross(w, e)
+        first, second = slide(X, e, t)
+        step = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
+        e = e + step * t
+        e, is_free = _within(points, k, e / ca.norm_2(e))
+    return e, is_free
+
+
+def _within(points: RoundPoints, k: int, e: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """The direction (3, 1) of the wall that is nearest to e; and 1 if it is e."""
+    opening = float(points.opening[k])
+    if opening > np.pi - STRAIGHT:
+        return e, ca.SX(1)
+    x = ca.DM(points.towards[k])
+    y = ca.DM(np.cross(points.direction[k], points.towards[k]))
+    is_free = ca.dot(e, x) >= np.cos(opening)
+    end = np.cos(opening) * x + ca.if_else(ca.dot(e, y) < 0, -1, 1) * np.sin(opening) * y
+    return ca.if_else(is_free, e, end), ca.if_else(is_free, 1, 0)
+
+
+def _of_ball(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+    """The same of a ball beside a curved wall."""
+    c, _ = _in_wall_frame(points, k, X)
+    side = -1.0 if points.is_hollow[k] else 1.0
+    distance, normal, curvature = _distance(points, k, c)
+    n = ca.SX.sym("n", 3)
+    along, J = ca.dot(n, c), ca.jacobian(c, X)
+    slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
+    around, nothing = J.T @ curvature @ J, ca.SX.zeros(ENTRIES, ENTRIES)
+    bend, closing = (bend, around) if points.is_hollow[k] else (bend + around, nothing)
+    return side * distance - float(points.radius[k]), slope, bend, closing
+
+
+def _distance(points: RoundPoints, k: int, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
+
+    Positive outside; see Form.distance.
+    """
+    kind, w, x = ANALYTIC[points.kind[k]], ca.DM(points.direction[k]), ca.DM(points.towards[k])
+    R, r, one = float(points.wall_radius[k]), float(points.radius[k]), ca.SX.eye(3)
+    p = c - ca.DM(points.origin[k])
+    least = max(abs(R - r), CLOSE * r)
+    if kind == "sphere":
+        length, n = _direction(p + ASIDE * x)
+        return length - R, n, (one - n @ n.T) / ca.fmax(length, least)
+    along = ca.dot(w, p)
+    length, outward = _direction(p - w * along + ASIDE * x)
+    round_ = ca.cross(w, outward)
+    if kind == "cylinder":
+        return length - R, outward, round_ @ round_.T / ca.fmax(length, least)
+    if kind == "cone":
+        cos, sin = np.cos(points.angle[k]), np.sin(points.angle[k])
+        n = cos * outward - sin * w
+        return length * cos - along * sin, n, cos * round_ @ round_.T / ca.fmax(length, CLOSE * r)
+    tube, n = _direction((length - R) * outward + along * w)
+    across = ca.cross(round_, n)
+    turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
+    return tube - float(points.minor[k]), n, across @ across.T / ca.fmax(tube, CLOSE * r) + turning * round_ @ round_.T
+
+
+def _direction(vector: ca.SX) -> tuple[ca.SX, ca.SX]:
+    length = ca.norm_2(vector)
+    return length, vector / length
