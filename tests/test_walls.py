@@ -35,7 +35,7 @@ NEVER = {
 ORDER = (
     "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
     "compiled", "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation",
-    "statistics", "archive", "workflow", "report", "testing", "cli", "__init__", "__main__",
+    "statistics", "archive", "workflow", "report", "recomputed", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.archive import open_archive
 from tolcontact.errors import OptionError
+from tolcontact.recomputed import round_points
 
 Results = xr.DataTree | str | Path
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
@@ -47,7 +48,8 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
 
     They are computed again with nothing but what the archive holds: n'(x_m - x_r), with x = R p + t, p a nominal contact point
     of the moving or the reference part, n the nominal normal turned with the reference part; less the deviation of the
-    one-sided locator that a point stands for. The two may differ by `within` [mm].
+    one-sided locator that a point stands for. Where a ball or a shaft touches a wall it is their distance, from their sizes and
+    places. The two may differ by `within` [mm].
 
     Unfinished realizations are passed over, and those whose `searched` is 1: their contact points were projected again, and are
     not archived. (Archives of format 1 do not say which; all of theirs are computed.)
@@ -160,11 +162,16 @@ class _Pair:
             int(contact[variable.name][pair]) for variable in (words.MOVING_PART, words.REFERENCE_PART)
         )
         self.locators = contact[words.LOCATOR_OF_POINT.name][own]
+        self.round = round_points(contact, np.flatnonzero(own))
 
     def least_gaps(self, rows: Rows, some: slice) -> np.ndarray:
         """The least gaps (realization, state) [mm] of some realizations."""
         R_m, t_m = _pose(rows, some, self.moving_part)
         R_r, t_r = _pose(rows, some, self.reference_part)
+        if self.round:
+            turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
+            apart = np.einsum("...ij,...j->...i", turn, t_m - t_r)
+            return np.asarray(np.min([point.gaps(turn @ R_m, apart) for point in self.round], axis=0))
         moving = self.moving_point @ R_m.swapaxes(-1, -2) + t_m[..., None, :]
         reference = self.reference_point @ R_r.swapaxes(-1, -2) + t_r[..., None, :]
         normal = self.normal @ R_r.swapaxes(-1, -2)

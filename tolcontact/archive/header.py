@@ -16,7 +16,7 @@ from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import to_document
-from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.discretization import Nominal, NominalPart, form_arrays, known_surfaces
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import Variable
@@ -207,10 +207,22 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
             mesh.createDimension(words.CORNER, 3)
             write(mesh, words.MESH_VERTICES, part.mesh.vertices)
             write(mesh, words.MESH_FACES, part.mesh.faces)
+            known = known_surfaces(part.mesh)
+            if known is not None:
+                mesh.createDimension(words.BREP_FACE, len(known[1]))
+                write(mesh, words.BREP_OF_FACE, known[0])
+                _write_forms(mesh, words.OF_BREP_FACE, form_arrays(known[1]))
+
+
+def _write_forms(group: netCDF4.Group, variables: Mapping[str, Variable], arrays: Mapping[str, np.ndarray]) -> None:
+    for name, variable in variables.items():
+        write(group, variable, arrays[name])
 
 
 def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
     group.createDimension(words.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
+    if any(pair.round for pair in nominal.pairs):
+        group.createDimension(words.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
     for variable, values in contact_values(nominal).items():
         write(group, variable, values)
 
@@ -228,12 +240,27 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
         pair.offsets.columns[pair.offsets.matrix.argmax(axis=0)] if pair.is_supports else np.full(len(pair.P_m), -1)
         for pair in pairs
     ]
-    return parts | {
+    values = parts | {
         words.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
         words.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
         words.REFERENCE_POINT: np.vstack([pair.P_r for pair in pairs]),
         words.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
         words.LOCATOR_OF_POINT: np.concatenate(locators),
+    }
+    return values | _round_values(nominal)
+
+
+def _round_values(nominal: Nominal) -> dict[Variable, Any]:
+    """What says where round faces touch, at any pose."""
+    first = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
+    known = [(first[k] + np.arange(len(pair.round)), pair.round) for k, pair in enumerate(nominal.pairs) if pair.round]
+    if not known:
+        return {}
+    numbers, points = zip(*known, strict=True)
+    return {
+        words.POINT_OF_ROUND: np.concatenate(numbers),
+        **{v: np.concatenate([each.walls[name] for each in points]) for name, v in words.OF_WALL.items()},
+        **{v: np.concatenate([each.points[name] for each in points]) for name, v in words.OF_ROUND.items()},
     }
 
 

@@ -41,7 +41,7 @@ ONCE = {  # by group
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
     "model": (words.DECLARATION,),
     "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,
-                words.LOCATOR_OF_POINT),
+                words.LOCATOR_OF_POINT, *words.ROUND),
     "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
                words.LOCATOR_DIRECTION),
     "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
@@ -174,7 +174,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
                 _check_variable(group, variable)
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
-        for variable in OF_MESH:
+        for variable in (*OF_MESH, *words.KNOWN_SURFACES):
             _check_variable(group, variable)
     for name in LABELS:
         if name in file.variables:
@@ -245,7 +245,7 @@ def _texts(stored: netCDF4.Variable) -> list[str]:
 def _check_sums(group: netCDF4.Dataset) -> None:
     """Whether what is written once, or in one go, has the checksum that is stored beside it."""
     kind = group.path.split("/")[1]
-    known = {v.name: v for v in (OF_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
+    known = {v.name: v for v in ((*OF_MESH, *words.KNOWN_SURFACES) if "/mesh/" in group.path else ONCE.get(kind, ()))}
     for name, stored in group.variables.items():
         if words.CHECKSUM in stored.ncattrs() and name in known:
             values = _declaration(stored) if known[name] is words.DECLARATION else _values(stored, known[name])

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,6 +12,7 @@ from tolcontact import vocabulary as words
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.rebuilding import from_document
+from tolcontact.discretization import forms_of, with_known_surfaces
 from tolcontact.errors import ArchiveError
 
 
@@ -50,11 +52,25 @@ def model_of(results: xr.DataTree) -> Assembly:
         for name, group in results["model/mesh"].children.items():
             of = group.to_dataset()
             # Groups of format 1 do not say the part's name: it was their own.
-            triangles = _Triangles(of[words.MESH_VERTICES.name].values, of[words.MESH_FACES.name].values)
-            meshes[str(of.attrs.get("part", name))] = triangles
+            meshes[str(of.attrs.get("part", name))] = _mesh(of)
     return from_document(document, meshes)
 
 
 class _Triangles:
     def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
         self.vertices, self.faces = vertices, faces
+
+
+def _mesh(of: xr.Dataset) -> Any:
+    """The mesh of a part, with the surfaces of its B-rep faces if it has any."""
+    vertices, faces = of[words.MESH_VERTICES.name].values, of[words.MESH_FACES.name].values
+    if any(variable.name not in of for variable in words.KNOWN_SURFACES):
+        return _Triangles(vertices, faces)
+    brep = of[words.BREP_OF_FACE.name].values
+    arrays = {name: of[variable.name].values for name, variable in words.OF_BREP_FACE.items()}
+    kinds = arrays["kind"]
+    sound = all(np.isfinite(values).all() for values in arrays.values())
+    sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(words.SURFACE_KINDS)).all())
+    if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
+        raise ArchiveError("the surfaces of a mesh in the archive are damaged")
+    return with_known_surfaces(vertices, faces, brep, forms_of(arrays))

@@ -28,7 +28,8 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
         if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program.nominal).items():
-        if not _same(there["contact"][variable.name], values):
+        stored = there["contact"].variables.get(variable.name)
+        if stored is None or not _same(stored, values):
             raise ArchiveError(f'"{path}": its contact points differ (it was written by {there.versions}); write to a new file')
     for word, value in settings.items():
         was = getattr(there, word, None)

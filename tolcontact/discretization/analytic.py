@@ -1,13 +1,15 @@
 """Surfaces that a file knows exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-ANALYTIC = ("plane", "cylinder", "cone", "sphere", "torus")
+from tolcontact.vocabulary import SURFACE_KINDS
+
+ANALYTIC = SURFACE_KINDS
 METRE = 1e3  # [mm], the reader's unit
 ROUNDS = 4  # of Newton's method: as many as bring vertices off by micrometres to the last digit
 PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different ones
@@ -68,6 +70,22 @@ class Form:
             value, slope = self.distance(points)
             points = points - value[:, None] * slope
         return points
+
+
+def form_arrays(of: Sequence[Form | None]) -> dict[str, np.ndarray]:
+    """Surfaces as arrays (surface, ...) by name, as an archive has them; `kind` is the number in `ANALYTIC`, -1 of None."""
+    known = [form or Form("plane", np.zeros(3), np.zeros(3)) for form in of]
+    numbers = {name: np.array([getattr(form, name) for form in known]) for name in ("origin", "axis", "radius", "minor", "angle")}
+    return {"kind": np.array([-1 if form is None else ANALYTIC.index(form.kind) for form in of]), **numbers}
+
+
+def forms_of(arrays: Mapping[str, np.ndarray]) -> list[Form | None]:
+    """Surfaces from such arrays."""
+    sizes = {name: values for name, values in arrays.items() if name != "kind"}
+    return [
+        None if kind < 0 else Form(ANALYTIC[kind], **{name: values[k] for name, values in sizes.items()})
+        for k, kind in enumerate(arrays["kind"])
+    ]
 
 
 def forms(text: str) -> list[Form | None]:

@@ -47,3 +47,17 @@ def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:
         return None
     form = fitted(np.asarray(mesh.triangles)[own], FIT)
     return None if form is None or form.kind == "plane" else form
+
+
+def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[Form | None]] | None:
+    """Of a mesh from a STEP file the B-rep face of each triangle (face,), from 0, and their surfaces; else None."""
+    brep = mesh.face_attributes.get(BREP)
+    return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES])
+
+
+def with_known_surfaces(vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[Form | None]) -> trimesh.Trimesh:
+    """A mesh that knows them again."""
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    mesh.face_attributes[BREP] = brep
+    mesh.metadata[SURFACES] = surfaces
+    return mesh

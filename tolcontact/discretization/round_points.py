@@ -5,12 +5,12 @@ that are found anew at every pose, from few numbers. What touches is exact; noth
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tolcontact.discretization.analytic import ANALYTIC, Form
+from tolcontact.discretization.analytic import Form, form_arrays, forms_of
 from tolcontact.discretization.surface import Piece
 
 NONE = np.zeros(3)
@@ -83,42 +83,21 @@ def _or_x(towards: np.ndarray | None) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class RoundPoints:
-    """The points of a pair as arrays, as an archive has them; each (point, ...), see RoundPoint and Form.
+    """The points of a pair as arrays (point, ...), by name: `walls` what their Forms are, `points` what else RoundPoint has."""
 
-    kind   number of the wall's kind in `ANALYTIC`
-    """
-
-    kind: np.ndarray
-    origin: np.ndarray
-    direction: np.ndarray
-    wall_radius: np.ndarray
-    minor: np.ndarray
-    angle: np.ndarray
-    is_hollow: np.ndarray
-    centre: np.ndarray
-    axis: np.ndarray
-    cut: np.ndarray
-    radius: np.ndarray
-    on_moving: np.ndarray
-    towards: np.ndarray
-    opening: np.ndarray
+    walls: Mapping[str, np.ndarray]
+    points: Mapping[str, np.ndarray]
 
     def __len__(self) -> int:
-        return len(self.kind)
+        return len(self.points["radius"])
 
     @classmethod
     def of(cls, points: Sequence[RoundPoint]) -> "RoundPoints":
         """The arrays of some points."""
-        walls = [point.wall for point in points]
-        return cls(
-            kind=np.array([ANALYTIC.index(wall.kind) for wall in walls]),
-            origin=np.array([wall.origin for wall in walls]),
-            direction=np.array([wall.axis for wall in walls]),
-            wall_radius=np.array([wall.radius for wall in walls]),
-            minor=np.array([wall.minor for wall in walls]),
-            angle=np.array([wall.angle for wall in walls]),
-            **{name: np.array([getattr(point, name) for point in points]) for name in _OWN},
-        )
+        own = [field.name for field in fields(RoundPoint) if field.name != "wall"]
+        return cls(form_arrays([point.wall for point in points]), {name: np.array([getattr(p, name) for p in points]) for name in own})
 
-
-_OWN = tuple(field.name for field in fields(RoundPoint) if field.name != "wall")
+    def __iter__(self) -> Iterator[RoundPoint]:
+        for k, wall in enumerate(forms_of(self.walls)):
+            assert wall is not None
+            yield RoundPoint(wall, **{name: values[k] for name, values in self.points.items()})

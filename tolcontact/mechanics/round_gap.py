@@ -10,7 +10,7 @@ of a hollow cylinder the one counts that is nearest.
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ANALYTIC, RoundPoints
+from tolcontact.discretization import RoundPoint, RoundPoints
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
 ROUNDS = 3  # of Newton's method, from the tangent that is nearest to an upright shaft
@@ -32,106 +32,106 @@ def round_gaps(points: RoundPoints) -> ca.Function:
     X, reactions = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("reactions", len(points))
     gaps, slopes = [], []
     bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
-    for k in range(len(points)):
-        gap, slope, bend, closing = (_of_tangents if _has_tangents(points, k) else _of_ball)(points, k, X)
+    for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
+        gap, slope, bend, closing = (_of_tangents if _has_tangents(point) else _of_ball)(point, X)
         gaps.append(gap)
         slopes.append(slope)
-        bow += reactions[k] * bend
-        wrap += reactions[k] * closing
+        bow += reaction * bend
+        wrap += reaction * closing
     outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
     return ca.Function("round_gaps", [X, reactions], [*outputs.values()], ["X_RM", "reactions"], [*outputs])
 
 
-def _has_tangents(points: RoundPoints, k: int) -> bool:
-    return ANALYTIC[points.kind[k]] == "plane" or bool(points.axis[k].any())
+def _has_tangents(point: RoundPoint) -> bool:
+    return point.wall.kind == "plane" or bool(point.axis.any())
 
 
-def _in_wall_frame(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Centre and axis (3, 1) of the ball or shaft, as the part that has the wall sees them."""
     pose = pose_of(X)
-    if not points.on_moving[k]:
+    if not point.on_moving:
         pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
-    return pose.apply(ca.DM(points.centre[k])), pose.R @ ca.DM(points.axis[k])
+    return pose.apply(ca.DM(point.centre)), pose.R @ ca.DM(point.axis)
 
 
-def _of_tangents(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_tangents(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Gap, slope (1, 12), second derivative (12, 12) and what that is less by the wall's closing in (12, 12), beside a plane, or of a shaft in a hollow cylinder."""
-    c, a = _in_wall_frame(points, k, X)
-    o, w, r = ca.DM(points.origin[k]), points.direction[k], float(points.radius[k])
+    c, a = _in_wall_frame(point, X)
+    o, w, r = ca.DM(point.wall.origin), point.wall.axis, float(point.radius)
     tilt = ca.SX(0)
-    if points.cut[k].any():
-        u = ca.DM(points.cut[k])
-        c = c + a * (ca.dot(u, ca.DM(points.centre[k]) - c) / ca.dot(u, a))
+    if point.cut.any():
+        u = ca.DM(point.cut)
+        c = c + a * (ca.dot(u, ca.DM(point.centre) - c) / ca.dot(u, a))
         tilt = 1 / ca.dot(u, a) ** 2
-    elif points.axis[k].any():
+    elif point.axis.any():
         tilt = ca.SX(-1)
     e, t, delta = ca.SX.sym("e", 3), ca.SX.sym("t", 3), ca.SX.sym("delta")
     across = e * ca.cos(delta) + t * ca.sin(delta)
-    gap = float(points.wall_radius[k]) - ca.dot(across, c - o) - r * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
+    gap = float(point.wall.radius) - ca.dot(across, c - o) - r * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
     slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
     second, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
-    if ANALYTIC[points.kind[k]] == "plane":
+    if point.wall.kind == "plane":
         where = [-w, np.zeros(3), 0]
         return (*ca.substitute([gap, slope, second], [e, t, delta], where), ca.SX.zeros(ENTRIES, ENTRIES))
-    there, is_free = _nearest_tangent(points, k, ca.Function("slide", [X, e, t], ca.substitute([slide, stiffness], [delta], [ca.SX(0)])), X, c - o)
-    least = max(abs(float(points.wall_radius[k]) - r), CLOSE * r)
+    there, is_free = _nearest_tangent(point, ca.Function("slide", [X, e, t], ca.substitute([slide, stiffness], [delta], [ca.SX(0)])), X, c - o)
+    least = max(abs(float(point.wall.radius) - r), CLOSE * r)
     closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
     where = [there, ca.cross(ca.DM(w), there), ca.SX(0)]
     return tuple(ca.substitute([gap, slope, second, closing], [e, t, delta], where))  # type: ignore[return-value]
 
 
-def _nearest_tangent(points: RoundPoints, k: int, slide: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _nearest_tangent(point: RoundPoint, slide: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if that is where the wall ends, else 1.
 
     slide   Function of X_RM, e and t: first and second derivative of the gap as e turns towards t
     q       (3, 1) from the wall's axis to the shaft's
     """
-    w, x = ca.DM(points.direction[k]), ca.DM(points.towards[k])
+    w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
     q = q - w * ca.dot(w, q) + ASIDE * x
-    e, is_free = _within(points, k, q / ca.norm_2(q))
-    least = CLOSE * float(points.radius[k]) * 1e-3
+    e, is_free = _within(point, q / ca.norm_2(q))
+    least = CLOSE * float(point.radius) * 1e-3
     for _ in range(ROUNDS):
         t = ca.cross(w, e)
         first, second = slide(X, e, t)
         step = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
         e = e + step * t
-        e, is_free = _within(points, k, e / ca.norm_2(e))
+        e, is_free = _within(point, e / ca.norm_2(e))
     return e, is_free
 
 
-def _within(points: RoundPoints, k: int, e: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
     """The direction (3, 1) of the wall that is nearest to e; and 1 if it is e."""
-    opening = float(points.opening[k])
+    opening = float(point.opening)
     if opening > np.pi - STRAIGHT:
         return e, ca.SX(1)
-    x = ca.DM(points.towards[k])
-    y = ca.DM(np.cross(points.direction[k], points.towards[k]))
+    x = ca.DM(point.towards)
+    y = ca.DM(np.cross(point.wall.axis, point.towards))
     is_free = ca.dot(e, x) >= np.cos(opening)
     end = np.cos(opening) * x + ca.if_else(ca.dot(e, y) < 0, -1, 1) * np.sin(opening) * y
     return ca.if_else(is_free, e, end), ca.if_else(is_free, 1, 0)
 
 
-def _of_ball(points: RoundPoints, k: int, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """The same of a ball beside a curved wall."""
-    c, _ = _in_wall_frame(points, k, X)
-    side = -1.0 if points.is_hollow[k] else 1.0
-    distance, normal, curvature = _distance(points, k, c)
+    c, _ = _in_wall_frame(point, X)
+    side = -1.0 if point.is_hollow else 1.0
+    distance, normal, curvature = _distance(point, c)
     n = ca.SX.sym("n", 3)
     along, J = ca.dot(n, c), ca.jacobian(c, X)
     slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
     around, nothing = J.T @ curvature @ J, ca.SX.zeros(ENTRIES, ENTRIES)
-    bend, closing = (bend, around) if points.is_hollow[k] else (bend + around, nothing)
-    return side * distance - float(points.radius[k]), slope, bend, closing
+    bend, closing = (bend, around) if point.is_hollow else (bend + around, nothing)
+    return side * distance - float(point.radius), slope, bend, closing
 
 
-def _distance(points: RoundPoints, k: int, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
 
     Positive outside; see Form.distance.
     """
-    kind, w, x = ANALYTIC[points.kind[k]], ca.DM(points.direction[k]), ca.DM(points.towards[k])
-    R, r, one = float(points.wall_radius[k]), float(points.radius[k]), ca.SX.eye(3)
-    p = c - ca.DM(points.origin[k])
+    kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
+    R, r, one = float(point.wall.radius), float(point.radius), ca.SX.eye(3)
+    p = c - ca.DM(point.wall.origin)
     least = max(abs(R - r), CLOSE * r)
     if kind == "sphere":
         length, n = _direction(p + ASIDE * x)
@@ -142,13 +142,13 @@ def _distance(points: RoundPoints, k: int, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.S
     if kind == "cylinder":
         return length - R, outward, round_ @ round_.T / ca.fmax(length, least)
     if kind == "cone":
-        cos, sin = np.cos(points.angle[k]), np.sin(points.angle[k])
+        cos, sin = np.cos(point.wall.angle), np.sin(point.wall.angle)
         n = cos * outward - sin * w
         return length * cos - along * sin, n, cos * round_ @ round_.T / ca.fmax(length, CLOSE * r)
     tube, n = _direction((length - R) * outward + along * w)
     across = ca.cross(round_, n)
     turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
-    return tube - float(points.minor[k]), n, across @ across.T / ca.fmax(tube, CLOSE * r) + turning * round_ @ round_.T
+    return tube - float(point.wall.minor), n, across @ across.T / ca.fmax(tube, CLOSE * r) + turning * round_ @ round_.T
 
 
 def _direction(vector: ca.SX) -> tuple[ca.SX, ca.SX]:

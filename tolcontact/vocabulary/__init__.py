@@ -4,4 +4,5 @@ from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of whi
 from tolcontact.vocabulary.comparison import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
+from tolcontact.vocabulary.surfaces import *  # noqa: F403
 from tolcontact.vocabulary.variable import Variable as Variable

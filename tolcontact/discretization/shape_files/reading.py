@@ -14,7 +14,7 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.discretization.edges import rim
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import reader, screening
-from tolcontact.discretization.shape_files.product import STEP_ANGLE, STEP_CHORD, Product, check_numbers, product
+from tolcontact.discretization.shape_files.product import BREP, SURFACES, STEP_ANGLE, STEP_CHORD, Product, check_numbers, product
 from tolcontact.discretization.shape_files.step_text import StepText
 
 COARSER = (1, 30)  # times the usual chord, one after the other
@@ -145,6 +145,8 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     own.apply_scale(_scale(geometry, getattr(source, "units", None)))
     check_numbers(own.vertices, str(geometry))
     own.merge_vertices(merge_tex=True, merge_norm=True)
+    if BREP in getattr(source, "face_attributes", {}):  # from an archive
+        own.face_attributes[BREP], own.metadata[SURFACES] = source.face_attributes[BREP], source.metadata[SURFACES]
     return own
 
 

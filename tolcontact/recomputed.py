@@ -1,0 +1,89 @@
+"""Gaps of round faces from what an archive holds of them, another way than the simulation computes them.
+
+The distance of a ball from a wall is that of its centre, less its radius. A shaft inside a wall is as far from it as its end is
+from the nearest of the wall's tangent planes: here all directions are tried, and the nearest one is narrowed down.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolcontact import vocabulary as words
+
+DIRECTIONS = 72  # that are tried
+NARROWINGS = 60
+GOLDEN = (np.sqrt(5) - 1) / 2
+
+
+def round_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[RoundPoint]":
+    """Those of the contact points `own` (point,) that are of round faces; `contact`: variables of that group, by name."""
+    if words.POINT_OF_ROUND.name not in contact:
+        return []
+    chosen = np.flatnonzero(np.isin(contact[words.POINT_OF_ROUND.name], own))
+    wall, body = (
+        {name: contact[variable.name][chosen] for name, variable in of.items()} for of in (words.OF_WALL, words.OF_ROUND)
+    )
+    return [RoundPoint(*({name: values[k] for name, values in of.items()} for of in (wall, body))) for k in range(len(chosen))]
+
+
+class RoundPoint(NamedTuple):
+    """A ball, or the end of a shaft, and a wall, by the names that the vocabulary gives what they are."""
+
+    wall: Mapping[str, Any]
+    body: Mapping[str, Any]
+
+    def gaps(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Gaps (...) [mm] where the moving part is at R (..., 3, 3), t (..., 3) [mm], as the reference part sees it."""
+        if not self.body["on_moving"]:
+            R = R.swapaxes(-1, -2)
+            t = -np.einsum("...ij,...j->...i", R, t)
+        centre, axis = R @ self.body["centre"] + t, R @ self.body["axis"]
+        if words.SURFACE_KINDS[self.wall["kind"]] == "plane":
+            return self._beside(-self.wall["axis"], centre, axis)
+        if self.body["axis"].any():
+            return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
+        distance = self._distance(centre - self.wall["origin"])
+        return np.asarray((-distance if self.body["is_hollow"] else distance) - self.body["radius"])
+
+    def _beside(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """Distance from the plane through the wall's point and across e (..., 3), which points out of the free side."""
+        tilt = (e * axis).sum(axis=-1)
+        stretch = np.sqrt(1 - tilt**2)
+        if self.body["cut"].any():
+            slope = axis @ self.body["cut"]
+            centre = centre + ((self.body["centre"] - centre) @ self.body["cut"] / slope)[..., None] * axis
+            stretch = np.sqrt(1 + (tilt / slope) ** 2)
+        return np.asarray(-(e * (centre - self.wall["origin"])).sum(axis=-1) - self.body["radius"] * stretch)
+
+    def _nearest(self, gap: Callable[[np.ndarray], np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+        """The least gap (...) of all directions that the wall has."""
+        x, opening = self.body["towards"], self.body["opening"]
+        y = np.cross(self.wall["axis"], x)
+
+        def at(azimuth: np.ndarray) -> np.ndarray:
+            azimuth = azimuth.clip(-opening, opening)[..., None] if opening < np.pi else azimuth[..., None]
+            return gap(np.cos(azimuth) * x + np.sin(azimuth) * y)
+
+        tried = np.linspace(-opening, opening, DIRECTIONS + 1)
+        width = tried[1] - tried[0]
+        best = tried[np.argmin([at(np.full(shape, azimuth)) for azimuth in tried], axis=0)]
+        low, high = best - width, best + width
+        for _ in range(NARROWINGS):
+            inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+            left = at(inner) < at(outer)
+            low, high = np.where(left, low, inner), np.where(left, outer, high)
+        return at((low + high) / 2)
+
+    def _distance(self, apart: np.ndarray) -> np.ndarray:
+        """Distance (...) [mm] from the wall's surface, positive outside, of what is `apart` (..., 3) from its point."""
+        kind, wall = words.SURFACE_KINDS[self.wall["kind"]], self.wall
+        if kind == "sphere":
+            return np.asarray(np.linalg.norm(apart, axis=-1) - wall["radius"])
+        along = apart @ wall["axis"]
+        across = np.linalg.norm(apart - along[..., None] * wall["axis"], axis=-1)
+        if kind == "cylinder":
+            return np.asarray(across - wall["radius"])
+        if kind == "cone":
+            return np.asarray(across * np.cos(wall["angle"]) - along * np.sin(wall["angle"]))
+        return np.asarray(np.hypot(across - wall["radius"], along) - wall["minor"])
