@@ -65,7 +65,8 @@ def contact_rows(
     """The rows about the poses `now`, which the increments change to `moved`; `inputs` as in contact_program."""
     slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     slopes: list[ca.SX] = []
-    gaps, filled, pairs, relative, bends = ([] for _ in range(5))
+    pairs: list[int] = []
+    gaps, filled, relative, bends = ([] for _ in range(4))
     bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
     for k, (before, after) in enumerate(zip(setting.relative(now), setting.relative(moved), strict=True)):
         by_z = setting.slope(after.vector())

@@ -9,11 +9,12 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.projection import project, reach
 from tolcontact.contact.round_scan import RoundScan
-from tolcontact.contact.scan import PairScan, Scan, least_gaps, pair_scan
+from tolcontact.contact.scan import PairScan, Scan, fixed, least_gaps, pair_scan
 from tolcontact.contact.state import State
 from tolcontact.mechanics import curved_pairs
 
 CLUSTERS = 6
+BESIDE = 0.01  # of their radius: what balls and shafts may carry beside a wall, if they came from afar
 
 
 class Seen(NamedTuple):
@@ -32,10 +33,17 @@ class Seen(NamedTuple):
 
 
 class Carriers(NamedTuple):
-    """Points of a pair that carry: the realization of each, its nominal place (point, 3), and their usual distance [mm]."""
+    """Points of a pair that carry.
+
+    realization   the realization of each
+    places        (point, 3), nominal, of the part that has not the surface which they touch
+    on_moving     whether that is the moving part
+    spacing       their usual distance [mm]; of round faces how far they may stand beside a wall
+    """
 
     realization: Int[Array, " point"]
     places: Float[Array, "point 3"]
+    on_moving: Bool[Array, " point"]
     spacing: float
 
 
@@ -64,7 +72,7 @@ class Candidates:
         is_iterated = self._method.is_iterated
         self.curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
         again = [k for k, pair in enumerate(self._pairs) if pair.round is None] if is_iterated else self.curved
-        self._reaches = {k: reach(self._every[k]) for k in again}
+        self._reaches = {k: reach(fixed(self._every[k])) for k in again}
 
     def scans(self, relative: Float[Array, "realization pair 12"], *, anew: bool = False) -> list[Scan]:
         """Scans of the points that may carry; projected again if the method requires it.
@@ -79,7 +87,7 @@ class Candidates:
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
         """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
-        return project(self._some[k], self._pairs[k].surface, relative, self._reaches[k])
+        return project(fixed(self._some[k]), self._pairs[k].surface, relative, self._reaches[k])
 
     def survey(self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]) -> Seen:
         """What is seen of raw states, for deviations (realization, locator) [mm]."""
@@ -112,18 +120,22 @@ class Candidates:
         if self._method.is_closed:
             return [None for _ in scans]
         return [
-            None if self._pairs[k].is_supports or self._pairs[k].round else scan.gaps(relative[:, k], deviations) < self._method.activity
-            for k, scan in enumerate(scans)
+            None if pair.is_supports or pair.round else scan.gaps(relative[:, k], deviations) < self._method.activity
+            for k, (pair, scan) in enumerate(zip(self._pairs, scans, strict=True))
         ]
 
     def carriers(self, k: int, state: State) -> Carriers:
         """The points of pair k that carry."""
-        loaded, standing = state.loaded[:, self._spans[k]], self._standing[k]
+        loaded, standing, pair = state.loaded[:, self._spans[k]], self._standing[k], self._pairs[k]
+        if pair.round:
+            of = pair.round.points
+            realization, column = np.nonzero(loaded & ~of["cut"].any(axis=1))  # where a wall ends a shaft may go on
+            return Carriers(realization, of["centre"][column], of["on_moving"][column], BESIDE * float(of["radius"].max()))
         if standing is None:
             slots = state.slots[self._varying.index(k)]
             realization, column = np.nonzero(loaded & slots.filled)
             places = self._some[k].P_m[slots.points[realization, column]]
         else:
             realization, column = np.nonzero(loaded)
-            places = self._pairs[k].P_m[standing[column]]
-        return Carriers(realization, places, 2 * reach(self._every[k]))
+            places = pair.P_m[standing[column]]
+        return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * reach(fixed(self._every[k])))

@@ -67,9 +67,13 @@ class Doubt:
             faces, X_RM = self._nominal.face_pair(index) if far.size else None, travelled.relative[:, k]
             if faces is not None:
                 carriers = candidates.carriers(k, travelled)
-                places = pose.apply(X_RM[carriers.realization], carriers.places[:, None])[:, 0]
-                beside = faces.reference.face.overhang(places)
-                doubtful[far[carriers.realization[beside > carriers.spacing]]] = True
+                for side, motion, some in (
+                    (faces.reference, X_RM, carriers.on_moving),
+                    (faces.moving, pose.inverse(X_RM), ~carriers.on_moving),
+                ):
+                    own = carriers.realization[some]
+                    beside = side.face.overhang(pose.apply(motion[own], carriers.places[some, None])[:, 0])
+                    doubtful[far[own[beside > carriers.spacing]]] = True
                 doubtful[far] |= faces.depth(X_RM) > self.allowed(k)
         return doubtful
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.scan import Deepest, PairScan
+from tolcontact.contact.scan import Deepest, PairScan, fixed
 from tolcontact.contact.slots import NOTHING, Slots
 from tolcontact.contact.state import State, Task
 from tolcontact.mechanics import ENTRIES
@@ -103,7 +103,7 @@ class LinearStep:
         bends = [np.zeros((len(task), 0)), *(np.zeros((len(task), ENTRIES)) for _ in before)]
         if newton:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
-            bends[1:] = [_bend(task.scans[k], own, task.deviations) for k, own in zip(self.varying, before, strict=True)]
+            bends[1:] = [_bend(fixed(task.scans[k]), own, task.deviations) for k, own in zip(self.varying, before, strict=True)]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
 
     def _carry_over(self, inputs: dict[str, np.ndarray], before: Sequence[Slots], slots: Sequence[Slots]) -> None:
@@ -120,7 +120,7 @@ class LinearStep:
         Returns for the varying pairs the deepest points, and by how much they are deeper than the slack; and step sizes (2, n).
         """
         count = len(task)
-        points = [task.scans[k].rows(own.points, task.deviations) for k, own in zip(self.varying, slots, strict=True)]
+        points = [fixed(task.scans[k]).rows(own.points, task.deviations) for k, own in zip(self.varying, slots, strict=True)]
         P_m, P_r, n_r = (np.concatenate([np.zeros((count, 0, 3)), *(each[i] for each in points)], axis=1) for i in range(3))
         filled = np.concatenate([np.zeros((count, 0)), *(own.filled for own in slots)], axis=1)
         answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled)
@@ -149,7 +149,7 @@ class LinearStep:
 
     def _deepest(self, task: Task, relative: np.ndarray) -> list[Deepest]:
         """Of varying pairs the deepest points that may carry, at X_RM (n, pair, 12)."""
-        return [task.scans[k].deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
+        return [fixed(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:

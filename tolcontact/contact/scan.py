@@ -131,6 +131,12 @@ class PairScan(Scan):
         return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
 
 
+def fixed(scan: Scan) -> PairScan:
+    """The scan of a pair that is not one of round faces."""
+    assert isinstance(scan, PairScan)
+    return scan
+
+
 class CompiledScan(PairScan):
     """A scan whose passes are compiled; PairScan is the same in NumPy."""
 

@@ -10,6 +10,7 @@ import numpy as np
 from tolcontact.vocabulary import SURFACE_KINDS
 
 ANALYTIC = SURFACE_KINDS
+SIZES = ("origin", "axis", "radius", "minor", "angle")
 METRE = 1e3  # [mm], the reader's unit
 ROUNDS = 4  # of Newton's method: as many as bring vertices off by micrometres to the last digit
 PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different ones
@@ -75,8 +76,8 @@ class Form:
 def form_arrays(of: Sequence[Form | None]) -> dict[str, np.ndarray]:
     """Surfaces as arrays (surface, ...) by name, as an archive has them; `kind` is the number in `ANALYTIC`, -1 of None."""
     known = [form or Form("plane", np.zeros(3), np.zeros(3)) for form in of]
-    numbers = {name: np.array([getattr(form, name) for form in known]) for name in ("origin", "axis", "radius", "minor", "angle")}
-    return {"kind": np.array([-1 if form is None else ANALYTIC.index(form.kind) for form in of]), **numbers}
+    kinds = np.array([-1 if form is None else ANALYTIC.index(form.kind) for form in of])
+    return {"kind": kinds} | {name: np.array([getattr(form, name) for form in known]) for name in SIZES}
 
 
 def forms_of(arrays: Mapping[str, np.ndarray]) -> list[Form | None]:

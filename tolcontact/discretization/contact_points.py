@@ -54,7 +54,9 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
             P_m = np.concatenate([P_m, overlap_corners(placed_own, target)])
     elif math.isfinite(finest):
         P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
-    P_m = placed_own.project(distinct(P_m, SAME * moving.mesh.scale))[0] if placed_own.forms else distinct(P_m, SAME * moving.mesh.scale)
+    P_m = distinct(P_m, SAME * moving.mesh.scale)
+    if placed_own.forms:
+        P_m, _, _ = placed_own.project(P_m)
     P_r, n_r, over = target.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)
     kept = over & (distance <= reach)

@@ -90,16 +90,25 @@ def facet_error(own: Surface, target: Surface, within: float) -> float:
     total = 0.0
     for face, other in ((own, target), (target, own)):
         total += max((form.residual for form in face.forms), default=0.0)
-        face = face.unknown
-        if not len(face.mesh.faces):
-            continue
-        corners, normals = np.asarray(face.mesh.triangles), face.corner_normals
-        along, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
-        height = np.abs((along * turn).sum(axis=2)).max(axis=1) / 8
-        _, nearest = other.nearest(face.mesh.triangles_center)
-        reach = np.linalg.norm(face.mesh.triangles_center - nearest, axis=1) - np.linalg.norm(along, axis=2).max(axis=1)
-        total += float(height.max(where=reach < within, initial=0.0))
+        rest = face.unknown
+        if len(rest.mesh.faces):
+            height, length = _chords(rest)
+            _, nearest = other.nearest(rest.mesh.triangles_center)
+            reach = np.linalg.norm(rest.mesh.triangles_center - nearest, axis=1) - length
+            total += float(height.max(where=reach < within, initial=0.0))
     return total
+
+
+def chord_height(face: Surface) -> float:
+    """How far [mm] the triangles of a face may lie off the round surface that they approximate."""
+    return float(_chords(face)[0].max(initial=0.0))
+
+
+def _chords(face: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Heights of the arcs over the longest edges of triangles (face,) [mm], and the lengths of those (face,) [mm]."""
+    corners, normals = np.asarray(face.mesh.triangles), face.corner_normals
+    along, turn = (np.roll(values, -1, axis=1) - values for values in (corners, normals))
+    return np.abs((along * turn).sum(axis=2)).max(axis=1) / 8, np.linalg.norm(along, axis=2).max(axis=1)
 
 
 def is_flat(surface: Surface) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
+from tolcontact.discretization.curvature import chord_height
 from tolcontact.discretization.surface import Surface
 
 PROBES = 2000  # points of a face at least, beside the corners of its triangles
@@ -42,9 +43,16 @@ class Side:
             depth[near] = self.face.depth(points[near])
             near = near[depth[near] > 0]
         if near.size and self._is_closed:
+            near = near[depth[near] > self._bulge]
+        if near.size and self._is_closed:
             turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[near]))
             depth[near[turns <= 0.5]] = 0
         return depth
+
+    @cached_property
+    def _bulge(self) -> float:
+        """How far [mm] known surfaces may stand out of the body's flat triangles."""
+        return max((chord_height(piece.surface) for piece in self.face.pieces), default=0.0)
 
     @cached_property
     def _plane(self) -> tuple[np.ndarray, float] | None:

@@ -55,7 +55,9 @@ def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[Form | None]
     return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES])
 
 
-def with_known_surfaces(vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[Form | None]) -> trimesh.Trimesh:
+def with_known_surfaces(
+    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[Form | None]
+) -> trimesh.Trimesh:
     """A mesh that knows them again."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.face_attributes[BREP] = brep

@@ -52,8 +52,8 @@ class ContactPoints:
     One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
     Their `offsets` are the locators' deviations. They have no faces; of a pair of faces `surface` is the reference face in
     its nominal place, and `own` the moving one.
-    `facets` [mm] is how far their triangles may lie off the round faces that they approximate. Where `round` says that a ball or
-    a shaft touches walls, gaps are not those of fixed points: they follow from it at any pose.
+    `facets` [mm] is how far their triangles may lie off the round faces that they approximate. Where `round` says
+    that a ball or a shaft touches walls, gaps are not those of fixed points: they follow from it at any pose.
     """
 
     name: str

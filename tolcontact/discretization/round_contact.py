@@ -1,4 +1,4 @@
-"""Whether two faces touch as round ones do: a ball, or a shaft, of one beside walls of the other. Nominal assembly frame, mm."""
+"""Whether two faces touch as round ones do: a ball, or a shaft, of one beside walls of the other. Assembly frame, mm."""
 
 import itertools
 import math

@@ -95,7 +95,9 @@ class RoundPoints:
     def of(cls, points: Sequence[RoundPoint]) -> "RoundPoints":
         """The arrays of some points."""
         own = [field.name for field in fields(RoundPoint) if field.name != "wall"]
-        return cls(form_arrays([point.wall for point in points]), {name: np.array([getattr(p, name) for p in points]) for name in own})
+        return cls(
+            form_arrays([point.wall for point in points]), {name: np.array([getattr(p, name) for p in points]) for name in own}
+        )
 
     def __iter__(self) -> Iterator[RoundPoint]:
         for k, wall in enumerate(forms_of(self.walls)):

@@ -173,7 +173,7 @@ class Surface:
         return np.where(at_rim, sideways, 0.0)
 
     def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far points stand beside their nearest ones, across the normal there (point,) [mm]; whether those are on the rim."""
+        """How far points stand beside their nearest ones, across normals there (point,) [mm]; whether those are on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
         for form, some, _ in self._stand_for(triangle):
             normal[some] = form.distance(nearest[some])[1]

@@ -55,7 +55,9 @@ def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _of_tangents(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Gap, slope (1, 12), second derivative (12, 12) and what that is less by the wall's closing in (12, 12), beside a plane, or of a shaft in a hollow cylinder."""
+    """Beside a plane, or of a shaft in a hollow cylinder: gap, slope (1, 12), second derivative (12, 12), and what is to be
+    subtracted from that because the wall closes in (12, 12).
+    """
     c, a = _in_wall_frame(point, X)
     o, w, r = ca.DM(point.wall.origin), point.wall.axis, float(point.radius)
     tilt = ca.SX(0)
@@ -70,21 +72,28 @@ def _of_tangents(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.S
     gap = float(point.wall.radius) - ca.dot(across, c - o) - r * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
     slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
     second, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
+    symbols = [e, t, delta]
     if point.wall.kind == "plane":
-        where = [-w, np.zeros(3), 0]
-        return (*ca.substitute([gap, slope, second], [e, t, delta], where), ca.SX.zeros(ENTRIES, ENTRIES))
-    there, is_free = _nearest_tangent(point, ca.Function("slide", [X, e, t], ca.substitute([slide, stiffness], [delta], [ca.SX(0)])), X, c - o)
-    least = max(abs(float(point.wall.radius) - r), CLOSE * r)
+        flat = _put([gap, slope, second], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
+        return flat[0], flat[1], flat[2], ca.SX.zeros(ENTRIES, ENTRIES)
+    turning = ca.Function("turning", [X, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
+    there, is_free = _nearest_tangent(point, turning, X, c - o)
+    least = max(abs(point.wall.radius - r), CLOSE * r)
     closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
-    where = [there, ca.cross(ca.DM(w), there), ca.SX(0)]
-    return tuple(ca.substitute([gap, slope, second, closing], [e, t, delta], where))  # type: ignore[return-value]
+    found = _put([gap, slope, second, closing], symbols, [there, ca.cross(ca.DM(w), there), ca.SX(0)])
+    return found[0], found[1], found[2], found[3]
 
 
-def _nearest_tangent(point: RoundPoint, slide: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _put(expressions: list[ca.SX], symbols: list[ca.SX], values: list[ca.SX]) -> list[ca.SX]:
+    """Expressions in which values stand for symbols."""
+    return list(ca.substitute(expressions, symbols, values))  # type: ignore[arg-type]
+
+
+def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if that is where the wall ends, else 1.
 
-    slide   Function of X_RM, e and t: first and second derivative of the gap as e turns towards t
-    q       (3, 1) from the wall's axis to the shaft's
+    turning  Function of X_RM, e and t: first and second derivative of the gap as e turns towards t
+    q        (3, 1) from the wall's axis to the shaft's
     """
     w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
     q = q - w * ca.dot(w, q) + ASIDE * x
@@ -92,7 +101,7 @@ def _nearest_tangent(point: RoundPoint, slide: ca.Function, X: ca.SX, q: ca.SX) 
     least = CLOSE * float(point.radius) * 1e-3
     for _ in range(ROUNDS):
         t = ca.cross(w, e)
-        first, second = slide(X, e, t)
+        first, second = turning(X, e, t)
         step = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
         e = e + step * t
         e, is_free = _within(point, e / ca.norm_2(e))

@@ -35,7 +35,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"]) -> Surfac
             continue
         X_RM = pose.relative(poses[:, pair.moving], poses[:, pair.reference])
         found.penetration[:, k] = faces.depth(X_RM)
-        if fixed:  # else contact points are those that stand over the face
+        if fixed and not pair.round:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
             row, point = np.nonzero(((places - pair.P_r) * pair.n_r).sum(axis=2) < TOUCHES)
             found.beside[:, k] = 0

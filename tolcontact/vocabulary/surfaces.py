@@ -15,7 +15,9 @@ def _of_form(word: str, dim: str, whose: str) -> dict[str, Variable]:
         "origin": Variable(
             f"{word}_point", (dim, AXIS), "f8", f"a point of {whose}, if it is a plane, or its centre; of a cone the apex", "mm"
         ),
-        "axis": Variable(f"{word}_axis", (dim, AXIS), "f8", f"unit normal or axis of {whose}; of a cone from the apex inward", "1"),
+        "axis": Variable(
+            f"{word}_axis", (dim, AXIS), "f8", f"unit normal or axis of {whose}; of a cone from the apex inward", "1"
+        ),
         "radius": Variable(f"{word}_radius", (dim,), "f8", f"radius of {whose}; of a torus that of the tube's middle", "mm"),
         "minor": Variable(f"{word}_tube_radius", (dim,), "f8", f"radius of the tube, if {whose} is a torus", "mm"),
         "angle": Variable(f"{word}_angle", (dim,), "f8", f"angle between axis and {whose}, if it is a cone", "rad"),
@@ -32,7 +34,9 @@ OF_WALL = _of_form("wall", ROUND_POINT, "the wall that a ball or shaft may touch
 OF_ROUND = {
     "is_hollow": Variable("wall_is_hollow", (ROUND_POINT,), "i1", "1 if the wall is around the ball or shaft", "1"),
     "towards": Variable("wall_middle", (ROUND_POINT, AXIS), "f8", "unit vector from a hollow wall's axis to its middle", "1"),
-    "opening": Variable("wall_opening", (ROUND_POINT,), "f8", "angle that a hollow wall reaches to either side; pi: whole", "rad"),
+    "opening": Variable(
+        "wall_opening", (ROUND_POINT,), "f8", "angle that a hollow wall reaches to either side; pi: whole", "rad"
+    ),
     "cut": Variable(
         "wall_end", (ROUND_POINT, AXIS), "f8", "unit normal of the plane in which the wall ends; 0: the shaft itself ends", "1"
     ),

@@ -14,7 +14,15 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.discretization.edges import rim
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import reader, screening
-from tolcontact.discretization.shape_files.product import BREP, SURFACES, STEP_ANGLE, STEP_CHORD, Product, check_numbers, product
+from tolcontact.discretization.shape_files.product import (
+    BREP,
+    STEP_ANGLE,
+    STEP_CHORD,
+    SURFACES,
+    Product,
+    check_numbers,
+    product,
+)
 from tolcontact.discretization.shape_files.step_text import StepText
 
 COARSER = (1, 30)  # times the usual chord, one after the other
