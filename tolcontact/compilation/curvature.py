@@ -20,7 +20,7 @@ def with_curvature(
     answer, and makes it convex again, or nearly: what is checked are the freedoms of each mover, not those of several together.
     """
     reactions = inputs["reactions"]
-    curvature = _of_lagrangian(setting, poses, rows.bends / goal.scale) - rows.bow / goal.scale - Q
+    curvature = _of_lagrangian(setting, poses, rows.bends / goal.scale) + (rows.wrap - rows.bow) / goal.scale - Q
     hold = (1 + 2 * ca.sum1(reactions) / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
     counts = ca.logic_and(inputs["newton"], _is_convex(Q + curvature))

@@ -1,5 +1,6 @@
 """A face of a STEP file's boundary representation, described. Lengths in mm."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import trimesh
 
 from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.readable import Readable
@@ -49,13 +51,24 @@ class FaceInFile(Readable):
         return ", ".join([*words, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
+def numbered(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[Form | None]]:
+    """The number of each triangle's face (face,), from 0, and the surfaces that are stated: of the B-rep faces of a STEP file.
+
+    Other meshes have smooth pieces instead, of which nothing is stated.
+    """
+    if BREP in mesh.face_attributes:
+        return np.asarray(mesh.face_attributes[BREP]).ravel(), mesh.metadata[SURFACES]
+    pieces = smooth_pieces(mesh, np.arange(len(mesh.faces)))
+    return pieces, [None] * (int(pieces.max(initial=-1)) + 1)
+
+
 def described(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
-    """The B-rep faces of a part that is from a STEP file. It keeps them: fitting surfaces takes time."""
+    """The faces of a part. It keeps them: fitting surfaces takes time."""
     if DESCRIBED not in mesh.metadata:
-        brep = np.asarray(mesh.face_attributes[BREP]).ravel()
-        order = np.argsort(brep, kind="stable")
-        groups = np.split(order, np.searchsorted(brep[order], np.arange(1, len(mesh.metadata[SURFACES]))))
-        surfaces = enumerate(zip(groups, mesh.metadata[SURFACES], strict=True), start=1)
+        number_of, stated = numbered(mesh)
+        order = np.argsort(number_of, kind="stable")
+        groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
+        surfaces = enumerate(zip(groups, stated, strict=True), start=1)
         mesh.metadata[DESCRIBED] = tuple(_described(mesh, number, own, form) for number, (own, form) in surfaces)
     return mesh.metadata[DESCRIBED]  # type: ignore[no-any-return]
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.vectors import Vector
-from tolcontact.discretization.brep_face import FaceInFile, described
+from tolcontact.discretization.brep_face import FaceInFile, described, numbered
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.known_forms import known_forms
 from tolcontact.discretization.shape_files import BREP, SURFACES
@@ -106,7 +106,7 @@ def _breps(face: Face, mesh: trimesh.Trimesh) -> np.ndarray:
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
-    brep = _breps(face, mesh)
+    number_of, _ = numbered(mesh)
     known = described(mesh)
     if isinstance(selection, Cylinder):
         radius, inner = selection.radius, selection.inner
@@ -122,7 +122,7 @@ def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -
     if not found:
         kinds = "; ".join(f"{each}" for each in known[:SHOWN]) + ("; ..." if len(known) > SHOWN else "")
         raise GeometryFault(f"face {face}: the part has no such face; its {len(known)} faces are: {kinds}")
-    return np.isin(brep, [each.number - 1 for each in found])
+    return np.isin(number_of, [each.number - 1 for each in found])
 
 
 def _is_along(face: FaceInFile, direction: Vector | None) -> bool:

@@ -5,9 +5,9 @@ import trimesh
 
 from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.brep_face import FIT
+from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES
-from tolcontact.discretization.surface import CREASE
 
 FACETS = 5  # directions of facets at least, from which a round surface is told from a fold
 SAME = 1e-9  # normals that differ by less are one direction
@@ -22,7 +22,7 @@ def known_forms(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[Form], 
     forms: list[Form] = []
     form_of = np.full(len(chosen), -1)
     brep = mesh.face_attributes.get(BREP)
-    group = _smooth(mesh, chosen) if brep is None else np.asarray(brep).ravel()[chosen]
+    group = smooth_pieces(mesh, chosen) if brep is None else np.asarray(brep).ravel()[chosen]
     for number in np.unique(group):
         own = np.flatnonzero(group == number)
         form = (None if brep is None else mesh.metadata[SURFACES][number]) or _fitted(mesh, chosen[own])
@@ -30,15 +30,6 @@ def known_forms(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[Form], 
             form_of[own] = len(forms)
             forms.append(form)
     return forms, form_of
-
-
-def _smooth(mesh: trimesh.Trimesh, chosen: np.ndarray) -> np.ndarray:
-    """The piece of each chosen triangle: across no edge of a piece do normals turn by more than across a crease."""
-    place = np.full(len(mesh.faces), -1)
-    place[chosen] = np.arange(len(chosen))
-    pairs = place[np.asarray(mesh.face_adjacency)].reshape(-1, 2)
-    smooth = (pairs >= 0).all(axis=1) & (np.cos(np.asarray(mesh.face_adjacency_angles)) > CREASE)
-    return np.asarray(trimesh.graph.connected_component_labels(pairs[smooth], node_count=len(chosen)))
 
 
 def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:

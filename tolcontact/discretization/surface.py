@@ -10,10 +10,9 @@ import trimesh
 from scipy.sparse import csr_array
 
 from tolcontact.discretization.analytic import Form
-from tolcontact.discretization.edges import on_rim, rim
+from tolcontact.discretization.edges import CREASE, on_rim, rim
 
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
-CREASE = np.cos(np.radians(30.0))  # facets that meet at a wider angle are two faces; else they approximate one curved face
 
 
 class Surface:
