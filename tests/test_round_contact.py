@@ -1,0 +1,195 @@
+"""Balls and shafts beside walls, against closed forms: exact per realization, at any tessellation, in any frame."""
+
+import casadi as ca
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tests import cases
+from tests.cases import round_contact as round_cases
+from tests.helpers import R_t, simulate
+from tolcontact.discretization import discretize
+from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.recomputed import RoundPoint, round_points
+from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+from tolcontact.vocabulary import CORRECTED, Status
+
+SEATED = tc.Method(objective="seating", resolution="exact")
+SOLVERS = ("daqp", "qpoases")
+
+
+def seated(make, solver="daqp", samples=60):
+    """The nominal pairs, and R (n, part, 3, 3), t (n, part, 3) of the corrected state; every realization is resolved."""
+    program, run = simulate(make, samples=samples, solver=solver, method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert all(pair.round for pair in program.nominal.pairs if not pair.is_supports)
+    return program, *R_t(run["poses"][:, CORRECTED])
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("sections", [24, 64])
+def test_a_shaft_in_a_v_rests_where_it_should(sections, solver):
+    program, run = simulate(cases.shaft_in_a_v(sections), samples=100, solver=solver, method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all() and len(program.nominal.pairs[0].P_m) == 2
+    heights = run["deviations"][:, program.nominal.locators.labels.index("left.H")]
+    heights = (heights + run["deviations"][:, program.nominal.locators.labels.index("right.H")]) / np.sqrt(2)
+    assert (
+        np.abs(run["measured"][:, CORRECTED, 0] - run["measured"][:, CORRECTED, 0].mean() - heights + heights.mean()).max()
+        < 1e-9
+    )
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_peg_lies_where_the_force_pushes_it(solver):
+    _, _, t = seated(cases.peg_in_a_hole(), solver)
+    apart = (t[:, 1] - t[:, 0])[:, :2]
+    assert np.abs(np.linalg.norm(apart, axis=1) - 0.05).max() < 1e-9
+    assert np.abs(apart @ [1, -2] / np.sqrt(5) - 0.05).max() < 1e-9
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("sections", [24, 96])
+def test_a_jammed_peg_tilts_as_far_as_its_rims_let_it(sections, solver):
+    _, R, _ = seated(round_cases.jammed_peg(sections=sections), solver)
+    axes = R @ [0, 0, 1.0]
+    angle = np.arcsin(np.linalg.norm(np.cross(axes[:, 0], axes[:, 1]), axis=1))
+    assert np.abs(angle - round_cases.jamming_angle()).max() * 15 < 1e-8  # mm at the peg's ends
+
+
+def test_a_short_peg_jams_on_its_own_rims():
+    """In a hole twice as long as the peg its own ends touch: (length / 2) sin + radius cos = radius + clearance."""
+    a = tc.Assembly("short")
+    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 20, sections=48)), fixed=True)
+    peg = a.part("peg", tc.Mesh(trimesh.creation.cylinder(5, 10, sections=36)), fixed=False)
+    a.locate(plate, round_cases.held(plate, [(20, 0, 0), (-20, 0, 0), (0, 20, 0), (0, 0, 0), (0, 0, 0), (20, 0, 0)], 0.2))
+    stops = cases.parked("Z1:5,0,0:z", "Z2:0,5,0:z", "X1:-5,0,0:x", "Y1:0,-5,0:y", "Y2:4,-3,0:y")
+    a.locate(peg, [tc.Locator("Z", (0, 0, 0), "z", 0), *stops])
+    for z, sign in ((4, 1.0), (-4, -1.0)):
+        a.force(f"at {z}", at=peg.point(0, 0, z), vector=(sign, 3 * sign, 0))
+    a.contact("fit", moving=plate.face(tc.Cylinder(radius=5.05)), reference=peg.face(tc.Cylinder(radius=5)))
+    a.measure("x", peg.point(0, 0, 0), along="x")
+    program, R, _ = seated(a)
+    assert (
+        not program.nominal.pairs[0].round.points["cut"].any() and not program.nominal.pairs[0].round.points["on_moving"].any()
+    )
+    axes = R @ [0, 0, 1.0]
+    angle = np.arcsin(np.linalg.norm(np.cross(axes[:, 0], axes[:, 1]), axis=1))
+    assert np.abs(5 * np.sin(angle) + 5 * np.cos(angle) - 5.05).max() < 1e-9
+
+
+def test_a_ball_rests_in_a_cone_and_on_three_pins():
+    _, R, t = seated(cases.ball_in_a_cone())
+    apex, axis = R[:, 0] @ [0, 0, -12.0] + t[:, 0], R[:, 0] @ [0, 0, 1.0]
+    centre = R[:, 1] @ [0, 0, 10 * np.sqrt(2) - 12] + t[:, 1]
+    assert np.abs(centre - apex - 10 * np.sqrt(2) * axis).max() < 1e-9
+    _, R, t = seated(round_cases.ball_on_three_pins())
+    centre = R[:, 3] @ [0, 0, np.sqrt(105.0)] + t[:, 3]
+    for k, turn in enumerate(2 * np.pi * np.arange(3) / 3):
+        place = R[:, k] @ [8 * np.cos(turn), 8 * np.sin(turn), 0] + t[:, k]
+        along = R[:, k] @ [-np.sin(turn), np.cos(turn), 0]
+        assert np.abs(np.linalg.norm(np.cross(centre - place, along), axis=1) - 13).max() < 1e-9
+
+
+def test_a_pin_in_a_slot_touches_an_edge_of_its_side():
+    """The distance of the axis from both edges of the side, as lines: the lesser is the pin's radius."""
+    _, R, t = seated(round_cases.cylinder_in_a_slot())
+    axis, edge = R[:, 2] @ [0, 0, 1.0], R[:, 0] @ [1.0, 0, 0]
+    across = np.cross(edge, axis)
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    apart = [np.abs(((t[:, 2] - R[:, 0] @ [0, 4.1, z] - t[:, 0]) * across).sum(axis=1)) for z in (-4, 4)]
+    assert np.abs(np.min(apart, axis=0) - 4).max() < 1e-9
+
+
+MAKES = {
+    "peg": cases.peg_in_a_hole, "V": cases.shaft_in_a_v, "cone": cases.ball_in_a_cone, "jammed": round_cases.jammed_peg,
+    "pins": round_cases.ball_on_three_pins, "slot": round_cases.cylinder_in_a_slot,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", MAKES)
+def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, tmp_path):
+    with tc.run(MAKES[name](), samples=40, method=SEATED, solver="daqp", out=tmp_path / "run.nc", keep="all") as results:
+        assert_resolved(results)
+        assert_gaps_recompute(results, within=1e-10)
+        assert_same_run(results, tc.run(tc.model_of(results), samples=40, method=SEATED, solver="daqp", keep="all"))
+        assert float(results["surface"].surface_penetration.max()) < 1e-7
+
+
+def test_linearized_steps_start_from_the_exact_gaps():
+    results = tc.run(cases.peg_in_a_hole(), samples=200, solver="daqp", method=tc.Method(objective="all points"))
+    assert_gaps_recompute(results)
+    assert_resolved(results)
+
+
+@pytest.mark.parametrize("name", MAKES)
+def test_gaps_of_round_faces_are_those_of_another_way_and_their_derivatives_theirs(name):
+    rng = np.random.default_rng(5)
+    for pair in discretize(MAKES[name]()).pairs:
+        if not pair.round:
+            continue
+        evaluate, count = round_gaps(pair.round), len(pair.round)
+        contact = {"point_of_round": np.arange(count)} | {
+            variable.name: values[name]
+            for of, values in ((tc.vocabulary.OF_WALL, pair.round.walls), (tc.vocabulary.OF_ROUND, pair.round.points))
+            for name, variable in of.items()
+        }
+        again: list[RoundPoint] = round_points(contact, np.arange(count))
+        for _ in range(3):
+            R, t = Rotation.from_rotvec(rng.normal(scale=3e-3, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
+            X, reactions = np.concatenate([R.ravel(), t]), rng.uniform(size=count)
+            gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, reactions))
+            assert np.abs(gaps.ravel() - [point.gaps(R, t) for point in again]).max() < 1e-11
+            for step, values, derivative in ((1e-6, 0, slopes), (1e-6, 1, bow - wrap)):
+                moved = [[evaluate(X + sign * step * e, reactions) for sign in (1, -1)] for e in np.eye(12)]
+                pairs = [[ca.DM(each[values]).full() for each in both] for both in moved]
+                rates = [(up - down) / (2 * step) for up, down in pairs]
+                found = np.hstack(rates) if values == 0 else np.column_stack([rate.T @ reactions for rate in rates])
+                assert np.abs(found - derivative).max() < 1e-5 * max(1, np.abs(derivative).max())
+            assert np.linalg.eigvalsh((wrap + wrap.T) / 2).min() > -1e-9 * max(1, np.abs(wrap).max())
+
+
+def turned(frame: cases.Frame) -> tc.Assembly:
+    """A peg in a hole, anywhere."""
+    a = tc.Assembly("turned")
+    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=48)), **frame.place(0, 0, 0), fixed=True)
+    peg = a.part("peg", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=48)), **frame.place(0, 0, 0))
+    places = [((20, 0, 0), "z"), ((-20, 0, 0), "z"), ((0, 20, 0), "z"), ((0, 0, 0), "x"), ((0, 0, 0), "y"), ((20, 0, 0), "y")]
+    a.locate(peg, [tc.Locator(f"L{k}", p, d, 0.3) for k, (p, d) in enumerate(places)])
+    a.contact("fit", moving=peg.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(radius=5.05)))
+    a.measure("along", peg.point(0, 0, 10), along=frame.along(1, 0, 0))
+    a.measure("across", peg.point(0, 0, 10), along=frame.along(0, 1, 0))
+    return a
+
+
+@pytest.mark.parametrize("resolution", ["linearized", "exact"])
+def test_where_the_assembly_stands_changes_nothing(resolution):
+    method = tc.Method(resolution=resolution, objective="all points")
+    _, here = simulate(turned(cases.STILL), samples=100, solver="daqp", method=method)
+    _, there = simulate(turned(cases.Frame((0.4, -1.1, 2.3), (500, -300, 800))), samples=100, solver="daqp", method=method)
+    assert np.abs(here["measured"] - there["measured"]).max() < 1e-8
+    assert (here["status"] == there["status"]).all()
+
+
+def test_what_is_not_a_ball_or_a_shaft_beside_a_wall_has_points():
+    def pair(pin, reference, **options):
+        a = tc.Assembly("not round")
+        plate = a.part("plate", reference, fixed=True)
+        moving = a.part("pin", tc.Mesh(pin))
+        a.locate(moving, round_cases.held(moving, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.1))
+        a.contact("fit", moving=moving.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(radius=5.05)), **options)
+        a.measure("x", moving.point(0, 0, 0), along="x")
+        (found,) = discretize(a).pairs
+        return found
+
+    hole = tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=48))
+    upright = trimesh.creation.cylinder(5, 20, sections=48)
+    assert pair(upright, hole).round
+    assert not pair(upright, hole, points=100).round and not pair(upright, hole, spacing=1.0).round
+    askew = upright.copy()
+    askew.apply_transform(trimesh.transformations.rotation_matrix(0.005, [1, 0, 0]))
+    assert not pair(askew, hole).round  # its axis is not that of the hole
+    half = upright.copy()
+    half.update_faces(half.triangles_center[:, 0] > 0)
+    assert not pair(half, hole).round  # it is not round on all sides
