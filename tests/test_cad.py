@@ -71,12 +71,22 @@ def test_surfaces_are_fitted_where_a_file_states_none():
         side = np.abs(mesh.face_normals[:, 2]) < 0.5 if radius == 7.5 else np.ones(len(mesh.faces), dtype=bool)
         used = np.unique(mesh.faces[side])
         vertices = mesh.vertices[used] @ R.T + [10.0, 20.0, -5.0] + rng.normal(scale=1e-6, size=(len(used), 3))
-        form = fitted(vertices, mesh.face_normals[side] @ R.T, 1e-4)
+        moved = np.zeros((len(mesh.vertices), 3))
+        moved[used] = vertices
+        form = fitted(moved[mesh.faces[side]], 1e-4)
         assert form.kind == ("cylinder" if radius == 7.5 else "sphere")
         assert form.radius == pytest.approx(radius, abs=2e-6) and 0 < form.residual < 1e-5
     box = trimesh.creation.box()
-    assert fitted(box.vertices, box.face_normals, 1e-4) is not None  # eight corners lie on a sphere: normals say nothing of it
-    assert fitted(rng.normal(size=(30, 3)), rng.normal(size=(30, 3)), 1e-4) is None
+    assert fitted(box.triangles, 1e-4) is not None  # eight corners lie on a sphere: that they turn sharply is not looked at
+    assert fitted(rng.normal(size=(30, 3, 3)), 1e-4) is None
+    # Two rings of vertices lie on a sphere, too; and a large face that is none of these is told from few of its triangles.
+    profile = np.array([[4, 0], [9, 3], [12, 3], [12, 0], [4, 0]], dtype=float)
+    funnel = trimesh.creation.revolve(profile, sections=90)
+    slope = (np.abs(funnel.face_normals[:, 2]) > 0.1) & (np.abs(funnel.face_normals[:, 2]) < 0.99)
+    form = fitted(funnel.triangles[slope], 1e-6)
+    assert form.kind == "cone" and form.angle == pytest.approx(np.arctan(5 / 3), abs=1e-9)
+    egg = trimesh.creation.icosphere(5, radius=10).apply_scale([1.001, 1, 1])
+    assert len(egg.faces) > 10_000 and fitted(egg.triangles, 1e-3) is None
 
 
 def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():

@@ -12,6 +12,7 @@ import numpy as np
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.doubt import Doubt
 from tolcontact.contact.linear_step import LinearStep
+from tolcontact.contact.scan import least_gaps
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -40,7 +41,10 @@ def search(
         size, scaled = step.take(left.task, left.state, stride=stride, caution=wary)
         now = energy_of(left.task, left.state)
         share = (energy - now) / np.maximum(scaled**2 / 2, 1e-300)  # of the gain that the QP foresaw
-        idle = (size > SHRINKS * before) & (share < 1 - SHRINKS)
+        scans = candidates.scans(left.state.relative, anew=True)
+        inside = -least_gaps(scans, left.state.relative, left.task.deviations).min(axis=1)
+        sinks = inside > np.maximum((1 - SHRINKS) * np.minimum(size, scaled), SETTLED)  # what it gains is what it lost before
+        idle = (size > SHRINKS * before) & (share < 1 - SHRINKS) | sinks
         wary = np.where(idle, np.maximum(CAUTION * wary, 1), np.where(share > SHRINKS, wary / CAUTION, wary))
         on = (size > SETTLED) & ~(idle & (scaled < UNWORTHY))
         lost = on & doubt.is_lost(left.task, left.state)
@@ -50,6 +54,6 @@ def search(
         wary, before, energy = wary[on], size[on], now[on]
         if not len(left):
             return
-        left.task = replace(left.task, scans=candidates.scans(left.state.relative, anew=True))
+        left.task = replace(left.task, scans=[scan.take(np.flatnonzero(on)) for scan in scans])
     left.state.residual[:] = np.maximum(left.state.residual, before)
     left.settle(np.ones(len(left), dtype=bool))

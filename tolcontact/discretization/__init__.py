@@ -34,7 +34,8 @@ A `tc.ContactWarning` states the error in mm if your points, or the triangles of
 >>> import trimesh, warnings
 >>> ball = tc.Assembly("ball")
 >>> floor = ball.part("floor", tc.Box(40, 40, 5), at=(-20, -20, -5), fixed=True)
->>> sphere = ball.part("sphere", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=10)), at=(0, 0, 10))
+>>> egg = trimesh.creation.icosphere(subdivisions=4, radius=10).apply_scale([1.2, 1, 1])
+>>> sphere = ball.part("egg", tc.Mesh(egg), at=(0, 0, 10))
 >>> feet = [tc.Locator("A1", (-5, -5, 0), "z"), tc.Locator("A2", (5, -5, 0), "z"), tc.Locator("A3", (0, 5, 0), "z")]
 >>> sides = [tc.Locator("B1", (-5, 0, 0), "y"), tc.Locator("B2", (5, 0, 0), "y"), tc.Locator("C1", (0, 0, 0), "x")]
 >>> location = ball.locate(sphere, feet + sides, tolerance=1)
@@ -43,7 +44,7 @@ A `tc.ContactWarning` states the error in mm if your points, or the triangles of
 >>> with warnings.catch_warnings(record=True) as caught:
 ...     program = tc.build(ball)
 >>> print(caught[0].message)
-contact pair "foot" (...): parts may be off by up to 0.0089 mm between flat triangles and the round faces ...
+contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
 A `tc.UnitsWarning` names a mesh whose size is implausible in mm, by itself (below 1 mm, above 10 m) or beside a part that it
 touches, if nobody stated its units; and a mesh from which locators, measures or forces lie farther away than it is large.
@@ -56,7 +57,34 @@ states its own, a GLB file is in m, `mesh.units` of a Trimesh applies if it is s
 Meshes may be open, or hold several bodies. A surface whose outside is undefined is rejected: neighbouring triangles oriented
 inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles,
 and reach 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles; triangles that
-meet at more than 30 degrees form an edge. Curved faces are as round as their triangles.
+meet at more than 30 degrees form an edge.
+
+## Round faces
+
+A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus, and where a cylinder, cone or sphere
+can be fitted to the vertices of a smooth piece of a mesh (at least five facets) so that none is farther off than 1 um. Contact
+points, their feet and normals then lie on that surface, not on its triangles. Other curved faces are as round as their triangles.
+
+If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
+beside a plane, cylinder, cone, sphere or torus. A shaft (an outer cylinder) is the two ends of its axis in a hole (an inner
+cylinder) parallel to it, or along a plane. What touches is found at every pose, tilted ones too: a pin jams in its hole by the
+right angle, whatever the tessellation. `tolcontact check` says which pairs these are; `points=` or `spacing=` overrule it.
+
+>>> stand = tc.Assembly("pin in a hole")
+>>> plate = stand.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=24)), fixed=True)
+>>> pin = stand.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=24)))
+>>> ends = [tc.Locator(f"A{k}", (x, y, 0), "z", 0) for k, (x, y) in enumerate([(5, 0), (-5, 0), (0, 5)])]
+>>> ends += [tc.Locator("B1", (0, 0, 0), "y"), tc.Locator("B2", (5, 0, 0), "y"), tc.Locator("C", (0, 0, 0), "x")]
+>>> location = stand.locate(pin, ends, tolerance=0.3)
+>>> fit = stand.contact("fit", moving=pin.face(tc.Cylinder()), reference=plate.face(tc.Cylinder(inner=True, radius=5.05)))
+>>> aside = stand.measure("aside", pin.point(0, 0, 0), along="x")
+>>> print(tc.build(stand))
+program of pin in a hole: ...
+  contact fit: 12 contact points of round faces, exact at any pose
+...
+
+The faces are taken to be as long as they are in the nominal assembly: a shaft that is pushed out of its hole, or a ball beyond
+the end of its wall, is not noticed at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).
 
 ## STEP files
 
