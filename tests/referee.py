@@ -10,6 +10,8 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
+from studies.certificates.judge import round_points
+
 
 def cross(v):
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
@@ -99,7 +101,12 @@ def _polished(A, b, y, multipliers, slacks):
 
 
 def gaps(pair, R, t):
-    """True gaps (point,) by paper (2) to (5), with R (part, 3, 3), t (part, 3)."""
+    """True gaps (point,) by paper (2) to (5), with R (part, 3, 3), t (part, 3); of round faces those of any pose."""
+    if pair.round:
+        turn = R[pair.reference].T
+        return np.array(
+            [p.gaps(turn @ R[pair.moving], turn @ (t[pair.moving] - t[pair.reference])) for p in round_points(pair)]
+        )
     x_m = pair.P_m @ R[pair.moving].T + t[pair.moving]
     x_r = pair.P_r @ R[pair.reference].T + t[pair.reference]
     n = pair.n_r @ R[pair.reference].T

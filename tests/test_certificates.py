@@ -130,44 +130,13 @@ def told(make, **options):
     return program, run, [str(one.message) for one in caught if one.category is ContactWarning]
 
 
-@pytest.mark.slow
-def test_a_shaft_in_a_v_rests_where_it_should():
-    """Default points: bias below a thousandth of the tolerance range, or a warning that names the error."""
-    program, run, _ = told(cases.shaft_in_a_v(1000), samples=100, solver="daqp", method=SEATED)
-    assert (run["status"] == Status.RESOLVED).all()
-    assert np.abs(errors_of_the_v(program, run)).max() < 1e-3 * 0.12
-    program, run, warned = told(cases.shaft_in_a_v(64), samples=100, solver="daqp", method=SEATED)
-    assert np.abs(errors_of_the_v(program, run)).max() < 0.02
-    assert len(warned) == 2 and "0.012 mm between flat triangles" in warned[0] and 'contact pair "left wall"' in warned[0]
+def test_a_shaft_on_sampled_points_is_off_and_a_warning_says_by_how_much():
+    """Of round faces that were overruled by a number of points."""
     program, run, warned = told(cases.shaft_in_a_v(1000, points=200), samples=100, solver="daqp", method=SEATED)
     assert np.abs(errors_of_the_v(program, run)).max() > 0.01
-    assert len(warned) == 2 and "between its contact points" in warned[0]
-
-
-@pytest.mark.slow
-def test_a_peg_that_can_spin_lies_at_the_side_of_its_hole():
-    """Planes at fixed points let it roll into the wall: such answers are tried again with points projected anew."""
-    _, run, _ = told(cases.peg_in_a_hole(), samples=8, solver="daqp", method=SEATED)
-    resolved = run["status"] == Status.RESOLVED
-    assert resolved.sum() >= 6 and np.isin(run["status"][~resolved], [Status.NOT_CONVERGED, Status.DOUBTFUL]).all()
-    _, t = R_t(run["poses"][:, CORRECTED])
-    apart = (t[:, 1] - t[:, 0])[resolved, :2]
-    assert np.abs(np.linalg.norm(apart, axis=1) - 0.05).max() < 1e-3 * 0.2
-    assert np.abs(apart @ [1, -2] / np.sqrt(5) - 0.05).max() < 1e-3 * 0.2
-    assert run["searched"][resolved].all()
-
-
-@pytest.mark.slow
-def test_a_ball_rests_in_a_cone():
-    _, run, _ = told(cases.ball_in_a_cone(), samples=6, solver="daqp", method=SEATED)
-    resolved = run["status"] == Status.RESOLVED
-    assert resolved.sum() >= 5
-    R, t = R_t(run["poses"][resolved, CORRECTED])
-    apex, axis = R[:, 0] @ [0, 0, -12.0] + t[:, 0], R[:, 0] @ [0, 0, 1.0]
-    centre = R[:, 1] @ [0, 0, 10 * np.sqrt(2) - 12] + t[:, 1]
-    height = ((centre - apex) * axis).sum(axis=1)
-    assert np.abs(height - 10 * np.sqrt(2)).max() < 1e-3 * 0.2
-    assert np.linalg.norm(centre - apex - height[:, None] * axis, axis=1).max() < 1e-3  # on the cone's axis
+    assert len(warned) == 2 and "between its contact points" in warned[0] and 'contact pair "left wall"' in warned[0]
+    program, run, warned = told(cases.shaft_in_a_v(64), samples=100, solver="daqp", method=SEATED)
+    assert np.abs(errors_of_the_v(program, run)).max() < 1e-9 and not warned
 
 
 @pytest.mark.slow

@@ -72,7 +72,7 @@ EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": 
 def test_few_rows_give_what_all_rows_give(make, resolution, monkeypatch):
     """Curved contact and several bodies included: the same QPs, once with the rows that are found, once with every row."""
     few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
-    monkeypatch.setattr(contact_qp, "standing_points", lambda gaps, method: np.arange(gaps.coordinates.shape[1]))
+    monkeypatch.setattr(contact_qp, "standing_points", lambda pair, gaps, method: np.arange(len(pair.P_m)))
     every = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
     assert any(len(g.program.standing[0]) > 4 for g in every.groups)
     blocks = [next(simulate_blocks(program, samples=40, seed=8)) for program in (few, every)]

@@ -1,6 +1,6 @@
 """Simulate random assemblies with two solvers, and look for a certified realization that anything else contradicts.
 
-What is looked at is computed from poses and deviations alone, by formulae that share no code with the package.
+What is looked at is computed from poses and deviations alone, by formulae that share no code with the simulation.
 """
 
 import argparse
@@ -16,6 +16,8 @@ import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.discretization.curvature import chord_height
+from tolcontact.recomputed import RoundPoint
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -48,6 +50,10 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
             x_r = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.P_r) + t[:, None, CORRECTED, pair.reference]
             n = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.n_r)
         gap = ((x_m - x_r) * n).sum(axis=2)
+        if pair.round:
+            turn = R[:, CORRECTED, pair.reference].swapaxes(1, 2)
+            apart = np.einsum("nij,nj->ni", turn, t[:, CORRECTED, pair.moving] - t[:, CORRECTED, pair.reference])
+            gap = np.stack([point.gaps(turn @ R[:, CORRECTED, pair.moving], apart) for point in round_points(pair)], axis=1)
         if pair.is_supports:
             gap = gap - run["deviations"][:, pair.offsets.columns]
         here = certified & ~run["searched"].astype(bool)
@@ -67,11 +73,22 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
                     limit = (
                         0.01 * nominal.assembly.finest()
                         + pair.facets
+                        + chord_height(pair.own)
+                        + chord_height(pair.surface)
                         + 1e-6 * size
                         + shifted(R[row, CORRECTED], t[row, CORRECTED], pair)
                     )
                     found["penetration of surfaces"] += int(inside > limit)
     return found
+
+
+def round_points(pair: ContactPoints) -> list[RoundPoint]:
+    """The contact points of round faces, of which gaps are computed another way than the simulation does it."""
+    walls, points = pair.round.walls, pair.round.points
+    return [
+        RoundPoint(*({name: values[k] for name, values in of.items()} for of in (walls, points)))
+        for k in range(len(pair.round))
+    ]
 
 
 def shifted(R: np.ndarray, t: np.ndarray, pair: ContactPoints) -> float:

@@ -63,7 +63,7 @@ meet at more than 30 degrees form an edge.
 
 A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus, and where a cylinder, cone or sphere
 can be fitted to the vertices of a smooth piece of a mesh (at least five facets) so that none is farther off than 1 um. Contact
-points, their feet and normals then lie on that surface, not on its triangles. Other curved faces are as round as their triangles.
+points, their feet and normals then lie on that surface, not on its triangles. Other curved faces are as round as theirs.
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
 beside a plane, cylinder, cone, sphere or torus. A shaft (an outer cylinder) is the two ends of its axis in a hole (an inner

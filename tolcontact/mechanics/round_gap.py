@@ -124,40 +124,40 @@ def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """The same of a ball beside a curved wall."""
     c, _ = _in_wall_frame(point, X)
     side = -1.0 if point.is_hollow else 1.0
-    distance, normal, curvature = _distance(point, c)
+    distance, normal, around, rest = _distance(point, c)
     n = ca.SX.sym("n", 3)
     along, J = ca.dot(n, c), ca.jacobian(c, X)
     slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
-    around, nothing = J.T @ curvature @ J, ca.SX.zeros(ENTRIES, ENTRIES)
-    bend, closing = (bend, around) if point.is_hollow else (bend + around, nothing)
+    bend += side * J.T @ (rest if point.is_hollow else around + rest) @ J
+    closing = J.T @ around @ J if point.is_hollow else ca.SX.zeros(ENTRIES, ENTRIES)
     return side * distance - float(point.radius), slope, bend, closing
 
 
-def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
 
-    Positive outside; see Form.distance.
+    Positive outside; see Form.distance. The second derivative is in two parts, of which the first is positive semidefinite.
     """
     kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
-    R, r, one = float(point.wall.radius), float(point.radius), ca.SX.eye(3)
+    R, r, one, nothing = float(point.wall.radius), float(point.radius), ca.SX.eye(3), ca.SX.zeros(3, 3)
     p = c - ca.DM(point.wall.origin)
     least = max(abs(R - r), CLOSE * r)
     if kind == "sphere":
         length, n = _direction(p + ASIDE * x)
-        return length - R, n, (one - n @ n.T) / ca.fmax(length, least)
+        return length - R, n, (one - n @ n.T) / ca.fmax(length, least), nothing
     along = ca.dot(w, p)
     length, outward = _direction(p - w * along + ASIDE * x)
     round_ = ca.cross(w, outward)
     if kind == "cylinder":
-        return length - R, outward, round_ @ round_.T / ca.fmax(length, least)
+        return length - R, outward, round_ @ round_.T / ca.fmax(length, least), nothing
     if kind == "cone":
         cos, sin = np.cos(point.wall.angle), np.sin(point.wall.angle)
         n = cos * outward - sin * w
-        return length * cos - along * sin, n, cos * round_ @ round_.T / ca.fmax(length, CLOSE * r)
+        return length * cos - along * sin, n, cos * round_ @ round_.T / ca.fmax(length, CLOSE * r), nothing
     tube, n = _direction((length - R) * outward + along * w)
     across = ca.cross(round_, n)
     turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
-    return tube - float(point.wall.minor), n, across @ across.T / ca.fmax(tube, CLOSE * r) + turning * round_ @ round_.T
+    return tube - float(point.wall.minor), n, across @ across.T / ca.fmax(tube, CLOSE * r), turning * round_ @ round_.T
 
 
 def _direction(vector: ca.SX) -> tuple[ca.SX, ca.SX]:
