@@ -10,6 +10,8 @@ from tolcontact.discretization.analytic import Form
 LEAST = 1e-4  # rad: a cone's angle to its axis, and to the plane across it
 SOME = 300  # triangles that are looked at first, and
 ROUGHLY = 10  # how much farther off their corners may be
+SURE = 0.1  # of how far vertices lie off a surface: how far its radius may be off
+DIGITS = 12  # of a radius behind the point
 LARGE = 1e4  # radii, in sizes of what they are fitted to: more is a plane's rounding
 
 
@@ -118,4 +120,11 @@ def _circle(points: np.ndarray) -> tuple[float, float, float]:
 
 
 def _with_residual(form: Form, vertices: np.ndarray) -> Form:
+    """The form, with how far the vertices lie off it; its radius is a round number if they cannot tell."""
+    residual = float(np.abs(form.distance(vertices)[0]).max())
+    for digits in range(DIGITS):
+        radius = round(form.radius, digits)
+        if abs(radius - form.radius) <= SURE * residual:
+            form = replace(form, radius=radius)
+            break
     return replace(form, residual=float(np.abs(form.distance(vertices)[0]).max()))

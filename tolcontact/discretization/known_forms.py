@@ -10,6 +10,7 @@ from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES
 
 FACETS = 5  # directions of facets at least, from which a round surface is told from a fold
+ALIKE = 10  # times as far as they were fitted may faces be off each other's surface that are taken for one
 SAME = 1e-9  # normals that differ by less are one direction
 
 
@@ -26,10 +27,27 @@ def known_forms(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[Form], 
     for number in np.unique(group):
         own = np.flatnonzero(group == number)
         form = (None if brep is None else mesh.metadata[SURFACES][number]) or _fitted(mesh, chosen[own])
-        if form is not None:
+        if form is None:
+            continue
+        for k, known in enumerate(forms):  # round faces come in halves
+            one = _one(mesh, known, form, chosen[form_of == k], chosen[own])
+            if one is not None:
+                forms[k], form_of[own] = one, k
+                break
+        else:
             form_of[own] = len(forms)
             forms.append(form)
     return forms, form_of
+
+
+def _one(mesh: trimesh.Trimesh, known: Form, form: Form, faces: np.ndarray, own: np.ndarray) -> Form | None:
+    """The surface that two faces are parts of, the triangles (face,) of each; None if they are not parts of one."""
+    if known.kind != form.kind or (known.residual == 0) != (form.residual == 0):
+        return None
+    off = np.abs(known.distance(np.asarray(mesh.vertices)[np.unique(mesh.faces[own])])[0]).max()
+    if off > ALIKE * (known.residual + form.residual) + SAME * mesh.scale:
+        return None
+    return known if known.residual == 0 else _fitted(mesh, np.concatenate([faces, own]))
 
 
 def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:

@@ -96,15 +96,16 @@ def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX
     q        (3, 1) from the wall's axis to the shaft's
     """
     w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
-    q = q - w * ca.dot(w, q) + ASIDE * x
-    e, is_free = _within(point, q / ca.norm_2(q))
+    _, e = _direction(_across(w, q) + ASIDE * x)
+    _, e = _direction(_across(w, e))  # what rounding left along the axis counts if a shaft is hardly off it
+    e, is_free = _within(point, e)
     least = CLOSE * float(point.radius) * 1e-3
     for _ in range(ROUNDS):
         t = ca.cross(w, e)
         first, second = turning(X, e, t)
         step = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
-        e = e + step * t
-        e, is_free = _within(point, e / ca.norm_2(e))
+        _, e = _direction(e + step * t)
+        e, is_free = _within(point, e)
     return e, is_free
 
 
@@ -146,7 +147,8 @@ def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
         length, n = _direction(p + ASIDE * x)
         return length - R, n, (one - n @ n.T) / ca.fmax(length, least), nothing
     along = ca.dot(w, p)
-    length, outward = _direction(p - w * along + ASIDE * x)
+    length, outward = _direction(_across(w, p) + ASIDE * x)
+    _, outward = _direction(_across(w, outward))
     round_ = ca.cross(w, outward)
     if kind == "cylinder":
         return length - R, outward, round_ @ round_.T / ca.fmax(length, least), nothing
@@ -158,6 +160,11 @@ def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     across = ca.cross(round_, n)
     turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
     return tube - float(point.wall.minor), n, across @ across.T / ca.fmax(tube, CLOSE * r), turning * round_ @ round_.T
+
+
+def _across(w: ca.DM, vector: ca.SX) -> ca.SX:
+    """What of a vector (3, 1) is across the unit vector w."""
+    return vector - w * ca.dot(w, vector)
 
 
 def _direction(vector: ca.SX) -> tuple[ca.SX, ca.SX]:
