@@ -1,6 +1,8 @@
 """Balls and shafts beside walls, against closed forms: exact per realization, at any tessellation, in any frame."""
 
-import casadi as ca
+import itertools
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -10,14 +12,18 @@ import tolcontact as tc
 from tests import cases
 from tests.cases import round_contact as round_cases
 from tests.helpers import R_t, simulate
-from tolcontact.discretization import discretize
+from tolcontact import vocabulary as words
+from tolcontact.discretization import RoundPoint, RoundPoints, discretize
+from tolcontact.discretization.analytic import ANALYTIC, Form
+from tolcontact.discretization.round_points import NONE
 from tolcontact.mechanics.round_gap import round_gaps
-from tolcontact.recomputed import RoundPoint, round_points
+from tolcontact.recomputed import round_points
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 from tolcontact.vocabulary import CORRECTED, Status
 
 SEATED = tc.Method(objective="seating", resolution="exact")
 SOLVERS = ("daqp", "qpoases")
+AS1 = Path(__file__).resolve().parents[1] / "studies" / "cad" / "as1-oc-214.stp"
 
 
 def seated(make, solver="daqp", samples=60):
@@ -123,31 +129,93 @@ def test_linearized_steps_start_from_the_exact_gaps():
     assert_resolved(results)
 
 
+def check_gaps(points, rng, turn):
+    """Gaps computed another way, and their derivatives by differences, at some poses."""
+    evaluate, count = round_gaps(points), len(points)
+    contact = {"point_of_round": np.arange(count)} | {
+        variable.name: values[name]
+        for of, values in ((words.OF_WALL, points.walls), (words.OF_ROUND, points.points))
+        for name, variable in of.items()
+    }
+    again = round_points(contact, np.arange(count))
+    step = 1e-6
+    for _ in range(3):
+        R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
+        X, reactions = np.concatenate([R.ravel(), t]), rng.uniform(size=count)
+        gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, reactions))
+        assert np.abs(gaps.ravel() - [point.gaps(R, t) for point in again]).max() < 1e-11
+        moved = [[[part.full() for part in evaluate(X + sign * step * e, reactions)] for sign in (1, -1)] for e in np.eye(12)]
+        rates = np.hstack([(up[0] - down[0]) / (2 * step) for up, down in moved])
+        bends = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
+        assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
+        assert np.abs(bends - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
+        assert np.linalg.eigvalsh(wrap).min() > -1e-9 * max(1, np.abs(wrap).max())
+
+
 @pytest.mark.parametrize("name", MAKES)
 def test_gaps_of_round_faces_are_those_of_another_way_and_their_derivatives_theirs(name):
     rng = np.random.default_rng(5)
     for pair in discretize(MAKES[name]()).pairs:
-        if not pair.round:
+        if pair.round:
+            check_gaps(pair.round, rng, turn=3e-3)
+
+
+def unit(rng):
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def test_a_ball_beside_walls_of_every_kind():
+    """Gaps another way, and derivatives by differences; of hollow walls from as far away as a ball that touches them is."""
+    rng, points = np.random.default_rng(3), []
+    for kind, is_hollow, on_moving in itertools.product(ANALYTIC, (False, True), (False, True)):
+        if kind == "plane" and is_hollow:
             continue
-        evaluate, count = round_gaps(pair.round), len(pair.round)
-        contact = {"point_of_round": np.arange(count)} | {
-            variable.name: values[name]
-            for of, values in ((tc.vocabulary.OF_WALL, pair.round.walls), (tc.vocabulary.OF_ROUND, pair.round.points))
-            for name, variable in of.items()
-        }
-        again: list[RoundPoint] = round_points(contact, np.arange(count))
-        for _ in range(3):
-            R, t = Rotation.from_rotvec(rng.normal(scale=3e-3, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
-            X, reactions = np.concatenate([R.ravel(), t]), rng.uniform(size=count)
-            gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, reactions))
-            assert np.abs(gaps.ravel() - [point.gaps(R, t) for point in again]).max() < 1e-11
-            for step, values, derivative in ((1e-6, 0, slopes), (1e-6, 1, bow - wrap)):
-                moved = [[evaluate(X + sign * step * e, reactions) for sign in (1, -1)] for e in np.eye(12)]
-                pairs = [[ca.DM(each[values]).full() for each in both] for both in moved]
-                rates = [(up - down) / (2 * step) for up, down in pairs]
-                found = np.hstack(rates) if values == 0 else np.column_stack([rate.T @ reactions for rate in rates])
-                assert np.abs(found - derivative).max() < 1e-5 * max(1, np.abs(derivative).max())
-            assert np.linalg.eigvalsh((wrap + wrap.T) / 2).min() > -1e-9 * max(1, np.abs(wrap).max())
+        w = unit(rng)
+        x = np.cross(w, unit(rng))
+        x /= np.linalg.norm(x)
+        sizes = {"cone": {"angle": 0.6}, "plane": {}, "torus": {"radius": 20.0, "minor": 5.0}}.get(kind, {"radius": 20.0})
+        wall = Form(kind, rng.normal(size=3), w, **sizes)
+        beside = 30 * x + 3 * w if not is_hollow else 6 * x + 20 * w if kind == "cone" else 19 * x + 3 * w
+        points.append(RoundPoint(wall, is_hollow, wall.origin + beside, NONE, NONE, 2.0, on_moving, x, np.pi))
+    check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+
+
+def test_a_ball_in_a_socket_lies_where_its_weight_points_to():
+    """A quarter of a ball's surface, hollow: the centre is off the socket's by the clearance, along the force."""
+    a = tc.Assembly("socket")
+    cup = trimesh.creation.icosphere(4, radius=10.2)
+    cup.update_faces(cup.triangles_center[:, 2] < -3)
+    cup.invert()
+    socket = a.part("socket", tc.Mesh(cup), fixed=True)
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(3, radius=10)), fixed=False)
+    a.locate(socket, round_cases.held(socket, [(9, 0, -9), (-9, 0, -9), (0, 9, -9), (0, 0, -9), (0, 0, -9), (9, 0, -9)], 0.3))
+    a.locate(
+        ball, cases.parked("Z1:5,0,-8:z", "Z2:-5,0,-8:z", "Z3:0,5,-8:z", "X:-10,0,0:x", "Y1:0,-10,0:y", "Y2:3,-9,0:y", away=1)
+    )
+    a.force("weight", at=ball.point(0, 0, 0), vector=(2, 1, -5))
+    a.contact("fit", moving=ball.face(), reference=socket.face())
+    a.measure("height", ball.point(0, 0, 0), along="z")
+    _, _, t = seated(a)
+    apart = t[:, 1] - t[:, 0]
+    assert np.abs(np.linalg.norm(apart, axis=1) - 0.2).max() < 1e-9
+    # A thousandth of the forces is a spring to where the ball was set down.
+    assert np.abs(apart - 0.2 * np.array([2, 1, -5]) / np.sqrt(30)).max() < 1e-4
+
+
+def test_a_bolt_finds_the_hole_of_its_own_size_in_a_file_from_others():
+    """Both of radius 5, in halves that are fitted to vertices: nothing is left but the hole's axis."""
+    a = tc.Assembly("bolt", method=tc.Method(resolution="exact", objective="all points"))
+    plate = tc.parts_from(a, AS1, ["plate_1"], fixed=True)["plate_1"]
+    bolt = tc.parts_from(a, AS1, ["bolt_1"])["bolt_1"]
+    a.locate(bolt, round_cases.held(bolt, [(5, 0, 0), (-5, 0, 0), (0, 5, 0), (0, 0, 0), (0, 0, 0), (5, 0, 0)], 0.2))
+    hole = plate.face(tc.Cylinder(radius=5, inner=True), tc.Inside((15, 65, -1), (35, 85, 25)))
+    a.contact("hole", moving=bolt.face(tc.Cylinder(radius=5)), reference=hole)
+    a.measure("x", bolt.point(0, 0, 0), along="x")
+    with tc.run(a, samples=200, seed=1, solver="daqp") as results:
+        assert_resolved(results)
+        assert float(results.gap_min.sel(state="corrected").min()) > -1e-9
+        assert np.abs(results.measured.sel(state="corrected")).max() < 1e-5
 
 
 def turned(frame: cases.Frame) -> tc.Assembly:

@@ -34,9 +34,9 @@ answer is kept; `starts` counts them.
 Contact points are projected once, in the nominal state. `tc.Method(resolution="exact", search="iterated")` projects them again
 at the corrected pose until they no longer move. It matters if curved surfaces slide along each other: for two rollers of
 radius 10, one set down 3 mm beside the top of the other, the axes end 20 mm apart as they must (to 0.002 mm of the mesh), and
-up to 0.5 mm too far with fixed points. If fixed points let a round part sink into its counterpart (a peg that spins, a ball
-that rolls), the exact resolution notices and searches again for these realizations, which then take some 0.2 s each; the
-archive's `searched` marks them.
+up to 0.5 mm too far with fixed points. If fixed points let a round part sink into its counterpart (a roller that spins), the
+exact resolution notices and searches again for these realizations, which then take some 0.2 s each; the archive's `searched`
+marks them. Balls and shafts beside walls need none of this: what touches is found at every pose (`tolcontact.discretization`).
 
 ## Statuses
 
@@ -78,6 +78,8 @@ True
   missing, or far.
 - Contact points are those of the nominal state. If rims of faces shift against each other *and* tilt, their edges may lie
   deeper than the points, by about shift times tilt; `surfaces` measures it.
+- A ball or shaft has the wall that it has nominally: where a hole or a groove ends is not looked for again as it moves along.
+  A hole whose rim is not square to its axis, a shaft across another one, and two shafts side by side have points.
 - "linearized" neglects second-order rotation. Rows that contradict each other (a tab wider than its slot) end as
   `not_converged`, as does a step that fails; only "exact" tells the two apart.
 - `not_assemblable` means that no pose without penetration was found near the raw one, not that none exists.

@@ -68,7 +68,8 @@ have more than six locators, of which at most six are two-sided. `stiffness` (N/
 `contact(name, moving=..., reference=...)` keeps points of the `moving` face outside the `reference` face. The points are 200
 spread evenly, and more where the rims of flat faces cross or faces are curved; `points=` sets their number, `spacing=` their
 distance, and `points="vertices"` takes the vertices of the mesh. A point takes part if the reference face lies within
-`within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part).
+`within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part). A ball or a shaft beside
+walls needs no sampled points (see Round faces in `tolcontact.discretization`), unless you ask for some.
 
 >>> pair = clamp.contact("seat", moving=plate.face("-z"), reference=base.face("+z"), spacing=5)
 >>> print(pair)

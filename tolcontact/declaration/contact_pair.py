@@ -16,7 +16,8 @@ class ContactPair(Readable):
 
     The points are `points` of them spread evenly, or as many as keep every spot of the face within `spacing` [mm] of
     one, or the mesh's own vertices (`points="vertices"`). By default they are 200 spread evenly, with the
-    corners of the region where flat faces overlap, and on curved faces as many more as curvature requires.
+    corners of the region where flat faces overlap, and on curved faces as many more as curvature requires; a ball or a shaft
+    beside walls touches exactly, with none of them.
     A point takes part when the reference face lies within `within` [mm] of it in the nominal assembly (None: a tenth of
     the moving part's diagonal).
     """
