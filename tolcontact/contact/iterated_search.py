@@ -12,7 +12,7 @@ import numpy as np
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.doubt import Doubt
 from tolcontact.contact.linear_step import LinearStep
-from tolcontact.contact.scan import least_gaps
+from tolcontact.contact.scan import least_gaps, undone
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -42,7 +42,10 @@ def search(
         now = energy_of(left.task, left.state)
         share = (energy - now) / np.maximum(scaled**2 / 2, 1e-300)  # of the gain that the QP foresaw
         scans = candidates.scans(left.state.relative, anew=True)
-        inside = -least_gaps(scans, left.state.relative, left.task.deviations).min(axis=1)
+        least = least_gaps(scans, left.state.relative, left.task.deviations)
+        inside = undone(scans, least, left.state.relative, left.task.deviations, left.task.may_carry, left.state.slack).max(
+            axis=1
+        )
         sinks = inside > np.maximum((1 - SHRINKS) * np.minimum(size, scaled), SETTLED)  # what it gains is what it lost before
         idle = (size > SHRINKS * before) & (share < 1 - SHRINKS) | sinks
         wary = np.where(idle, np.maximum(CAUTION * wary, 1), np.where(share > SHRINKS, wary / CAUTION, wary))

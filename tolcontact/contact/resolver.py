@@ -19,7 +19,7 @@ from tolcontact.contact.doubt import Doubt
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import fixed, least_gaps
+from tolcontact.contact.scan import least_gaps, undone
 from tolcontact.contact.state import Resolved, State, Task
 
 STRIDE, CAREFUL = 0.5, 0.05  # rad: what a step may turn a part by; linear rows are wrong long before
@@ -143,11 +143,8 @@ class ContactResolver:
 
     def _recheck(self, task: Task, state: State) -> None:
         """The solver's word is not enough: what is inside at the poses reached, beyond the slack, counts."""
-        for k, (scan, may_carry) in enumerate(zip(task.scans, task.may_carry, strict=True)):
-            inside = -state.gap_min[:, k]
-            if may_carry is not None:
-                inside = fixed(scan).deepest(state.relative[:, k], task.deviations, may_carry).depth.max(axis=1)
-            state.residual[:] = np.maximum(state.residual, inside - state.slack[:, k])
+        inside = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
+        state.residual[:] = np.maximum(state.residual, inside.max(axis=1))
         # Nor does penetration excuse locators that do not hold.
         excused = np.where(state.astray > ACCURACY, state.slack.max(axis=1), 0)
         state.residual[:] = np.maximum(state.residual, state.astray + excused)

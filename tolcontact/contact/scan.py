@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
@@ -250,6 +250,25 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
         nearer = distance < nearest if number else np.ones(len(points), dtype=bool)
         label[nearer], nearest[nearer] = number, distance[nearer]
     return np.unique(label, return_inverse=True)[1]
+
+
+def undone(
+    scans: Sequence[Scan],
+    least: Float[Array, "realization pair"],
+    relative: Float[Array, "realization pair 12"],
+    deviations: Float[Array, "realization locator"],
+    may_carry: Sequence[Bool[Array, "realization _"] | None],
+    slack: Float[Array, "realization pair"],
+) -> Float[Array, "realization pair"]:
+    """By how much points that may carry (realization, point) are deeper inside than the slack (realization, pair) [mm].
+
+    `least` are the least gaps (realization, pair) of all points.
+    """
+    depths = [
+        -least[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
+        for k, (scan, may) in enumerate(zip(scans, may_carry, strict=True))
+    ]
+    return np.stack(depths, axis=1) - slack
 
 
 def least_gaps(
