@@ -268,7 +268,7 @@ def undone(
         -least[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
         for k, (scan, may) in enumerate(zip(scans, may_carry, strict=True))
     ]
-    return np.stack(depths, axis=1) - slack
+    return np.asarray(np.stack(depths, axis=1) - slack)
 
 
 def least_gaps(
