@@ -55,7 +55,7 @@ def test_twenty_broken_files_end_in_a_message_each_or_are_read(tmp_path, monkeyp
     for number, (kind, text) in enumerate(BROKEN.items()):
         paths[kind] = tmp_path / f"{number}.step"
         paths[kind].write_text(text)
-    found = read_files([tc.Mesh(path) for path in paths.values()])
+    found = {path: content for (path, _), content in read_files([tc.Mesh(path) for path in paths.values()]).items()}
     messages = {kind: str(found[path]) for kind, path in paths.items() if isinstance(found[path], GeometryFault)}
     for kind, message in messages.items():
         assert paths[kind].name in message and "\n" not in message and len(message) < 600, (kind, message)

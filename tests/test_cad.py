@@ -180,6 +180,14 @@ def test_what_a_file_does_not_hold_is_told(file, tmp_path):
     model.part("ball", tc.Mesh(tmp_path / "ball.stl", body="ball"), fixed=True)
     with pytest.raises(tc.ModelError, match="only STEP files hold bodies"):
         tc.build(model)
+    for chord, source, said in (
+        (0.1, tmp_path / "ball.stl", "only STEP files are triangulated"),
+        (0, file, "chord is 0; expected"),
+    ):
+        model = tc.Assembly("ball")
+        model.part("ball", tc.Mesh(source, chord=chord), fixed=True)
+        with pytest.raises(tc.ModelError, match=said):
+            tc.build(model)
 
 
 def test_names_that_no_part_may_have_are_changed(tmp_path):

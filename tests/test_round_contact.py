@@ -169,7 +169,7 @@ def test_a_ball_beside_walls_of_every_kind():
     """Gaps another way, and derivatives by differences; of hollow walls from as far away as a ball that touches them is."""
     rng, points = np.random.default_rng(3), []
     for kind, is_hollow, on_moving in itertools.product(ANALYTIC, (False, True), (False, True)):
-        if kind == "plane" and is_hollow:
+        if kind in ("plane", "torus") and is_hollow:
             continue
         w = unit(rng)
         x = np.cross(w, unit(rng))
@@ -179,6 +179,24 @@ def test_a_ball_beside_walls_of_every_kind():
         beside = 30 * x + 3 * w if not is_hollow else 6 * x + 20 * w if kind == "cone" else 19 * x + 3 * w
         points.append(RoundPoint(wall, is_hollow, wall.origin + beside, NONE, NONE, 2.0, on_moving, x, np.pi))
     check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+
+
+def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
+    """Gaps beyond the end of the wall are those of its last tangent planes; and there is no wall where it is open."""
+    rng, points, out = np.random.default_rng(4), [], []
+    for kind, angle in itertools.product(("cylinder", "cone", "sphere"), (0.3, 1.5, 3.0)):
+        w = unit(rng)
+        x = np.cross(w, unit(rng))
+        x /= np.linalg.norm(x)
+        wall = Form(kind, np.zeros(3), w, **({"angle": 0.6} if kind == "cone" else {"radius": 20.0}))
+        aside = np.cos(angle) * x + np.sin(angle) * np.cross(w, x)
+        beside = 6 * aside + 20 * w if kind == "cone" else 18.5 * aside
+        points.append(RoundPoint(wall, True, beside, NONE, NONE, 2.0, True, x, 1.0))
+        out.append(-100 * x)
+    check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+    for k, far in enumerate(out):
+        evaluate = round_gaps(RoundPoints.of([points[k]]))
+        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), 0)[0]) > 40
 
 
 def test_a_ball_in_a_socket_lies_where_its_weight_points_to():
@@ -261,3 +279,25 @@ def test_what_is_not_a_ball_or_a_shaft_beside_a_wall_has_points():
     half = upright.copy()
     half.update_faces(half.triangles_center[:, 0] > 0)
     assert not pair(half, hole).round  # it is not round on all sides
+
+
+def pinned(chord):
+    """A pin in the round hole of the cover's STEP file, which is triangulated within `chord`."""
+    a = tc.Assembly("pinned", method=tc.Method(resolution="exact", objective="all points"))
+    cover = a.part("cover", tc.Mesh(cases.MODELS / "cover.step", chord=chord), fixed=True)
+    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(4, 16, sections=30)), at=(15, 15, 4))
+    a.locate(pin, round_cases.held(pin, [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)], 0.4))
+    a.contact("hole", moving=pin.face(tc.Cylinder()), reference=cover.face(tc.Brep((19.05, 15, 1))))
+    a.measure("x", pin.point(0, 0, 8), along="x")
+    return a
+
+
+def test_how_finely_a_step_file_is_triangulated_changes_nothing():
+    runs, triangles = [], []
+    for chord in (None, 0.3):
+        program, run = simulate(pinned(chord), samples=100, solver="daqp")
+        assert np.isin(run["status"], (Status.UNTOUCHED, Status.RESOLVED)).all()
+        runs.append(run["measured"])
+        triangles.append(len(program.nominal.parts[0].mesh.faces))
+    assert triangles[0] > 5 * triangles[1]
+    assert np.abs(runs[0] - runs[1]).max() < 1e-9

@@ -43,8 +43,9 @@ class RoundPoint(NamedTuple):
             return self._beside(-self.wall["axis"], centre, axis)
         if self.body["axis"].any():
             return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
-        distance = self._distance(centre - self.wall["origin"])
-        return np.asarray((-distance if self.body["is_hollow"] else distance) - self.body["radius"])
+        apart = centre - self.wall["origin"]
+        gap = self._inside(apart) if self.body["is_hollow"] else self._distance(apart)
+        return np.asarray(gap - self.body["radius"])
 
     def _beside(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
         """Distance from the plane through the wall's point and across e (..., 3), which points out of the free side."""
@@ -74,6 +75,17 @@ class RoundPoint(NamedTuple):
             left = at(inner) < at(outer)
             low, high = np.where(left, low, inner), np.where(left, outer, high)
         return at((low + high) / 2)
+
+    def _inside(self, apart: np.ndarray) -> np.ndarray:
+        """Distance (...) [mm] from the nearest tangent plane of a hollow wall."""
+        if words.SURFACE_KINDS[self.wall["kind"]] == "sphere":
+            along = apart @ self.body["towards"]
+            across = np.linalg.norm(apart - along[..., None] * self.body["towards"], axis=-1)
+            beyond = np.maximum(np.arctan2(across, along) - self.body["opening"], 0)
+            return np.asarray(self.wall["radius"] - np.hypot(across, along) * np.cos(beyond))
+        along, angle = apart @ self.wall["axis"], self.wall["angle"]
+        base = self.wall["radius"] + along * np.sin(angle)
+        return self._nearest(lambda e: base - np.cos(angle) * (e * apart).sum(axis=-1), apart.shape[:-1])
 
     def _distance(self, apart: np.ndarray) -> np.ndarray:
         """Distance (...) [mm] from the wall's surface, positive outside, of what is `apart` (..., 3) from its point."""

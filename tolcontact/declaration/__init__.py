@@ -31,7 +31,9 @@ A face consists of the triangles that meet every criterion you give; without any
 | `tc.Facing((0, 1, 2), angle)` | triangles whose outward normal is within `angle` of any direction |
 | `tc.Inside(lower, upper)` | what lies inside a box; triangles that cross its sides are cut there |
 | `tc.Near(other, within)` | faces that face another part and come within a distance of it |
-| `tc.Brep((x, y, z))` | the face of a STEP file that passes through a point |
+| `tc.Cylinder(radius, inner)` | cylinders: of one size, or holes (`inner=True`), or neither |
+| `tc.Largest("plane", "+z")` | the largest face of a kind, along a direction |
+| `tc.Brep((x, y, z))`, `tc.Brep(12)` | the face of a STEP file that passes through a point, or has a number |
 | `[0, 1, 2]` | triangles by their indices in the mesh |
 | a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
 

@@ -37,16 +37,22 @@ class Mesh(Readable):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
     `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m, `mesh.units`
-    of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within 2 um, and keep their
-    boundary representation for `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body`
+    of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
+    2 um, and coarser if that is too many), and keep their boundary representation for `tc.Brep`; that needs the extra
+    `tolcontact[step]`. Of a STEP file with several bodies, `body`
     is the name or the number (from 1) of one, which is read in its own frame; the only body of a file is read where it stands.
     """
 
     source: Any
     units: str | None = None
     body: str | int | None = None
+    chord: float | None = None
 
     def faults(self) -> Iterator[str]:
+        if self.chord is not None and not (is_length(self.chord) and self.chord > 0):
+            yield f"mesh chord is {self.chord!r}; expected a length in mm above 0"
+        elif self.chord is not None and not self._is_step:
+            yield "mesh chord is given, but only STEP files are triangulated; leave it out"
         if self.body is not None and not self._is_step:
             yield f"mesh body is {self.body!r}; only STEP files hold bodies that have names and numbers; leave it out"
         if isinstance(self.body, bool) or not isinstance(self.body, str | int | None):

@@ -142,7 +142,7 @@ class Brep(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Cylinder(Readable):
-    """Cylindrical faces of a STEP file; `radius` [mm] of those of one size, `inner` of holes (True) or of pins (False)."""
+    """Cylindrical faces; `radius` [mm] of those of one size, `inner` of holes (True) or of pins (False)."""
 
     radius: float | None = None
     inner: bool | None = None
@@ -160,9 +160,10 @@ class Cylinder(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Largest(Readable):
-    """The largest B-rep face of one `kind` of a STEP file; with a `direction` ("+x" to "-z", or a vector) of those along it.
+    """The largest face of one `kind`; with a `direction` ("+x" to "-z", or a vector) of those along it.
 
-    Planes look that way, cylinders, cones and tori have their axis along it, whichever way it points.
+    Planes look that way, cylinders, cones and tori have their axis along it, whichever way it points. Faces are the B-rep faces
+    of a STEP file, and the smooth pieces of other meshes.
     """
 
     kind: str

@@ -88,7 +88,8 @@ the end of its wall, is not noticed at that pose, but afterwards (see the checks
 
 ## STEP files
 
-STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad, and keep their
+STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad (`tc.Mesh(file,
+chord=0.1)`: within 0.1 mm; what touches on surfaces that the file states does not depend on it), and keep their
 boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states a plane, cylinder,
 cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces that meet in a vertex come to each
 other); elsewhere they are rounded to what single precision resolves, 1e-5 mm at 100 mm and 2e-4 mm at 1 m. If that would be

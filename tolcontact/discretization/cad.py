@@ -12,7 +12,7 @@ from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.brep_face import FaceInFile, described, in_words
 from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files import read_files
+from tolcontact.discretization.shape_files import key_of, read_files
 from tolcontact.discretization.shape_files.bodies import SHOWN
 from tolcontact.discretization.shape_files.product import Product
 from tolcontact.errors import STEERING, ModelError, OptionError, shown
@@ -66,13 +66,18 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
 
 
 def parts_from(
-    model: Assembly, path: str | Path, names: Sequence[str] | None = None, *, fixed: bool | None = None
+    model: Assembly,
+    path: str | Path,
+    names: Sequence[str] | None = None,
+    *,
+    fixed: bool | None = None,
+    chord: float | None = None,
 ) -> dict[str, Part]:
     """Declare the bodies of a STEP file as parts of a model, each in its place: all, or those named. By their names.
 
     A part is called like the body in the file, without the signs that no part may have in its name; where names repeat, the
     second is called "name (2)" and so on. The part's own frame is that of its product, the same for all of its places.
-    `fixed` is as of a Part.
+    `fixed` is as of a Part, `chord` [mm] as of a Mesh.
     Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if the names are one text.
     """
     if isinstance(names, str):
@@ -88,7 +93,7 @@ def parts_from(
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
     chosen = found if names is None else [known[name] for name in wanted]
     return {
-        name: model.part(name, Mesh(path, body=body.number), at=body.at, rotation=body.rotation, fixed=fixed)
+        name: model.part(name, Mesh(path, body=body.number, chord=chord), at=body.at, rotation=body.rotation, fixed=fixed)
         for body in chosen
         if (name := _part_name(body))
     }
@@ -103,7 +108,7 @@ def _product(path: str | Path) -> Product:
     geometry = Mesh(path)
     for fault in geometry.faults():
         raise OptionError(fault)
-    content = read_files([geometry])[Path(path)]
+    content = read_files([geometry])[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise OptionError(str(content))
     if content.product is None:

@@ -16,9 +16,12 @@ MOST = 40  # points of a pair
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
 WHOLE = math.radians(50.0)  # of a round face no wider gap is missing
 PARALLEL = 1e-3  # rad: how far the axis of a shaft may stand off its wall's
+MARGIN = math.radians(5.0)  # between where a shaft that is not round all about touches, and its ends
 STATIONS = 200  # places along an axis that are looked at
 HALVINGS = 40
 CLOSE = 1e-6  # of a face's size: what is no farther apart is in one place
+CLOSED = 1e-3  # of a sphere: less than that is missing of a whole one
+MISSING = 0.05  # of a cap: what its triangles leave out, and rims that are not round
 FLAT = 1e-9  # rad: triangles that turn by less from each other are one plane
 
 
@@ -73,12 +76,14 @@ def _between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint] 
 
 def _of_ball(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint] | None:
     c, r = body.form.origin, body.form.radius
+    if wall.is_hollow and (wall.form.kind == "torus" or (wall.form.kind == "sphere" and not _is_cap(wall))):
+        return None  # where it is open is not known
     side = -1.0 if wall.is_hollow else 1.0
     distance, slope = (each[0] for each in wall.form.distance(c[None]))
     if not -r < side * distance - r <= reach:
         return []
     nearest, tangents = RoundPoint.ball(wall, body.form, on_moving, *_arc(wall)), []
-    if wall.is_hollow and wall.form.kind in ("cylinder", "cone", "sphere"):
+    if wall.is_hollow:
         for e in _directions(wall):
             touching = _on_wall(wall.form, c, e)
             normal = _tangent(wall.form, e).axis
@@ -101,6 +106,9 @@ def _of_shaft(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[R
 
 def _on_plane(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint] | None:
     shaft, n = body.form, wall.form.axis
+    towards, opening = _arc(body)
+    if opening < math.pi and -n @ towards < math.cos(max(opening - MARGIN, 0)):
+        return None  # a little turn, and its edge or the face beside it touches
     height = float((shaft.origin - wall.form.origin) @ n) - shaft.radius
     if not -shaft.radius < height <= reach:
         return []
@@ -197,6 +205,9 @@ def _arc(wall: Piece) -> tuple[np.ndarray, float]:
     """The middle of a round face, seen from its axis (3,), and how far [rad] it reaches to either side of that."""
     vertices = np.asarray(wall.surface.mesh.vertices)
     across = vertices - wall.form.origin
+    if wall.form.kind == "sphere":
+        middle, cosine = _cap(wall)
+        return middle, math.acos(max(cosine, -1.0)) if cosine > -1 + CLOSED else math.pi
     across -= (across @ wall.form.axis)[:, None] * wall.form.axis
     across = across[np.linalg.norm(across, axis=1) > CLOSE * wall.surface.mesh.scale]
     if wall.form.kind == "plane" or not len(across):
@@ -209,16 +220,37 @@ def _arc(wall: Piece) -> tuple[np.ndarray, float]:
     if gaps[widest] < WHOLE:
         return x, math.pi
     opening = math.pi - float(gaps[widest]) / 2
-    middle = float(azimuths[widest] + gaps[widest]) + opening
-    return math.cos(middle) * x + math.sin(middle) * y, opening
+    turn = float(azimuths[widest] + gaps[widest]) + opening
+    return math.cos(turn) * x + math.sin(turn) * y, opening
+
+
+def _cap(wall: Piece) -> tuple[np.ndarray, float]:
+    """The middle of a piece of a sphere (3,), seen from its centre, and the cosine of the angle as far as which it reaches."""
+    apart = np.asarray(wall.surface.mesh.triangles_center) - wall.form.origin
+    middle = (np.asarray(wall.surface.mesh.area_faces)[:, None] * apart).sum(axis=0)
+    corners = (np.asarray(wall.surface.mesh.vertices) - wall.form.origin) / wall.form.radius
+    if np.linalg.norm(middle) < CLOSED * wall.surface.mesh.area * wall.form.radius:  # it is all around
+        return corners[0], -1.0
+    middle /= np.linalg.norm(middle)
+    return middle, float((corners @ middle).min())
+
+
+def _is_cap(wall: Piece) -> bool:
+    """Whether a piece of a sphere is all of a cap, or of the sphere."""
+    _, cosine = _cap(wall)
+    return bool(wall.surface.mesh.area > (1 - MISSING) * 2 * math.pi * wall.form.radius**2 * (1 - cosine))
 
 
 def _directions(wall: Piece) -> Sequence[np.ndarray]:
     """Unit vectors (3,), from the axis, of tangent planes that a hollow wall has besides the nearest."""
     x, opening = _arc(wall)
-    y = np.cross(wall.form.axis, x)
     if wall.form.kind == "sphere":
-        return [sign * each for each in (x, y, wall.form.axis) for sign in (1.0, -1.0)]
+        across = np.linalg.svd(x[None])[2][1:]
+        lean, turns = min(opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
+        aside = [math.cos(turn) * across[0] + math.sin(turn) * across[1] for turn in turns]
+        found = [x, *(math.cos(lean) * x + math.sin(lean) * each for each in aside)]
+        return [*found, -x] if opening == math.pi else found
+    y = np.cross(wall.form.axis, x)
     if opening == math.pi:
         azimuths = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
     else:

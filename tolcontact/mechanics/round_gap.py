@@ -110,15 +110,18 @@ def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX
 
 
 def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The direction (3, 1) of the wall that is nearest to e; and 1 if it is e."""
+    """The direction (3, 1) of a hollow wall that is nearest to e; and 1 if it is e."""
     opening = float(point.opening)
-    if opening > np.pi - STRAIGHT:
+    if opening > np.pi - STRAIGHT or not point.is_hollow:
         return e, ca.SX(1)
     x = ca.DM(point.towards)
-    y = ca.DM(np.cross(point.wall.axis, point.towards))
     is_free = ca.dot(e, x) >= np.cos(opening)
-    end = np.cos(opening) * x + ca.if_else(ca.dot(e, y) < 0, -1, 1) * np.sin(opening) * y
-    return ca.if_else(is_free, e, end), ca.if_else(is_free, 1, 0)
+    if point.wall.kind == "sphere":
+        _, aside = _direction(_across(x, e) + ASIDE * ca.DM(np.linalg.svd(point.towards[None])[2][1]))
+    else:
+        y = ca.DM(np.cross(point.wall.axis, point.towards))
+        aside = ca.if_else(ca.dot(e, y) < 0, -1, 1) * y
+    return ca.if_else(is_free, e, np.cos(opening) * x + np.sin(opening) * aside), ca.if_else(is_free, 1, 0)
 
 
 def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
@@ -137,25 +140,30 @@ def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
 def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
 
-    Positive outside; see Form.distance. The second derivative is in two parts, of which the first is positive semidefinite.
+    Positive outside; see Form.distance. Of a hollow wall that is not whole it is that of the nearest tangent plane which the
+    wall has. The second derivative is in two parts, of which the first is positive semidefinite.
     """
     kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
     R, r, one, nothing = float(point.wall.radius), float(point.radius), ca.SX.eye(3), ca.SX.zeros(3, 3)
     p = c - ca.DM(point.wall.origin)
     least = max(abs(R - r), CLOSE * r)
     if kind == "sphere":
-        length, n = _direction(p + ASIDE * x)
-        return length - R, n, (one - n @ n.T) / ca.fmax(length, least), nothing
+        _, n = _direction(p + ASIDE * x)
+        n, is_free = _within(point, n)
+        length, t = ca.dot(n, p), ca.cross(x, n)  # along the rim, if the wall ends there
+        along_rim = t @ t.T / ca.fmax(ca.norm_2(_across(x, p)) * np.sin(point.opening), CLOSE * r)
+        return length - R, n, ca.if_else(is_free, (one - n @ n.T) / ca.fmax(length, least), along_rim), nothing
     along = ca.dot(w, p)
-    length, outward = _direction(_across(w, p) + ASIDE * x)
+    _, outward = _direction(_across(w, p) + ASIDE * x)
     _, outward = _direction(_across(w, outward))
-    round_ = ca.cross(w, outward)
+    outward, is_free = _within(point, outward)
+    length, round_ = ca.dot(outward, p), ca.cross(w, outward)
     if kind == "cylinder":
-        return length - R, outward, round_ @ round_.T / ca.fmax(length, least), nothing
+        return length - R, outward, is_free * round_ @ round_.T / ca.fmax(length, least), nothing
     if kind == "cone":
         cos, sin = np.cos(point.wall.angle), np.sin(point.wall.angle)
         n = cos * outward - sin * w
-        return length * cos - along * sin, n, cos * round_ @ round_.T / ca.fmax(length, CLOSE * r), nothing
+        return length * cos - along * sin, n, is_free * cos * round_ @ round_.T / ca.fmax(length, CLOSE * r), nothing
     tube, n = _direction((length - R) * outward + along * w)
     across = ca.cross(round_, n)
     turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)

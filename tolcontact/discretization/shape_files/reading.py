@@ -25,6 +25,7 @@ from tolcontact.discretization.shape_files.product import (
 )
 from tolcontact.discretization.shape_files.step_text import StepText
 
+LARGEST_ANGLE = 0.5  # rad: triangles of round faces never turn by more
 COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 
@@ -49,44 +50,52 @@ class Content:
     product: Product | None
 
 
-Contents = Mapping[Path, Content | GeometryFault]
-State = tuple[str, int, int, int]
+Key = tuple[Path, float | None]  # a file, and its chord if one is asked for
+Contents = Mapping[Key, Content | GeometryFault]
+State = tuple[str, int, int, int, float | None]
 _known: dict[State | None, Content] = {}
 
 
 def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
     """The contents of all files that some geometries name, or what is wrong with them. Each file is read once."""
-    sources = [geometry.source for geometry in geometries if isinstance(geometry, Mesh)]
-    found: dict[Path, Content | GeometryFault] = {}
-    texts: dict[Path, StepText | None] = {}
-    states: dict[Path, State | None] = {}
-    for path in dict.fromkeys(Path(source) for source in sources if isinstance(source, str | Path)):
-        states[path] = _state_of(path)  # before it is read: it may change meanwhile
-        if (known := _known.get(states[path])) is not None:
-            found[path] = known
+    files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
+    found: dict[Key, Content | GeometryFault] = {}
+    texts: dict[Key, StepText | None] = {}
+    states: dict[Key, State | None] = {}
+    for key in dict.fromkeys(key_of(geometry) for geometry in files):
+        states[key] = _state_of(*key)  # before it is read: it may change meanwhile
+        if (known := _known.get(states[key])) is not None:
+            found[key] = known
             continue
         try:
-            texts[path] = screening.screen(path, MAX_TRIANGLES)
+            texts[key] = screening.screen(key[0], MAX_TRIANGLES)
         except GeometryFault as fault:
-            found[path] = fault
-    for path, read_in in _loaded(list(texts)).items():
-        if isinstance(read_in, GeometryFault):
-            found[path] = read_in
-        elif "count" in read_in:
-            found[path] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
-        else:
-            found[path] = _content(path, read_in, texts[path])
-            _remember(states[path], found[path])
+            found[key] = fault
+    for chord in dict.fromkeys(chord for _, chord in texts):
+        for path, read_in in _loaded([path for path, asked in texts if asked == chord], chord).items():
+            key = path, chord
+            if isinstance(read_in, GeometryFault):
+                found[key] = read_in
+            elif "count" in read_in:
+                found[key] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
+            else:
+                found[key] = _content(path, read_in, texts[key])
+                _remember(states[key], found[key])
     return found
 
 
-def _state_of(path: Path) -> State | None:
+def key_of(geometry: Mesh) -> Key:
+    """What of a file a geometry asks for."""
+    return Path(geometry.source), geometry.chord
+
+
+def _state_of(path: Path, chord: float | None) -> State | None:
     """By what one notices that a file has changed; None if there is none."""
     try:
         now = path.stat()
     except OSError:
         return None
-    return str(path.absolute()), now.st_mtime_ns, now.st_ino, now.st_size
+    return str(path.absolute()), now.st_mtime_ns, now.st_ino, now.st_size, chord
 
 
 def _remember(state: State | None, content: Content | GeometryFault) -> None:
@@ -97,14 +106,15 @@ def _remember(state: State | None, content: Content | GeometryFault) -> None:
         _known[state] = content
 
 
-def _loaded(paths: Sequence[Path]) -> dict[Path, dict[str, np.ndarray] | GeometryFault]:
-    """What the reader makes of some files. STEP files that come out too fine are cut more coarsely."""
+def _loaded(paths: Sequence[Path], chord: float | None) -> dict[Path, dict[str, np.ndarray] | GeometryFault]:
+    """What the reader makes of some files. STEP files that come out too fine are cut more coarsely, unless a chord is asked."""
     found: dict[Path, dict[str, np.ndarray] | GeometryFault] = {}
-    for coarser in COARSER:
+    for coarser in COARSER if chord is None else (chord / STEP_CHORD,):
         files = tuple((path, screening.kind(path)) for path in paths)
-        request = reader.Request(files, coarser * STEP_CHORD, math.sqrt(coarser) * STEP_ANGLE, MAX_TRIANGLES)
+        angle = min(math.sqrt(coarser) * STEP_ANGLE, LARGEST_ANGLE)
+        request = reader.Request(files, coarser * STEP_CHORD, angle, MAX_TRIANGLES)
         found |= dict(zip(paths, reader.load(request), strict=True)) if paths else {}
-        if coarser > 1:
+        if chord is None and coarser > 1:
             for path in paths:
                 if not _is_too_fine(found[path]):
                     log.warning('"%s": triangles within %g mm, since finer ones are too many', path, coarser * STEP_CHORD)
@@ -132,7 +142,7 @@ def read(geometry: Mesh, contents: Contents) -> Shape:
     source = geometry.source
     if not isinstance(source, str | Path):
         return Shape(_in_memory(geometry))
-    content = contents[Path(source)]
+    content = contents[key_of(geometry)]
     if isinstance(content, GeometryFault):
         raise content
     if content.product is not None:
