@@ -26,7 +26,8 @@ class Form:
     radius   [mm] of a cylinder or sphere, or of the circle in a torus' middle; else 0
     minor    [mm] radius of a torus' tube; else 0
     angle    [rad] between axis and surface of a cone; else 0
-    residual [mm] how far the vertices that it was fitted to lie off it at most; 0 if the file states it
+    residual [mm] how far the vertices that it was fitted to lie off it at most
+    is_fitted  whether it was; else a file states it
     """
 
     kind: str
@@ -36,6 +37,7 @@ class Form:
     minor: float = 0.0
     angle: float = 0.0
     residual: float = 0.0
+    is_fitted: bool = False
 
     def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Signed distances (point,) [mm] of `points` (point, 3) [mm], and their gradients (point, 3): unit vectors.

@@ -127,4 +127,4 @@ def _with_residual(form: Form, vertices: np.ndarray) -> Form:
         if abs(radius - form.radius) <= SURE * residual:
             form = replace(form, radius=radius)
             break
-    return replace(form, residual=float(np.abs(form.distance(vertices)[0]).max()))
+    return replace(form, residual=float(np.abs(form.distance(vertices)[0]).max()), is_fitted=True)

@@ -42,12 +42,22 @@ def known_forms(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[Form], 
 
 def _one(mesh: trimesh.Trimesh, known: Form, form: Form, faces: np.ndarray, own: np.ndarray) -> Form | None:
     """The surface that two faces are parts of, the triangles (face,) of each; None if they are not parts of one."""
-    if known.kind != form.kind or (known.residual == 0) != (form.residual == 0):
+    if (
+        known.kind != form.kind
+        or known.is_fitted != form.is_fitted
+        or _looks_out(mesh, known, faces) != _looks_out(mesh, known, own)
+    ):
         return None
     off = np.abs(known.distance(np.asarray(mesh.vertices)[np.unique(mesh.faces[own])])[0]).max()
     if off > ALIKE * (known.residual + form.residual) + SAME * mesh.scale:
         return None
-    return known if known.residual == 0 else _fitted(mesh, np.concatenate([faces, own]))
+    return _fitted(mesh, np.concatenate([faces, own])) if known.is_fitted else known
+
+
+def _looks_out(mesh: trimesh.Trimesh, form: Form, own: np.ndarray) -> bool:
+    """Whether the outside of some triangles (face,) is that of the form."""
+    _, slope = form.distance(np.asarray(mesh.triangles_center)[own])
+    return bool((slope * np.asarray(mesh.face_normals)[own]).sum() > 0)
 
 
 def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:

@@ -12,6 +12,8 @@ from scipy.sparse import csr_array
 from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.edges import CREASE, on_rim, rim
 
+TURN = 0.3  # rad: what the normals of a triangle and of the form that it stands for differ by at most, and
+BULGE = 0.05  # of a face's size: how far it may be off that
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
 
 
@@ -147,7 +149,12 @@ class Surface:
         over = ~at_rim | (sideways <= max(margin, 1e-6 * self.mesh.scale))
         feet = np.array(nearest)
         for form, some, _ in self._stand_for(triangle):
-            feet[some] = form.project(np.where(at_rim[some, None], nearest[some], points[some]))
+            below, own = form.project(nearest[some]), form.project(points[some])
+            apart = np.linalg.norm(own - nearest[some], axis=1)
+            height = np.linalg.norm(points[some] - nearest[some], axis=1)
+            # Near its axis, and beyond, a form has feet elsewhere.
+            is_here = ~at_rim[some] & (apart <= TURN * height + BULGE * self.mesh.scale)
+            feet[some] = np.where(is_here[:, None], own, below)
         return feet, self.normals(triangle, feet), over
 
     def depth(self, points: np.ndarray) -> np.ndarray:

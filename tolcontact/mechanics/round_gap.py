@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact.discretization import RoundPoint, RoundPoints
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
-ROUNDS = 3  # of Newton's method, from the tangent that is nearest to an upright shaft
+ROUNDS = 6  # of Newton's method, from the tangent that is nearest to an upright shaft
 LARGEST = 0.5  # rad: step of it
 ASIDE = 1e-13  # mm: what a point on an axis is taken to be beside it
 CLOSE = 1e-3  # of the ball's or shaft's radius: freedom that curvature is taken for at least
@@ -103,7 +103,8 @@ def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX
     for _ in range(ROUNDS):
         t = ca.cross(w, e)
         first, second = turning(X, e, t)
-        step = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
+        newton = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
+        step = ca.if_else(second > least, newton, ca.if_else(first > 0, -LARGEST, LARGEST))  # away from a farthest tangent
         _, e = _direction(e + step * t)
         e, is_free = _within(point, e)
     return e, is_free
@@ -132,7 +133,7 @@ def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     n = ca.SX.sym("n", 3)
     along, J = ca.dot(n, c), ca.jacobian(c, X)
     slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
-    bend += side * J.T @ (rest if point.is_hollow else around + rest) @ J
+    bend += J.T @ rest @ J if point.is_hollow else J.T @ (around + rest) @ J
     closing = J.T @ around @ J if point.is_hollow else ca.SX.zeros(ENTRIES, ENTRIES)
     return side * distance - float(point.radius), slope, bend, closing
 
