@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ContactPoints, Offsets
+from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.gap import gap
 from tolcontact.mechanics.gap_map import GapMap
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
@@ -76,7 +76,7 @@ def contact_rows(
             reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
             of_points, by_entries, second, closing = round_gaps(pair.round)(before.vector(), reactions)
             slopes.append(by_entries @ by_z)
-            gaps.append(of_points - _heights(pair.offsets, setting.deviations))
+            gaps.append(of_points)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
             bends.append(by_entries.T @ reactions)
@@ -121,12 +121,6 @@ def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[
     P_m, P_r, n_r = (ca.SX(ca.DM(each[points].T)) for each in (pair.P_m, pair.P_r, pair.n_r))
     offsets = pair.offsets.take(points)
     if offsets.columns.size:
-        P_r = P_r + n_r @ ca.diag(_heights(offsets, deviations))
+        heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
+        P_r = P_r + n_r @ ca.diag(heights)
     return list(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))
-
-
-def _heights(offsets: Offsets, deviations: ca.SX) -> ca.SX:
-    """How far the points of a pair stand out (point, 1) [mm]."""
-    if not offsets.columns.size:
-        return ca.SX.zeros(offsets.matrix.shape[1])
-    return ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]

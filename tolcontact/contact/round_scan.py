@@ -18,7 +18,4 @@ class RoundScan(Scan):
     gaps_at: NamedFunction
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        gaps = self.gaps_at(X_RM=relative)["gaps"]
-        if self.offsets.columns.size:
-            gaps = gaps - self.offsets.heights(deviations, np.broadcast_to(np.arange(len(self.P_m)), gaps.shape))
-        return gaps
+        return self.gaps_at(X_RM=relative)["gaps"]

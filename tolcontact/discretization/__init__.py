@@ -62,13 +62,16 @@ meet at more than 30 degrees form an edge.
 ## Round faces
 
 A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus, and where a cylinder, cone or sphere
-can be fitted to the vertices of a smooth piece of a mesh (at least five facets) so that none is farther off than 1 um. Contact
-points, their feet and normals then lie on that surface, not on its triangles. Other curved faces are as round as theirs.
+can be fitted to the vertices of a smooth piece of a mesh (at least five facets, none of which turns by more than 30 degrees) so
+that none is farther off than 1 um. Contact points, their feet and normals then lie on that surface, not on its triangles. So a
+prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are as
+round as their triangles.
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
-beside a plane, cylinder, cone, sphere or torus. A shaft (an outer cylinder) is the two ends of its axis in a hole (an inner
-cylinder) parallel to it, or along a plane. What touches is found at every pose, tilted ones too: a pin jams in its hole by the
-right angle, whatever the tessellation. `tolcontact check` says which pairs these are; `points=` or `spacing=` overrule it.
+beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a hole
+(an inner cylinder) parallel to it, or along a plane. What touches is found at every pose, tilted ones too: a pin jams in its
+hole by the right angle, whatever the tessellation. Where an edge of the wall, a gap in it or another curve may touch first, the
+pair has sampled points. `tolcontact check` says which pairs are of round faces; `points=` or `spacing=` overrule it.
 
 >>> stand = tc.Assembly("pin in a hole")
 >>> plate = stand.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=24)), fixed=True)
@@ -80,7 +83,7 @@ right angle, whatever the tessellation. `tolcontact check` says which pairs thes
 >>> aside = stand.measure("aside", pin.point(0, 0, 0), along="x")
 >>> print(tc.build(stand))
 program of pin in a hole: ...
-  contact fit: 12 contact points of round faces, exact at any pose
+  contact fit: 12 contact points of round faces, exact at any pose; fitted to triangles that lie up to 0.043 mm inside
 ...
 
 The faces are taken to be as long as they are in the nominal assembly: a shaft that is pushed out of its hole, or a ball beyond

@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration import Assembly, Face, Measure, Part, Point
+from tolcontact.discretization.curvature import chord_height
 from tolcontact.discretization.face_pair import FacePair, side
 from tolcontact.discretization.faces import triangles
 from tolcontact.discretization.locators import Locators
@@ -67,6 +68,13 @@ class ContactPoints:
     own: Surface | None = None
     facets: float = 0.0
     round: RoundPoints | None = None
+
+    @cached_property
+    def bulge(self) -> float:
+        """How far [mm] round surfaces that were fitted to triangles, and count instead, stand out of these."""
+        faces = [face for face in (self.own, self.surface) if face is not None]
+        pieces = [piece.surface for face in faces for piece in face.pieces if piece.form.is_fitted]
+        return max(map(chord_height, pieces), default=0.0)
 
     @property
     def is_supports(self) -> bool:
