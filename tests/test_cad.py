@@ -19,6 +19,7 @@ from tolcontact.discretization.analytic import Form, believed, onto
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES, product, reading
+from tolcontact.discretization.shape_files.step_text import step_text
 from tolcontact.discretization.shapes import shape
 
 COVER = cases.MODELS / "cover.step"
@@ -201,7 +202,7 @@ def test_names_that_no_part_may_have_are_changed(tmp_path):
 
 def test_the_command_line_lists_bodies_and_faces(file):
     listed = CliRunner().invoke(app, ["bodies", str(file)])
-    assert listed.stdout.splitlines()[:2] == ["whole", "  1. use 0: 5 x 5 x 5 mm, 6 faces"]
+    assert listed.stdout.splitlines()[:2] == ["lengths in the file: millimetre; here: mm", "whole"]
     bodies = json.loads(CliRunner().invoke(app, ["bodies", str(file), "--json"]).stdout)
     assert [body["name"] for body in bodies][-1] == "use 2" and bodies[-1]["at"] == [0, 0, 5]
     listed = CliRunner().invoke(app, ["faces", str(file), "--body", "use 2"]).stdout
@@ -270,3 +271,17 @@ def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file)
     listed = CliRunner().invoke(app, ["bodies", str(file)]).stdout
     assert "red" in listed and "\x1b" not in listed
     assert "\x1b" not in "".join(tc.parts_from(tc.Assembly("stack"), file))
+
+
+def test_the_units_of_a_file_are_stated(file):
+    assert all(body.units == "millimetre" for body in tc.bodies_in(file))
+    assert CliRunner().invoke(app, ["bodies", str(file)]).stdout.startswith("lengths in the file: millimetre; here: mm\n")
+    si = b"#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(%s,.METRE.));\n"
+    inch = b"#2=( CONVERSION_BASED_UNIT('INCH',#3) LENGTH_UNIT() NAMED_UNIT(#4) );\n"
+    for text, units in (
+        (si % b".MILLI.", "millimetre"),
+        (si % b"$", "metre"),
+        (si % b".MILLI." + inch, "inch"),
+        (b"#1=X();", ""),
+    ):
+        assert step_text(text).units == units

@@ -15,11 +15,13 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print them as JSON.")]
 
 @app.command()
 def bodies(file: StepFile, as_json: AsJson = False) -> None:
-    """List the bodies of a STEP file: numbers, names, sizes and faces, in its product tree."""
+    """List the bodies of a STEP file: numbers, names, sizes [mm] and faces, in its product tree; and its units of length."""
     found = bodies_in(file)
     if as_json:
         typer.echo(json.dumps([asdict(body) for body in found]))
         return
+    if found and found[0].units:
+        typer.echo(f"lengths in the file: {found[0].units}; here: mm")
     above: tuple[str, ...] = ()
     for body in found:
         *products, _ = body.path or ("",)

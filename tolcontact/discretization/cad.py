@@ -29,6 +29,7 @@ class BodyInFile(Readable):
     at, rotation   where its own frame stands, as of a Part [mm, rad]
     faces          number of its B-rep faces
     is_open        whether its faces do not close
+    units          of length in the file, in its words; empty if it states none. All lengths here are in mm
     """
 
     number: int
@@ -40,6 +41,7 @@ class BodyInFile(Readable):
     rotation: Vector
     faces: int
     is_open: bool
+    units: str
 
     def __str__(self) -> str:
         called = f"{self.number}. {shown(self.name) or 'without a name'}"
@@ -122,4 +124,4 @@ def _body(held: Product, number: int) -> BodyInFile:
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
     faces = len(np.unique(held.brep[body.triangles]))
     place = in_words(body.place[:3, 3]), in_words(rotation)
-    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open)
+    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open, shown(held.text.units))

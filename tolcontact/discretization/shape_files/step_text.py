@@ -11,11 +11,12 @@ _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
 _INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
 _ENTITY = re.compile(
     rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL"
-    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT)\s*\("
+    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|LENGTH_UNIT)\s*\("
 )
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
+_METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
 
@@ -29,11 +30,15 @@ class Solid:
 
 @dataclass(frozen=True)
 class StepText:
-    """Solids in the file's order, the names of `files` that hold shapes that it refers to, and of other `documents`."""
+    """Solids in the file's order, the names of `files` that hold shapes that it refers to, and of other `documents`.
+
+    units   of length, in the file's words: "millimetre", "inch"; of several those that are not of the SI; empty if not stated
+    """
 
     solids: tuple[Solid, ...]
     files: tuple[str, ...]
     documents: tuple[str, ...]
+    units: str
 
 
 def step_text(content: bytes) -> StepText:
@@ -42,6 +47,7 @@ def step_text(content: bytes) -> StepText:
     shells: dict[int, list[int]] = {}
     oriented: dict[int, list[int]] = {}
     named: list[str] = []
+    units: list[str] = []
     for number, entity, record in _entities(content):
         strings = [_decoded(string) for string in _STRING.findall(record)]
         references = [int(reference) for reference in re.findall(rb"#(\d+)", _STRING.sub(b"", record))]
@@ -51,6 +57,9 @@ def step_text(content: bytes) -> StepText:
             oriented[number] = references
         elif entity in (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT"):
             named.extend(strings[:1])
+        elif entity == b"LENGTH_UNIT":
+            metres = _METRES.search(record)
+            units += [f"{(metres[1] or b'').decode().lower()}metre"] if metres else [name.lower() for name in strings[:1]]
         else:
             solids.append((strings[0] if strings else "", references))
     links = re.search(rb"\bREFERENCE\s*;(.*?)\bENDSEC\s*;", content, re.DOTALL)
@@ -61,6 +70,7 @@ def step_text(content: bytes) -> StepText:
         tuple(Solid(name, _count(references, shells, oriented)) for name, references in solids),
         files,
         tuple(name for name in named if name not in files),
+        next((unit for unit in units if not unit.endswith("metre")), units[0] if units else ""),
     )
 
 
