@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
+from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests import cases
 from tests.cases import round_contact as round_cases
 from tests.helpers import R_t, simulate
 from tolcontact import vocabulary as words
+from tolcontact.cli.app import app
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
 from tolcontact.discretization.analytic import ANALYTIC, Form
 from tolcontact.discretization.faces import patch
@@ -236,6 +238,12 @@ def test_a_bolt_finds_the_hole_of_its_own_size_in_a_file_from_others():
         assert_resolved(results)
         assert float(results.gap_min.sel(state="corrected").min()) > -1e-9
         assert np.abs(results.measured.sel(state="corrected")).max() < 1e-5
+
+
+def test_check_says_which_pairs_are_round():
+    listed = CliRunner().invoke(app, ["check", str(cases.MODELS / "cover.py")]).stdout
+    assert "contact seat: 78 contact points\n" in listed
+    assert "contact round hole: 12 contact points, exact on round faces; triangles up to 0.00061 mm inside\n" in listed
 
 
 def turned(frame: cases.Frame) -> tc.Assembly:

@@ -21,5 +21,5 @@ def check(
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
         typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
     for pair in program.nominal.pairs:
-        typer.echo(f"  contact {pair.name}: {len(pair.P_m)} contact points within reach")
+        typer.echo(f"  contact {pair.name}: {pair.in_words}")
     typer.echo("no faults found")

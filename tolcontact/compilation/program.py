@@ -11,7 +11,7 @@ from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.tape import Tape
-from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
+from tolcontact.discretization import Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import GapMap, gap_map
@@ -65,7 +65,7 @@ class Program(Readable):
         nominal, method = self.nominal, self.method
         rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
         rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
-        rows += [f"  contact {pair.name}: {_points_of(pair)}" for pair in nominal.pairs]
+        rows += [f"  contact {pair.name}: {pair.in_words}" for pair in nominal.pairs]
         rows += [
             f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
@@ -116,12 +116,6 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 if not measure.points
             },
         )
-
-
-def _points_of(pair: ContactPoints) -> str:
-    """What a pair has for contact points, in words."""
-    said = f"{len(pair.P_m)} contact points{' of round faces, exact at any pose' if pair.round else ''}"
-    return said + (f"; fitted to triangles that lie up to {pair.bulge:.2g} mm inside" if pair.bulge > 0 else "")
 
 
 def _gaps_only(points: RoundPoints) -> ca.Function:

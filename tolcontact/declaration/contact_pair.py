@@ -49,5 +49,5 @@ class ContactPair(Readable):
             points = f"spacing {self.spacing:g} mm"
         else:
             said = VERTICES if self.points == VERTICES else f"{self.points} points"
-            points = "points by curvature" if self.points is None else said
+            points = "points by geometry" if self.points is None else said
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}"

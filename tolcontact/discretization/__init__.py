@@ -83,7 +83,7 @@ pair has sampled points. `tolcontact check` says which pairs are of round faces;
 >>> aside = stand.measure("aside", pin.point(0, 0, 0), along="x")
 >>> print(tc.build(stand))
 program of pin in a hole: ...
-  contact fit: 12 contact points of round faces, exact at any pose; fitted to triangles that lie up to 0.043 mm inside
+  contact fit: 12 contact points, exact on round faces; triangles up to 0.043 mm inside
 ...
 
 The faces are taken to be as long as they are in the nominal assembly: a shaft that is pushed out of its hole, or a ball beyond

@@ -77,6 +77,12 @@ class ContactPoints:
         return max(map(chord_height, pieces), default=0.0)
 
     @property
+    def in_words(self) -> str:
+        """How many points they are, of what, and what they rely on."""
+        said = f"{len(self.P_m)} contact points{', exact on round faces' if self.round else ''}"
+        return said + (f"; triangles up to {self.bulge:.2g} mm inside" if self.bulge > 0 else "")
+
+    @property
     def is_supports(self) -> bool:
         """Whether they are one-sided locators."""
         return self.surface is None
