@@ -1,6 +1,7 @@
 """What a STEP file holds: shapes, put back onto the surfaces that the file knows, and bodies in their places. Lengths in mm."""
 
 import json
+import logging
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,6 +23,8 @@ RIGID = 1e-5  # how far a motion may stretch lengths, having passed through sing
 OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # attribute of a mesh: the B-rep face of each triangle
 SURFACES = "surfaces"  # and the surface of each B-rep face, None if the file states none
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +114,7 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     whole = (mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)
     shape, brep = arrays["piece"][whole], arrays["brep"][whole]
     if not whole.all():
+        log.info('"%s": %d triangles on edges of no length are left out', path, int((~whole).sum()))
         mesh.update_faces(whole)
     vertices, off = np.array(mesh.vertices), OFF * float(arrays["chord"])
     known: list[list[Form | None]] = []
