@@ -14,6 +14,7 @@ from tolcontact.discretization.surface import Surface
 PROBES = 2000  # points of a face at least, beside the corners of its triangles
 DENSER = 4  # times as close as contact points, as far as MOST allows
 MOST = 20_000
+SLIVERS = 20  # times as many would halving long triangles give: points are drawn instead
 TOGETHER = 16  # poses at once
 
 
@@ -98,7 +99,12 @@ def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
     """A side of a pair with so many contact points."""
     wanted = min(max(PROBES, contacts * DENSER**2), MOST)
     step = float(np.sqrt(face.mesh.area / wanted))
-    vertices, _ = trimesh.remesh.subdivide_to_size(face.mesh.vertices, face.mesh.faces, max_edge=step, max_iter=30)
+    longest = np.linalg.norm(np.roll(face.mesh.triangles, -1, axis=1) - face.mesh.triangles, axis=2).max(axis=1)
+    if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() > SLIVERS * wanted:
+        sampled, _ = trimesh.sample.sample_surface(face.mesh, wanted, seed=0)
+        vertices = np.concatenate([face.mesh.vertices, sampled])
+    else:
+        vertices, _ = trimesh.remesh.subdivide_to_size(face.mesh.vertices, face.mesh.faces, max_edge=step, max_iter=30)
     points = np.unique(np.asarray(vertices), axis=0)
     if len(points) > MOST:
         points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
