@@ -198,6 +198,12 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
         points.append(RoundPoint(wall, True, beside, NONE, NONE, 2.0, True, x, 1.0))
         out.append(-100 * x)
     check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+    shaft, x = Form("cylinder", np.zeros(3), np.array([0, 0, 1.0]), radius=5.05), np.array([1.0, 0, 0])
+    ends = [
+        RoundPoint(shaft, True, np.array([-1.0, aside, 5.0]), shaft.axis, cut, 5.0, True, x, 1.0)
+        for aside, cut in itertools.product((-0.5, 0.7), (NONE, shaft.axis))
+    ]
+    check_gaps(RoundPoints.of(ends), rng, turn=3e-3)
     for k, far in enumerate(out):
         evaluate = round_gaps(RoundPoints.of([points[k]]))
         assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), 0)[0]) > 40
@@ -354,6 +360,11 @@ def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     trough = strip([(14 * np.sin(t), -8 * np.cos(t)) for t in np.linspace(-1.5, 1.5, 20)])
     assert not pair_between(BALL, (), trough, (ANY,), at=(0, 0, -2.9)).round
     assert pair_between(BALL, (), grooved(6, 1.5), (ANY,), at=(0, 0, -0.9)).round
+    lying = trimesh.creation.cylinder(5, 30, sections=48)
+    lying.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
+    barrel = (tc.Cylinder(),)
+    assert pair_between(lying, barrel, grooved(5.2, 1.5), (ANY,), at=(0, 0, -0.1)).round
+    assert not pair_between(lying, barrel, grooved(4.9, 1.5), (ANY,), at=(0, 0, 0.1)).round
     small = grooved(4.5, 1.5)
     assert not pair_between(BALL, (), small, (ANY,), at=(0, 0, 2)).round  # it rests on the groove's edges
 
