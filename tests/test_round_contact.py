@@ -17,7 +17,7 @@ from tests.helpers import R_t, simulate
 from tolcontact import vocabulary as words
 from tolcontact.cli.app import app
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
-from tolcontact.discretization.analytic import ANALYTIC, Form
+from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.faces import patch
 from tolcontact.discretization.round_points import NONE
 from tolcontact.mechanics.round_gap import round_gaps
@@ -172,7 +172,7 @@ def unit(rng):
 def test_a_ball_beside_walls_of_every_kind():
     """Gaps another way, and derivatives by differences; of hollow walls from as far away as a ball that touches them is."""
     rng, points = np.random.default_rng(3), []
-    for kind, is_hollow, on_moving in itertools.product(ANALYTIC, (False, True), (False, True)):
+    for kind, is_hollow, on_moving in itertools.product(words.SURFACE_KINDS, (False, True), (False, True)):
         if kind in ("plane", "torus") and is_hollow:
             continue
         w = unit(rng)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from tolcontact.declaration.vectors import DIRECTIONS, Vector, is_finite, is_length, vector
 from tolcontact.declaration.vectors import direction as _direction
 from tolcontact.readable import Readable
+from tolcontact.vocabulary import SURFACE_KINDS
 
 if TYPE_CHECKING:
     import numpy as np
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 FACE_ANGLE = math.radians(1.0)
-KINDS = ("plane", "cylinder", "cone", "sphere", "torus", "general")  # of surfaces
+KINDS = (*SURFACE_KINDS, "general")  # of surfaces
 
 
 class Selection(Protocol):

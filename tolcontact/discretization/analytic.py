@@ -1,4 +1,4 @@
-"""Surfaces that a file knows exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm."""
+"""Surfaces that are known exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -9,8 +9,7 @@ import numpy as np
 
 from tolcontact.vocabulary import SURFACE_KINDS
 
-ANALYTIC = SURFACE_KINDS
-SIZES = ("origin", "axis", "radius", "minor", "angle")
+NUMBERS = ("origin", "axis", "radius", "minor", "angle")
 METRE = 1e3  # [mm], the reader's unit
 ROUNDS = 4  # of Newton's method: as many as bring vertices off by micrometres to the last digit
 PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different ones
@@ -20,7 +19,7 @@ PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex w
 class Form:
     """A surface without ends.
 
-    kind     one of `ANALYTIC`
+    kind     one of `SURFACE_KINDS`
     origin   a point of a plane or of the axis (3,) [mm]: a cone's apex, the centre of a sphere or torus
     axis     normal of a plane, or unit vector along the axis (3,): from a cone's apex into it; of a sphere it has no meaning
     radius   [mm] of a cylinder or sphere, or of the circle in a torus' middle; else 0
@@ -76,24 +75,24 @@ class Form:
 
 
 def form_arrays(of: Sequence[Form | None]) -> dict[str, np.ndarray]:
-    """Surfaces as arrays (surface, ...) by name, as an archive has them; `kind` is the number in `ANALYTIC`, -1 of None."""
+    """Surfaces as arrays (surface, ...) by name, as an archive has them; `kind` is its number in SURFACE_KINDS, -1 of None."""
     known = [form or Form("plane", np.zeros(3), np.zeros(3)) for form in of]
-    kinds = np.array([-1 if form is None else ANALYTIC.index(form.kind) for form in of])
-    return {"kind": kinds} | {name: np.array([getattr(form, name) for form in known]) for name in SIZES}
+    kinds = np.array([-1 if form is None else SURFACE_KINDS.index(form.kind) for form in of])
+    return {"kind": kinds} | {name: np.array([getattr(form, name) for form in known]) for name in NUMBERS}
 
 
 def forms_of(arrays: Mapping[str, np.ndarray]) -> list[Form | None]:
     """Surfaces from such arrays."""
-    sizes = {name: values for name, values in arrays.items() if name != "kind"}
+    numbers = {name: values for name, values in arrays.items() if name != "kind"}
     return [
-        None if kind < 0 else Form(ANALYTIC[kind], **{name: values[k] for name, values in sizes.items()})
+        None if kind < 0 else Form(SURFACE_KINDS[kind], **{name: values[k] for name, values in numbers.items()})
         for k, kind in enumerate(arrays["kind"])
     ]
 
 
 def forms(text: str) -> list[Form | None]:
     """The surface of each B-rep face, from what the reader said of them; None of those that are none of these."""
-    return [_form(said) if said and said.get("type") in ANALYTIC else None for said in json.loads(text)]
+    return [_form(said) if said and said.get("type") in SURFACE_KINDS else None for said in json.loads(text)]
 
 
 def _form(said: dict[str, Any]) -> Form | None:

@@ -1,4 +1,4 @@
-"""A face of a STEP file's boundary representation, described. Lengths in mm."""
+"""The faces of a part, described: those of a STEP file's boundary representation, or smooth pieces. Lengths in mm."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES
 from tolcontact.readable import Readable
 
-FIT = 1e-3  # [mm] a face none of whose vertices is farther off a plane, cylinder or sphere is on one
+FIT = 1e-3  # [mm] a face none of whose vertices is farther off a plane, cylinder, cone or sphere is on one
 DESCRIBED = "described"
 
 

@@ -1,9 +1,10 @@
 """Where the faces of a contact pair may touch: points of the moving face, and their feet on the reference face."""
 
+import functools
 import logging
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from tolcontact.discretization.nominal import ContactPoints, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.overlap import overlap_corners, rim_points
 from tolcontact.discretization.round_contact import round_points
-from tolcontact.discretization.round_points import RoundPoint, RoundPoints
+from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.discretization.spreading import own_vertices, spread
 from tolcontact.discretization.surface import Surface
 from tolcontact.errors import ContactWarning, shown
@@ -39,9 +40,18 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     target = patch(pair.reference, meshes).placed(*reference.placement)
     placed_own = own.placed(*moving.placement)
-    found = round_points(placed_own, target, reach) if pair.points is None and pair.spacing is None else []
-    if found:
-        return _of_round(assembly, pair, moving, reference, found, placed_own, target)
+    made = functools.partial(
+        ContactPoints,
+        pair.name,
+        assembly.parts.index(moving.part),
+        assembly.parts.index(reference.part),
+        surface=target,
+        own=placed_own,
+        facets=facet_error(placed_own, target, reach),
+    )
+    if pair.points is None and pair.spacing is None and (found := round_points(placed_own, target, reach)):
+        touching, feet, normals = (np.array(each) for each in zip(*(point.nominal() for point in found), strict=True))
+        return made(touching, feet, normals, Offsets.none(len(found)), round=RoundPoints.of(found))
     if isinstance(pair.points, str):
         sampled = own_vertices(own.mesh)
     else:
@@ -73,44 +83,7 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
             f"its faces {pair.moving} and {pair.reference} point the same way, so one cannot rest on the other; "
             "choose faces that face each other"
         )
-    return ContactPoints(
-        pair.name,
-        assembly.parts.index(moving.part),
-        assembly.parts.index(reference.part),
-        P_m[kept],
-        P_r[kept],
-        n_r[kept],
-        Offsets.none(int(kept.sum())),
-        surface=target,
-        own=placed_own,
-        facets=facet_error(placed_own, target, reach),
-    )
-
-
-def _of_round(
-    assembly: Assembly,
-    pair: ContactPair,
-    moving: NominalPart,
-    reference: NominalPart,
-    found: Sequence[RoundPoint],
-    own: Surface,
-    target: Surface,
-) -> ContactPoints:
-    """The contact points of balls or shafts: where they touch, as seen from the nominal place."""
-    P_m, P_r, n_r = (np.array(each) for each in zip(*(point.nominal() for point in found), strict=True))
-    return ContactPoints(
-        pair.name,
-        assembly.parts.index(moving.part),
-        assembly.parts.index(reference.part),
-        P_m,
-        P_r,
-        n_r,
-        Offsets.none(len(found)),
-        surface=target,
-        own=own,
-        facets=sum(max((form.residual for form in face.forms), default=0.0) for face in (own, target)),
-        round=RoundPoints.of(found),
-    )
+    return made(P_m[kept], P_r[kept], n_r[kept], Offsets.none(int(kept.sum())))
 
 
 def _announce(pair: ContactPair, area: float, count: int | None) -> None:

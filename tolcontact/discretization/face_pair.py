@@ -9,6 +9,7 @@ import trimesh
 
 from tolcontact import poses as pose
 from tolcontact.discretization.curvature import chord_height
+from tolcontact.discretization.edges import rim
 from tolcontact.discretization.surface import Surface
 
 PROBES = 2000  # points of a face at least, beside the corners of its triangles
@@ -99,13 +100,24 @@ def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
     """A side of a pair with so many contact points."""
     wanted = min(max(PROBES, contacts * DENSER**2), MOST)
     step = float(np.sqrt(face.mesh.area / wanted))
-    longest = np.linalg.norm(np.roll(face.mesh.triangles, -1, axis=1) - face.mesh.triangles, axis=2).max(axis=1)
-    if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() > SLIVERS * wanted:
-        sampled, _ = trimesh.sample.sample_surface(face.mesh, wanted, seed=0)
-        vertices = np.concatenate([face.mesh.vertices, sampled])
-    else:
-        vertices, _ = trimesh.remesh.subdivide_to_size(face.mesh.vertices, face.mesh.faces, max_edge=step, max_iter=30)
-    points = np.unique(np.asarray(vertices), axis=0)
+    points = np.unique(_all_over(face.mesh, step, wanted), axis=0)
     if len(points) > MOST:
         points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
     return Side(face, body, face.project(points)[0] if face.forms else points)
+
+
+def _all_over(mesh: trimesh.Trimesh, step: float, wanted: int) -> np.ndarray:
+    """Points (point, 3) of a face some `step` [mm] apart, its rim and vertices among them.
+
+    Where halving the edges of long slivers would give too many, so many as are `wanted` are drawn inside, with a fixed seed.
+    """
+    vertices, corners = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
+    longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
+    if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() <= SLIVERS * wanted:
+        return np.asarray(trimesh.remesh.subdivide_to_size(vertices, mesh.faces, max_edge=step, max_iter=30)[0])
+    inside, _ = trimesh.sample.sample_surface(mesh, wanted, seed=0)
+    along_rim = [
+        np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / step)) + 1)
+        for start, end in vertices[rim(mesh.faces)]
+    ]
+    return np.concatenate([vertices, inside, *along_rim])

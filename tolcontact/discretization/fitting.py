@@ -7,6 +7,8 @@ from scipy.optimize import least_squares
 
 from tolcontact.discretization.analytic import Form
 
+FACETS = 5  # directions of facets at least, from which a round surface is told from a fold
+SAME_WAY = 1e-9  # normals that differ by less are one direction
 LEAST = 1e-4  # rad: a cone's angle to its axis, and to the plane across it
 SOME = 300  # triangles that are looked at first, and
 ROUGHLY = 10  # how much farther off their corners may be
@@ -18,11 +20,13 @@ LARGE = 1e4  # radii, in sizes of what they are fitted to: more is a plane's rou
 def fitted(triangles: np.ndarray, within: float) -> Form | None:
     """The surface that no corner of `triangles` (face, 3, 3) [mm] is farther off than `within` [mm]; None if none is.
 
-    Between two rings of vertices there is room for a sphere as well as for a cone: it is taken for the simpler one.
+    Between two rings of vertices there is room for a sphere as well as for a cone: it is taken for the simpler one. What looks
+    in fewer than FACETS directions is a plane, or bent.
     """
     if len(np.unique(triangles.reshape(-1, 3), axis=0)) < 4:
         return None
-    for attempt in (_plane, _cylinder, _cone, _sphere):
+    is_bent = len(np.unique(np.round(_normals(triangles) / SAME_WAY), axis=0)) < FACETS
+    for attempt in (_plane,) if is_bent else (_plane, _cylinder, _cone, _sphere):
         for some in (_spread(triangles), triangles) if len(triangles) > SOME else (triangles,):
             form = attempt(np.unique(some.reshape(-1, 3), axis=0), some)
             if form is None or form.residual > within * (1 if some is triangles else ROUGHLY):

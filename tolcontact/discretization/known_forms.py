@@ -9,9 +9,8 @@ from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES
 
-FACETS = 5  # directions of facets at least, from which a round surface is told from a fold
 ALIKE = 10  # times as far as they were fitted may faces be off each other's surface that are taken for one
-SAME = 1e-9  # normals that differ by less are one direction
+SAME = 1e-9  # of a part's size: faces that are no farther off each other's surface are parts of one
 
 
 def known_forms(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[Form], np.ndarray]:
@@ -61,9 +60,6 @@ def _looks_out(mesh: trimesh.Trimesh, form: Form, own: np.ndarray) -> bool:
 
 
 def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:
-    normals = np.asarray(mesh.face_normals)[own]
-    if len(np.unique(np.round(normals / SAME), axis=0)) < FACETS:
-        return None
     form = fitted(np.asarray(mesh.triangles)[own], FIT)
     return None if form is None or form.kind == "plane" else form
 
