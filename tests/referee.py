@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
-from studies.certificates.judge import round_points
+from studies.certificates.judge import as_archived
 
 
 def cross(v):
@@ -105,7 +105,7 @@ def gaps(pair, R, t):
     if pair.round:
         turn = R[pair.reference].T
         return np.array(
-            [p.gaps(turn @ R[pair.moving], turn @ (t[pair.moving] - t[pair.reference])) for p in round_points(pair)]
+            [p.gaps(turn @ R[pair.moving], turn @ (t[pair.moving] - t[pair.reference])) for p in as_archived(pair.round)]
         )
     x_m = pair.P_m @ R[pair.moving].T + t[pair.moving]
     x_r = pair.P_r @ R[pair.reference].T + t[pair.reference]

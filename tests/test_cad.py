@@ -3,6 +3,7 @@
 import itertools
 import json
 import logging
+import re
 
 import numpy as np
 import pytest
@@ -285,3 +286,29 @@ def test_the_units_of_a_file_are_stated(file):
         (b"#1=X();", ""),
     ):
         assert step_text(text).units == units
+
+
+@pytest.mark.parametrize("name", ["cover", "housing"])
+def test_surfaces_have_the_numbers_of_the_file(name):
+    """Planes within 1e-9 mm, radii within 1e-12 mm of what the text says."""
+    path = cases.MODELS / f"{name}.step"
+    text = re.sub(r"\s+", "", path.read_text())
+    points, directions = (
+        {
+            key: np.array(numbers.split(","), dtype=float)
+            for key, numbers in re.findall(rf"#(\d+)={entity}\('[^']*',\(([^)]*)\)\)", text)
+        }
+        for entity in ("CARTESIAN_POINT", "DIRECTION")
+    )
+    axes = {key: rest for key, *rest in re.findall(r"#(\d+)=AXIS2_PLACEMENT_3D\('[^']*',#(\d+),#(\d+)", text)}
+    placed = [axes[key] for key in re.findall(r"=PLANE\('[^']*',#(\d+)\)", text)]
+    planes = np.array([[*directions[n], points[p] @ directions[n]] for p, n in placed])
+    radii = np.array(re.findall(r"=CYLINDRICAL_SURFACE\('[^']*',#\d+,([^)]*)\)", text), dtype=float)
+    forms = shape(tc.Mesh(path)).mesh.metadata[SURFACES]
+    assert {form.kind for form in forms} == ({"plane", "cylinder"} if len(radii) else {"plane"})
+    for form in forms:
+        if form.kind == "cylinder":
+            assert np.abs(radii - form.radius).min() < 1e-12
+        else:
+            own = np.array([*form.axis, form.axis @ form.origin])
+            assert min(np.abs(planes - sign * own).max(axis=1).min() for sign in (1, -1)) < 1e-9

@@ -16,7 +16,7 @@ NARROWINGS = 60
 GOLDEN = (np.sqrt(5) - 1) / 2
 
 
-def round_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[RoundPoint]":
+def archived_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[ArchivedPoint]":
     """Those of the contact points `own` (point,) that are of round faces; `contact`: variables of that group, by name."""
     if words.POINT_OF_ROUND.name not in contact:
         return []
@@ -24,10 +24,12 @@ def round_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[Ro
     wall, body = (
         {name: contact[variable.name][chosen] for name, variable in of.items()} for of in (words.OF_WALL, words.OF_ROUND)
     )
-    return [RoundPoint(*({name: values[k] for name, values in of.items()} for of in (wall, body))) for k in range(len(chosen))]
+    return [
+        ArchivedPoint(*({name: values[k] for name, values in of.items()} for of in (wall, body))) for k in range(len(chosen))
+    ]
 
 
-class RoundPoint(NamedTuple):
+class ArchivedPoint(NamedTuple):
     """A ball, or the end of a shaft, and a wall, by the names that the vocabulary gives what they are."""
 
     wall: Mapping[str, Any]

@@ -22,7 +22,7 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.archive import open_archive
 from tolcontact.errors import OptionError
-from tolcontact.recomputed import round_points
+from tolcontact.recomputed import archived_points
 
 Results = xr.DataTree | str | Path
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
@@ -162,7 +162,7 @@ class _Pair:
             int(contact[variable.name][pair]) for variable in (words.MOVING_PART, words.REFERENCE_PART)
         )
         self.locators = contact[words.LOCATOR_OF_POINT.name][own]
-        self.round = round_points(contact, np.flatnonzero(own))
+        self.round = archived_points(contact, np.flatnonzero(own))
 
     def least_gaps(self, rows: Rows, some: slice) -> np.ndarray:
         """The least gaps (realization, state) [mm] of some realizations."""

@@ -15,9 +15,9 @@ import trimesh
 import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
-from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.discretization.curvature import chord_height
-from tolcontact.recomputed import RoundPoint
+from tolcontact.recomputed import ArchivedPoint
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -53,7 +53,9 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
         if pair.round:
             turn = R[:, CORRECTED, pair.reference].swapaxes(1, 2)
             apart = np.einsum("nij,nj->ni", turn, t[:, CORRECTED, pair.moving] - t[:, CORRECTED, pair.reference])
-            gap = np.stack([point.gaps(turn @ R[:, CORRECTED, pair.moving], apart) for point in round_points(pair)], axis=1)
+            gap = np.stack(
+                [point.gaps(turn @ R[:, CORRECTED, pair.moving], apart) for point in as_archived(pair.round)], axis=1
+            )
         if pair.is_supports:
             gap = gap - run["deviations"][:, pair.offsets.columns]
         here = certified & ~run["searched"].astype(bool)
@@ -82,13 +84,10 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
     return found
 
 
-def round_points(pair: ContactPoints) -> list[RoundPoint]:
-    """The contact points of round faces, of which gaps are computed another way than the simulation does it."""
-    walls, points = pair.round.walls, pair.round.points
-    return [
-        RoundPoint(*({name: values[k] for name, values in of.items()} for of in (walls, points)))
-        for k in range(len(pair.round))
-    ]
+def as_archived(points: RoundPoints) -> list[ArchivedPoint]:
+    """Contact points of round faces, as what computes gaps another way than the simulation does it."""
+    both = points.walls, points.points
+    return [ArchivedPoint(*({name: values[k] for name, values in of.items()} for of in both)) for k in range(len(points))]
 
 
 def shifted(R: np.ndarray, t: np.ndarray, pair: ContactPoints) -> float:

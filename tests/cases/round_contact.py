@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 
 import tolcontact as tc
 from tests.cases.locators import parked
+from tests.cases.round_bodies import ball_in_a_cone, peg_in_a_hole, shaft_in_a_v
 
 BARREL = tc.Cylinder(inner=False)
 
@@ -80,3 +81,9 @@ def cylinder_in_a_slot(sections: int = 32, clearance: float = 0.1, tolerance: fl
         a.contact(f"{jaw.name} side", moving=pin.face(BARREL), reference=jaw.face(side))
     a.measure("aside", pin.point(0, 0, 0), along="y", tolerance=tolerance)
     return a
+
+
+EVERY = {
+    "peg": peg_in_a_hole, "V": shaft_in_a_v, "cone": ball_in_a_cone, "jammed": jammed_peg, "pins": ball_on_three_pins,
+    "slot": cylinder_in_a_slot,
+}  # fmt: skip

@@ -174,6 +174,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
                 _check_variable(group, variable)
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
+        _need_together(group, words.KNOWN_SURFACES)
         for variable in (*OF_MESH, *words.KNOWN_SURFACES):
             _check_variable(group, variable)
     for name in LABELS:
@@ -204,6 +205,7 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
 
 def _check_needed(file: netCDF4.Dataset) -> None:
     """What summaries and models are read from."""
+    _need_together(file["contact"], words.ROUND)
     for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (words.DECLARATION,))):
         _need(file[group], needed)
     _need(file, (words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS))
@@ -226,6 +228,15 @@ def _need(group: netCDF4.Dataset, needed: tuple[Variable, ...]) -> None:
     missing = [variable.name for variable in needed if variable.name not in group.variables]
     if missing:
         raise DamagedError(f"is damaged: group {group.path} has no {', '.join(missing)}")
+
+
+def _need_together(group: netCDF4.Dataset, variables: tuple[Variable, ...]) -> None:
+    """Variables that a group has all of, or none; the second of them are kinds of surfaces."""
+    if any(variable.name in group.variables for variable in variables):
+        _need(group, variables)
+        kinds = np.ma.getdata(group[variables[1].name][...])
+        if ((kinds < -1) | (kinds >= len(words.SURFACE_KINDS))).any():
+            raise DamagedError(f"is damaged: group {group.path} has surfaces of unknown kinds")
 
 
 def _texts(stored: netCDF4.Variable) -> list[str]:

@@ -79,7 +79,8 @@ True
 - Contact points are those of the nominal state. If rims of faces shift against each other *and* tilt, their edges may lie
   deeper than the points, by about shift times tilt; `surfaces` measures it.
 - A ball or shaft has the wall that it has nominally: where a hole or a groove ends is not looked for again as it moves along.
-  A hole whose rim is not square to its axis, a shaft across another one, and two shafts side by side have points.
+  A hole whose rim is not square to its axis, a shaft across another one, and two shafts side by side have points. What touches
+  of balls and shafts is always constrained: `active_set="initial"` leaves none of it out.
 - "linearized" neglects second-order rotation. Rows that contradict each other (a tab wider than its slot) end as
   `not_converged`, as does a step that fails; only "exact" tells the two apart.
 - `not_assemblable` means that no pose without penetration was found near the raw one, not that none exists.

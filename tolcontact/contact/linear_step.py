@@ -39,6 +39,7 @@ class LinearStep:
         self._usable = USABLE * group.group.length
         self.spans = group.program.spans
         self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
+        # The curvature of walls around round faces counts in every step, not in Newton's alone.
         self.knows_walls = any(program.nominal.pairs[pair].round for pair in group.group.pairs)
 
     def twin(self) -> "LinearStep":

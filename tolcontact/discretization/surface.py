@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.edges import CREASE, on_rim, rim
 
+OVER = 1e-6  # of a face's size: what stands no farther beside its rim is over it
 TURN = 0.3  # rad: what the normals of a triangle and of the form that it stands for differ by at most, and
 BULGE = 0.05  # of a face's size: how far it may be off that
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
@@ -45,9 +46,8 @@ class Surface:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._given is None else self._given)
         for form, own, outside in self._known:
-            _, slope = form.distance(np.asarray(self.mesh.triangles)[own].reshape(-1, 3))
-            exact = np.linalg.norm(slope, axis=1) > 0.5  # not in the apex of a cone
-            normals[own] = np.where(exact[:, None], outside * slope, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
+            corners = np.asarray(self.mesh.triangles)[own].reshape(-1, 3)
+            normals[own] = _normals_of(form, outside, corners, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
@@ -117,9 +117,7 @@ class Surface:
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         for form, some, outside in self._stand_for(triangle):
-            _, slope = form.distance(points[some])
-            exact = np.linalg.norm(slope, axis=1) > 0.5
-            normals[some] = np.where(exact[:, None], outside * slope, normals[some])
+            normals[some] = _normals_of(form, outside, points[some], normals[some])
         return np.asarray(normals)
 
     def _stand_for(self, triangle: np.ndarray) -> list[tuple[Form, np.ndarray, float]]:
@@ -141,12 +139,13 @@ class Surface:
         """Project `points` (point, 3) [mm] onto the surface.
 
         Returns the nearest points (point, 3) [mm], the outward unit normals there (point, 3), and a mask (point,) of the
-        points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. On curved faces the
-        normals are interpolated between the corners of a facet: they change steadily as a point moves.
+        points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. Where a triangle stands
+        for a form, nearest points and normals are those of the form. On other curved faces normals are interpolated between
+        the corners of a facet: they change steadily as a point moves.
         """
         triangle, nearest = self.nearest(points)
         sideways, at_rim = self._sideways(points, triangle, nearest)
-        over = ~at_rim | (sideways <= max(margin, 1e-6 * self.mesh.scale))
+        over = ~at_rim | (sideways <= max(margin, OVER * self.mesh.scale))
         feet = np.array(nearest)
         for form, some, _ in self._stand_for(triangle):
             below, own = form.project(nearest[some]), form.project(points[some])
@@ -168,7 +167,7 @@ class Surface:
             depth[some] = np.abs(height[some])
         behind = np.flatnonzero(height < 0)
         sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
-        over = ~at_rim | (sideways <= 1e-6 * self.mesh.scale)
+        over = ~at_rim | (sideways <= OVER * self.mesh.scale)
         found = np.zeros(len(points))
         found[behind[over]] = depth[behind[over]]
         return found
@@ -199,6 +198,13 @@ class Piece(NamedTuple):
     form: Form
     is_hollow: bool
     surface: Surface
+
+
+def _normals_of(form: Form, outside: float, points: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """Outward normals (point, 3) of a form; those given (point, 3) where it has none: in the apex of a cone, on an axis."""
+    _, slope = form.distance(points)
+    has_one = np.linalg.norm(slope, axis=1) > 0.5
+    return np.where(has_one[:, None], outside * slope, otherwise)
 
 
 def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:

@@ -1,0 +1,86 @@
+"""Gaps of balls and shafts beside walls: against another way to compute them, and their derivatives against differences."""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from studies.certificates.judge import as_archived
+from tests.cases import round_contact as round_cases
+from tolcontact import vocabulary as words
+from tolcontact.discretization import RoundPoint, RoundPoints, discretize
+from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.round_points import NONE
+from tolcontact.mechanics.round_gap import round_gaps
+
+
+def check_gaps(points, rng, turn):
+    """Gaps computed another way, and their derivatives by differences, at some poses."""
+    evaluate, count = round_gaps(points), len(points)
+    again = as_archived(points)
+    step = 1e-6
+    for _ in range(3):
+        R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
+        X, reactions = np.concatenate([R.ravel(), t]), rng.uniform(size=count)
+        gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, reactions))
+        assert np.abs(gaps.ravel() - [point.gaps(R, t) for point in again]).max() < 1e-11
+        moved = [[[part.full() for part in evaluate(X + sign * step * e, reactions)] for sign in (1, -1)] for e in np.eye(12)]
+        rates = np.hstack([(up[0] - down[0]) / (2 * step) for up, down in moved])
+        bends = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
+        assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
+        assert np.abs(bends - bow + wrap).max() < 1e-6 * max(1, np.abs(bow - wrap).max())
+        assert np.linalg.eigvalsh(wrap).min() > -1e-9 * max(1, np.abs(wrap).max())
+
+
+@pytest.mark.parametrize("name", round_cases.EVERY)
+def test_gaps_of_round_faces_are_those_of_another_way_and_their_derivatives_theirs(name):
+    rng = np.random.default_rng(5)
+    for pair in discretize(round_cases.EVERY[name]()).pairs:
+        if pair.round:
+            check_gaps(pair.round, rng, turn=3e-3)
+
+
+def unit(rng):
+    vector = rng.normal(size=3)
+    return vector / np.linalg.norm(vector)
+
+
+def test_a_ball_beside_walls_of_every_kind():
+    """Gaps another way, and derivatives by differences; of hollow walls from as far away as a ball that touches them is."""
+    rng, points = np.random.default_rng(3), []
+    for kind, is_hollow, on_moving in itertools.product(words.SURFACE_KINDS, (False, True), (False, True)):
+        if kind in ("plane", "torus") and is_hollow:
+            continue
+        w = unit(rng)
+        x = np.cross(w, unit(rng))
+        x /= np.linalg.norm(x)
+        sizes = {"cone": {"angle": 0.6}, "plane": {}, "torus": {"radius": 20.0, "minor": 5.0}}.get(kind, {"radius": 20.0})
+        wall = Form(kind, rng.normal(size=3), w, **sizes)
+        beside = 30 * x + 3 * w if not is_hollow else 6 * x + 20 * w if kind == "cone" else 19 * x + 3 * w
+        points.append(RoundPoint(wall, is_hollow, wall.origin + beside, NONE, NONE, 2.0, on_moving, x, np.pi))
+    check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+
+
+def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
+    """Gaps beyond the end of the wall are those of its last tangent planes; and there is no wall where it is open."""
+    rng, points, out = np.random.default_rng(4), [], []
+    for kind, angle in itertools.product(("cylinder", "cone", "sphere"), (0.3, 1.5, 3.0)):
+        w = unit(rng)
+        x = np.cross(w, unit(rng))
+        x /= np.linalg.norm(x)
+        wall = Form(kind, np.zeros(3), w, **({"angle": 0.6} if kind == "cone" else {"radius": 20.0}))
+        aside = np.cos(angle) * x + np.sin(angle) * np.cross(w, x)
+        beside = 6 * aside + 20 * w if kind == "cone" else 18.5 * aside
+        points.append(RoundPoint(wall, True, beside, NONE, NONE, 2.0, True, x, 1.0))
+        out.append(-100 * x)
+    check_gaps(RoundPoints.of(points), rng, turn=3e-2)
+    shaft, x = Form("cylinder", np.zeros(3), np.array([0, 0, 1.0]), radius=5.05), np.array([1.0, 0, 0])
+    ends = [
+        RoundPoint(shaft, True, np.array([-1.0, aside, 5.0]), shaft.axis, cut, 5.0, True, x, 1.0)
+        for aside, cut in itertools.product((-0.5, 0.7), (NONE, shaft.axis))
+    ]
+    check_gaps(RoundPoints.of(ends), rng, turn=3e-3)
+    for k, far in enumerate(out):
+        evaluate = round_gaps(RoundPoints.of([points[k]]))
+        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), 0)[0]) > 40
