@@ -139,8 +139,8 @@ def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notice
 def test_compiled_scans_equal_those_in_numpy(make, activity):
     program = tc.build(make(), solver="daqp")
     block = next(simulate_blocks(program, samples=50, seed=1))
-    _, relative = _observe(program, block.poses[:, RAW])
-    _, later = _observe(program, block.poses[:, 1])
+    _, relative = _observe(program, block.poses[:, RAW], block.deviations)
+    _, later = _observe(program, block.poses[:, 1], block.deviations)
     (group,) = program.groups
     for position, index in enumerate(group.group.pairs):
         tables = [side.table for side in group.group.sides if side.pair == position]

@@ -19,13 +19,15 @@ def check_gaps(points, rng, turn):
     """Gaps computed another way, and their derivatives by differences, at some poses."""
     evaluate, count = round_gaps(points), len(points)
     again = as_archived(points)
-    step = 1e-6
+    step, heights = 1e-6, np.random.default_rng(2)
     for _ in range(3):
         R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
-        X, reactions = np.concatenate([R.ravel(), t]), rng.uniform(size=count)
-        gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, reactions))
-        assert np.abs(gaps.ravel() - [point.gaps(R, t) for point in again]).max() < 1e-11
-        moved = [[[part.full() for part in evaluate(X + sign * step * e, reactions)] for sign in (1, -1)] for e in np.eye(12)]
+        X, grown, reactions = np.concatenate([R.ravel(), t]), heights.normal(scale=0.01, size=2), rng.uniform(size=count)
+        gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, grown, reactions))
+        assert np.abs(gaps.ravel() - [point.gaps(R, t, *grown) for point in again]).max() < 1e-11
+        moved = [
+            [[part.full() for part in evaluate(X + sign * step * e, grown, reactions)] for sign in (1, -1)] for e in np.eye(12)
+        ]
         rates = np.hstack([(up[0] - down[0]) / (2 * step) for up, down in moved])
         bends = np.column_stack([(up[1] - down[1]).T @ reactions / (2 * step) for up, down in moved])
         assert np.abs(rates - slopes).max() < 1e-6 * max(1, np.abs(slopes).max())
@@ -83,4 +85,4 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     check_gaps(RoundPoints.of(ends), rng, turn=3e-3)
     for k, far in enumerate(out):
         evaluate = round_gaps(RoundPoints.of([points[k]]))
-        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), 0)[0]) > 40
+        assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), np.zeros(2), 0)[0]) > 40

@@ -7,8 +7,8 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.variation import draws
-from tolcontact.variation.draws import STREAM, draw
+from tolcontact.variation.draws import draw
+from tolcontact.variation.uniforms import STREAM, uniform
 
 SHAPES = {
     "normal": stats.norm(0, 0.5),
@@ -66,6 +66,6 @@ def test_a_locator_keeps_its_draws_when_others_come_or_go():
 
 def test_shares_are_in_the_middle_of_the_steps_that_a_draw_may_take():
     """Odd multiples of 2^-53: neither 0 nor 1, whose quantiles are infinite for many distributions, and without a bias."""
-    shares = draws._uniform(1, "block.A1", 0, 5000)
+    shares = uniform(1, "block.A1", 0, 5000)
     multiples = (shares * 2.0**53).astype(np.int64)
     assert (multiples == shares * 2.0**53).all() and (multiples % 2 == 1).all()

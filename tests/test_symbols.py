@@ -121,8 +121,9 @@ def test_measures_and_a_users_own_expression():
     a.measure("step", base.point(100, 0, 10), to=top.point(50, 0, 0), along="z")
     program = tc.build(a)
     assert program.nominal_measures == pytest.approx([0, 0, np.linalg.norm([50, 12.5, 10]), 0])
-    poses = program.place(deviations=RNG.normal(size=(5, 12)))
-    values = program.observe(poses=poses["poses"])
+    deviations = RNG.normal(size=(5, 12))
+    poses = program.place(deviations=deviations)
+    values = program.observe(poses=poses["poses"], deviations=deviations)
     for row, pose in zip(values["measured"], poses["poses"].reshape(5, 2, 12), strict=True):
         (R_b, t_b), (R_t, t_t) = ((p[:9].reshape(3, 3), p[9:]) for p in pose)
         corner = R_t @ [100, 12.5, 20] + t_t
@@ -144,14 +145,16 @@ def test_an_expression_that_fails_is_a_fault_of_the_model():
 def test_a_tape_gives_back_the_expression():
     entries = ca.SX.sym("poses", 24)
     poses = [Pose(ca.reshape(v[:9], 3, 3).T, v[9:]) for v in ca.vertsplit(entries, 12)]
+    deviations = ca.SX.sym("deviations", 2)
     expressions = [
         ca.if_else(entries[3] > 0, ca.sqrt(ca.sumsqr(entries[:5])), ca.fmax(entries[9], 2) ** entries[1]),
         ca.atan2(ca.sin(entries[4]), 1 + ca.exp(-entries[7])) - ca.fabs(entries[20]) / 3 + entries[23] ** 2,
         entries[5],
+        entries[5] * deviations[1],
         ca.SX(4.5),
     ]
     values = RNG.uniform(0.1, 1, size=24)
     for expression in expressions:
-        back = replay(record(expression, entries), poses)
-        both = ca.Function("both", [entries], [expression, back])(values)
+        back = replay(record(expression, ca.vertcat(entries, deviations)), poses, deviations)
+        both = ca.Function("both", [entries, deviations], [expression, back])(values, [0.5, 2.0])
         assert float(both[0]) == float(both[1])

@@ -2,13 +2,18 @@ from .archive import model_of, open_archive
 from .cli import command_line, main
 from .compilation import Program
 from .declaration import (
+    Angularity,
     Assembly,
     Box,
     Brep,
+    CircularRunout,
+    Coaxiality,
     ContactPair,
     Cylinder,
     Face,
     Facing,
+    Feature,
+    Flatness,
     Force,
     Inside,
     Largest,
@@ -16,9 +21,17 @@ from .declaration import (
     Measure,
     Mesh,
     Near,
+    Parallelism,
     Part,
+    Perpendicularity,
     Point,
+    Position,
+    Profile,
+    Size,
+    Symmetry,
     Tolerance,
+    TotalRunout,
+    Variable,
     three_two_one,
 )
 from .discretization import bodies_in, faces_in, parts_from
@@ -38,9 +51,10 @@ from .vocabulary import Status
 from .workflow import build, check, compare, run, summarize
 
 __all__ = [
-    "ArchiveError", "Assembly", "Box", "Brep", "ContactPair", "ContactWarning", "Cylinder", "Face", "Facing", "Force",
-    "Inside", "Largest", "Locator", "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Part", "Point",
-    "Program", "ScriptError", "Status", "TolcontactError", "Tolerance", "UnitsWarning", "__version__", "bodies_in", "build",
-    "check", "command_line", "compare", "faces_in", "main", "model_of", "open_archive", "parts_from", "run",
-    "simulate_blocks", "summarize", "three_two_one",
+    "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "Coaxiality", "ContactPair",
+    "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
+    "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
+    "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
+    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "command_line", "compare",
+    "faces_in", "main", "model_of", "open_archive", "parts_from", "run", "simulate_blocks", "summarize", "three_two_one",
 ]  # fmt: skip

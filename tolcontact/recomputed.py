@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as words
 
@@ -35,8 +36,17 @@ class ArchivedPoint(NamedTuple):
     wall: Mapping[str, Any]
     body: Mapping[str, Any]
 
-    def gaps(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Gaps (...) [mm] where the moving part is at R (..., 3, 3), t (..., 3) [mm], as the reference part sees it."""
+    def gaps(self, R: np.ndarray, t: np.ndarray, of_moving: Any = 0.0, of_reference: Any = 0.0) -> np.ndarray:
+        """Gaps (...) [mm] where the moving part is at R (..., 3, 3), t (..., 3) [mm], as the reference part sees it.
+
+        Its face has grown by `of_moving` (...), the reference part's by `of_reference` (...) [mm].
+        """
+        of_body, of_wall = (of_moving, of_reference) if self.body["on_moving"] else (of_reference, of_moving)
+        grown = ArchivedPoint(self.wall, {**self.body, "radius": self.body["radius"] + of_body})
+        return np.asarray(grown._apart(R, t) - of_wall)
+
+    def _apart(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Gaps (...) [mm] at such poses, of faces as large as they are."""
         if not self.body["on_moving"]:
             R = R.swapaxes(-1, -2)
             t = -np.einsum("...ij,...j->...i", R, t)
@@ -101,3 +111,42 @@ class ArchivedPoint(NamedTuple):
         if kind == "cone":
             return np.asarray(across * np.cos(wall["angle"]) - along * np.sin(wall["angle"]))
         return np.asarray(np.hypot(across - wall["radius"], along) - wall["minor"])
+
+
+class ArchivedFaces:
+    """The faces of features, from the groups `contact` and `sample` of an archive, variables by name."""
+
+    def __init__(self, contact: Mapping[str, np.ndarray], sample: Mapping[str, np.ndarray]) -> None:
+        self._contact, self._sample = contact, sample
+
+    def displacement(self, face: int, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """tau (realization, 3) [mm] and rho (realization, 3) [rad] for deviations (realization, contributor)."""
+        found = deviations @ self._contact[words.FACE_TWIST.name][face].T
+        return found[:, :3], found[:, 3:]
+
+    def height(self, face: int, deviations: np.ndarray) -> np.ndarray:
+        """How much farther out the face lies (realization,) [mm]; 0 of face -1."""
+        if face < 0:
+            return np.zeros(len(deviations))
+        return np.asarray(deviations @ self._contact[words.FACE_HEIGHT.name][face])
+
+    def placed(self, face: int, deviations: np.ndarray, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where a face is, R and t, of a part at R (realization, state, 3, 3), t (realization, state, 3) [mm]."""
+        if face < 0:
+            return R, t
+        tau, rho = self.displacement(face, deviations)
+        turned, centre = Rotation.from_rotvec(rho).as_matrix(), self._contact[words.FACE_CENTRE.name][face]
+        moved = tau + centre - turned @ centre
+        return R @ turned[:, None], np.einsum("...ij,...j->...i", R, moved[:, None]) + t
+
+    def held(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """How far locators move their parts (realization, locator) [mm]."""
+        found = deviations[:, locators].copy()
+        for place, locator in enumerate(locators):
+            face = int(self._sample[words.FACE_OF_LOCATOR.name][locator]) if words.FACE_OF_LOCATOR.name in self._sample else -1
+            if face >= 0:
+                tau, rho = self.displacement(face, deviations)
+                arm = self._sample[words.LOCATOR_POINT.name][locator] - self._contact[words.FACE_CENTRE.name][face]
+                inward = self._sample[words.LOCATOR_DIRECTION.name][locator]
+                found[:, place] += self.height(face, deviations) - (tau + np.cross(rho, arm)) @ inward
+        return found

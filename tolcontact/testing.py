@@ -22,7 +22,7 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.archive import open_archive
 from tolcontact.errors import OptionError
-from tolcontact.recomputed import archived_points
+from tolcontact.recomputed import ArchivedFaces, archived_points
 
 Results = xr.DataTree | str | Path
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
@@ -49,7 +49,8 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
     They are computed again with nothing but what the archive holds: n'(x_m - x_r), with x = R p + t, p a nominal contact point
     of the moving or the reference part, n the nominal normal turned with the reference part; less the deviation of the
     one-sided locator that a point stands for. Where a ball or a shaft touches a wall it is their distance, from their sizes and
-    places. The two may differ by `within` [mm].
+    places. Faces of features are displaced in their parts first, and lie farther out by their heights. The two may differ by
+    `within` [mm].
 
     Unfinished realizations are passed over, and those whose `searched` is 1: their contact points were projected again, and are
     not archived. (Archives of format 1 do not say which; all of theirs are computed.)
@@ -163,22 +164,40 @@ class _Pair:
         )
         self.locators = contact[words.LOCATOR_OF_POINT.name][own]
         self.round = archived_points(contact, np.flatnonzero(own))
+        sample = {str(name): values.values for name, values in tree.children["sample"].to_dataset().data_vars.items()}
+        self.faces = ArchivedFaces(contact, sample)
+        self.moving_face, self.reference_face = (
+            int(contact[variable.name][pair]) if variable.name in contact else -1
+            for variable in (words.FACE_OF_MOVING, words.FACE_OF_REFERENCE)
+        )
+        self.facing = contact[words.FACING.name][own] if words.FACING.name in contact else None
+
+    @property
+    def _is_drawn(self) -> bool:
+        """Whether deviations matter beside poses."""
+        return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
 
     def least_gaps(self, rows: Rows, some: slice) -> np.ndarray:
         """The least gaps (realization, state) [mm] of some realizations."""
-        R_m, t_m = _pose(rows, some, self.moving_part)
-        R_r, t_r = _pose(rows, some, self.reference_part)
+        moving, reference = (_pose(rows, some, part) for part in (self.moving_part, self.reference_part))
+        drawn = _needed(rows, words.DEVIATION.name, some) if self._is_drawn else np.zeros((1, 0))
+        R_m, t_m = self.faces.placed(self.moving_face, drawn, *moving)
+        R_r, t_r = self.faces.placed(self.reference_face, drawn, *reference)
+        of_moving, of_reference = (self.faces.height(face, drawn) for face in (self.moving_face, self.reference_face))
         if self.round:
             turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
             apart = np.einsum("...ij,...j->...i", turn, t_m - t_r)
-            return np.asarray(np.min([point.gaps(turn @ R_m, apart) for point in self.round], axis=0))
+            grown = (of_moving[:, None], of_reference[:, None])
+            return np.asarray(np.min([point.gaps(turn @ R_m, apart, *grown) for point in self.round], axis=0))
         moving = self.moving_point @ R_m.swapaxes(-1, -2) + t_m[..., None, :]
         reference = self.reference_point @ R_r.swapaxes(-1, -2) + t_r[..., None, :]
         normal = self.normal @ R_r.swapaxes(-1, -2)
         gaps = ((moving - reference) * normal).sum(axis=-1) / np.linalg.norm(normal, axis=-1)
+        if self.facing is not None:
+            gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
         supports = self.locators >= 0
         if supports.any():
-            gaps[..., supports] -= _needed(rows, words.DEVIATION.name, some)[:, None, self.locators[supports]]
+            gaps[..., supports] -= self.faces.held(self.locators[supports], drawn)[:, None]
         return np.asarray(gaps.min(axis=-1))
 
 

@@ -1,7 +1,7 @@
 """Write a small archive, compressed, to be kept for good and read by all later versions: write_archive.py ARCHIVE.nc.gz.
 
 It holds something of everything: two bars as meshes, locators with and without a distribution, one of them one-sided, a pair of
-faces, measures of three kinds, a force. The bars have so many sections that they need no more points for their fields.
+faces, measures of three kinds, a force; since format 4 also features and a variable. The bars have so many sections that they need no more points for their fields.
 """
 
 import gzip
@@ -43,6 +43,11 @@ def assembly():
     a.locate(block, six)
     a.contact("interface", moving=block.face("-z"), reference=base.face("+z"), points=8)
     a.force("weight", at=block.point(25, 1, 3), vector=(0, 0, -1))
+    post = a.part("post", bar(20, 2), at=(0, 10, 0), fixed=True)
+    post.feature("foot", post.face("-z"), datum="A")
+    top = post.feature("top", post.face("+z"), tc.Profile(0.2, "A"))
+    a.variable("warmth", 6, drives={"post.top.offset": 0.01}, units="K")
+    a.measure("post", top.point(10, 1, 2), along="z")
     a.measure("corner", block.point(50, 3, 3), along="z", tolerance=0.2)
     a.measure("gap", base.point(5, 0, 4), to=block.point(0, 0, 0), along="z")
     a.measure("tilt", lambda poses: poses.rotation(block)[2, 0], units="rad")
@@ -51,5 +56,7 @@ def assembly():
 
 with tempfile.TemporaryDirectory() as folder:
     path = Path(folder) / "bars.nc"
-    tc.run(assembly(), samples=8, seed=1, solver="daqp", method=tc.Method(resolution="exact"), surfaces=4, out=path).close()
+    tc.run(
+        assembly(), samples=8, seed=1, solver="daqp", method=tc.Method(resolution="exact"), surfaces=4, fields=16_384, out=path
+    ).close()
     Path(sys.argv[1]).write_bytes(gzip.compress(path.read_bytes(), mtime=0))

@@ -99,7 +99,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_measures(file, program)
     _write_model(file.createGroup("model"), nominal, declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
-    _write_sample(file.createGroup("sample"), nominal, deviations=words.DEVIATION in kept_rows(run.keep))
+    _write_sample(file.createGroup("sample"), program, deviations=words.DEVIATION in kept_rows(run.keep))
     checked = file.createGroup("surface")
     checked.createDimension(words.CHECKED, run.surfaces)
     _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
@@ -223,6 +223,14 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
     group.createDimension(words.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
         group.createDimension(words.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
+    if nominal.faces:
+        sizes = {
+            words.FEATURE_FACE: len(nominal.faces),
+            words.FREEDOM: len(words.FREEDOMS),
+            words.CONTRIBUTOR: len(nominal.contributors),
+        }
+        for name, size in sizes.items():
+            group.createDimension(name, size)
     for variable, values in contact_values(nominal).items():
         write(group, variable, values)
 
@@ -236,10 +244,7 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
     }
     if not pairs:
         return parts
-    locators = [
-        pair.offsets.columns[pair.offsets.matrix.argmax(axis=0)] if pair.is_supports else np.full(len(pair.P_m), -1)
-        for pair in pairs
-    ]
+    locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
     values = parts | {
         words.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
         words.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
@@ -247,7 +252,31 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
         words.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
         words.LOCATOR_OF_POINT: np.concatenate(locators),
     }
-    return values | _round_values(nominal)
+    return values | _round_values(nominal) | _face_values(nominal)
+
+
+def _face_values(nominal: Nominal) -> dict[Variable, Any]:
+    """How the faces of features deviate, and which sides of pairs they are."""
+    faces, count = nominal.faces, len(nominal.contributors)
+    if not faces:
+        return {}
+    twists, heights = np.zeros((len(faces), 6, count)), np.zeros((len(faces), count))
+    for number, face in enumerate(faces):
+        twists[number][:, face.columns], heights[number, face.columns] = face.twist, face.height
+    moving, reference = (
+        [-1 if face is None else faces.index(face) for face in side]
+        for side in zip(*(pair.deviating for pair in nominal.pairs), strict=True)
+    )
+    return {
+        words.FEATURE_OF_FACE: [face.name for face in faces],
+        words.FACE_CENTRE: np.array([face.centre for face in faces]),
+        words.FREEDOM_LABEL: words.FREEDOMS,
+        words.FACE_TWIST: twists,
+        words.FACE_HEIGHT: heights,
+        words.FACE_OF_MOVING: moving,
+        words.FACE_OF_REFERENCE: reference,
+        words.FACING: np.concatenate([pair.facing for pair in nominal.pairs]),
+    }
 
 
 def _round_values(nominal: Nominal) -> dict[Variable, Any]:
@@ -264,22 +293,24 @@ def _round_values(nominal: Nominal) -> dict[Variable, Any]:
     }
 
 
-def _write_sample(group: netCDF4.Group, nominal: Nominal, *, deviations: bool) -> None:
+def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
+    nominal, every = program.nominal, program.draws.contributors.every
+    group.createDimension(words.CONTRIBUTOR, len(every))
     group.createDimension(words.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, words.DEVIATION)
+    write(group, words.CONTRIBUTOR_LABEL, [each.label for each in every])
+    write(group, words.CONTRIBUTOR_SOURCE, [each.source for each in every])
+    write(group, words.CONTRIBUTOR_UNITS, [each.units for each in every])
+    write(group, words.TOLERANCE_RANGE, [each.range for each in every])
+    write(group, words.DISTRIBUTION, [each.said for each in every])
     locators = nominal.locators
     write(group, words.LOCATOR_LABEL, locators.labels)
-    write(group, words.TOLERANCE_RANGE, [np.nan if t.range is None else t.range for t in locators.tolerances])
-    write(
-        group,
-        words.DISTRIBUTION,
-        [t.distribution if isinstance(t.distribution, str) else t.distribution.dist.name for t in locators.tolerances],
-    )
     write(group, words.STIFFNESS, locators.stiffness)
     write(group, words.ONE_SIDED, locators.one_sided)
     write(group, words.LOCATOR_POINT, locators.points)
     write(group, words.LOCATOR_DIRECTION, locators.directions)
+    write(group, words.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
 
 
 def declaration(program: Program) -> str:

@@ -35,15 +35,17 @@ SAID = ("title", "history", "versions", "resolution", "objective", "active_set")
 OF_FIELD = (words.FIELD_VERTICES, words.FIELD_FACES, words.FIELD_MEAN, words.FIELD_SIX_SIGMA, words.FIELD_INTERVAL)
 OF_CONTACT = (words.MOVING_PART, words.REFERENCE_PART)
 OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
+BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (words.MESH_VERTICES, words.MESH_FACES)
 ONCE = {  # by group
     "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS,
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
     "model": (words.DECLARATION,),
     "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,
-                words.LOCATOR_OF_POINT, *words.ROUND),
+                words.LOCATOR_OF_POINT, *words.ROUND, *words.FEATURE_FACES),
     "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
-               words.LOCATOR_DIRECTION),
+               words.LOCATOR_DIRECTION, words.CONTRIBUTOR_LABEL, words.CONTRIBUTOR_SOURCE, words.CONTRIBUTOR_UNITS,
+               words.FACE_OF_LOCATOR),
     "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
     "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS,
               words.MAGNITUDE_REALIZATIONS, words.FIELD_SUMS,
@@ -194,7 +196,10 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
     stored, where = group[variable.name], f"{group.path.rstrip('/')}/{variable.name}"
     text = stored.dtype is str or np.dtype(stored.dtype).kind == "S"
     dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
-    if dims != variable.dims or text != (variable.kind is str):
+    expected = variable.dims
+    if getattr(_top(group), "format", 1) <= BEFORE_CONTRIBUTORS:
+        expected = tuple(words.LOCATOR if d == words.CONTRIBUTOR else d for d in expected)
+    if dims != expected or text != (variable.kind is str):
         raise DamagedError(f"is damaged: {where} does not have the dimensions and the type that it has in an archive")
     if text or variable is words.NUMBERS:
         return
@@ -206,6 +211,8 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
 def _check_needed(file: netCDF4.Dataset) -> None:
     """What summaries and models are read from."""
     _need_together(file["contact"], words.ROUND)
+    if any(variable.name in file["contact"].variables for variable in words.FEATURE_FACES):
+        _need(file["contact"], words.FEATURE_FACES)
     for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (words.DECLARATION,))):
         _need(file[group], needed)
     _need(file, (words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS))

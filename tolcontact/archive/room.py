@@ -42,7 +42,7 @@ def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
         words.PART: len(nominal.parts),
         words.PAIR: len(nominal.pairs),
         words.MEASURE: len(nominal.measures),
-        words.LOCATOR: len(nominal.locators),
+        words.CONTRIBUTOR: len(nominal.contributors),
         words.AXIS: 3,
         words.BODY_AXIS: 3,
     }

@@ -41,6 +41,7 @@ class ContactProgram:
     """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
 
     energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
+    relate       X_RM of the pairs at `poses`: of poses, deviations
     slacks       how many of the QP's last variables are slacks: they are not negative
     equations    how many of its last rows are equations: two-sided locators, if the objective holds them
     standing     for each pair of the group the contact points that always have a row, None if slots hold changing points
@@ -50,6 +51,7 @@ class ContactProgram:
     plugin: Plugin
     finish: ca.Function
     energy: ca.Function
+    relate: ca.Function
     slacks: int
     equations: int
     standing: tuple[np.ndarray | None, ...]
@@ -76,7 +78,7 @@ def contact_program(
     poses (12 p)         poses of the group's parts about which the gaps are linearized
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
-    deviations (l)       of all locators of the model [mm]
+    deviations (c)       of all contributors of the model
     firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
     stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
@@ -132,6 +134,11 @@ def contact_program(
         plugin=plugin,
         finish=_function("finish", inputs | given, results),
         energy=_function("energy", {name: inputs[name] for name in OF_ENERGY}, {"energy": least}),
+        relate=_function(
+            "relate",
+            {name: inputs[name] for name in ("poses", "deviations")},
+            {"relative": ca.vertcat(*(X.vector() for X in setting.relative(now)))},
+        ),
         slacks=len(group.pairs),
         equations=exact.numel(),
         standing=standing,
@@ -147,7 +154,7 @@ def _inputs(nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None
         "poses": (ENTRIES * len(group.parts), 1),
         "raw": (ENTRIES * len(group.parts), 1),
         "moments": (MOMENTS, len(group.sides)),
-        "deviations": (len(nominal.locators), 1),
+        "deviations": (len(nominal.contributors), 1),
         "firmness": (1, 1),
         "newton": (1, 1),
         "stride": (1, 1),

@@ -26,7 +26,7 @@ class ContactSolver:
     def __init__(self, program: ContactProgram) -> None:
         self._program = program
         self._assemble, self._finish = NamedFunction(program.assemble), NamedFunction(program.finish)
-        self._energy = NamedFunction.dense(program.energy)
+        self._energy, self._relate = (NamedFunction.dense(function) for function in (program.energy, program.relate))
         self._plugin = program.plugin
         self.start_over()
 
@@ -67,6 +67,10 @@ class ContactSolver:
     def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
         """The objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
         return self._energy(**arrays)["energy"][:, 0]
+
+    def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization _"]:
+        """X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
+        return self._relate(**arrays)["relative"]
 
     def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])

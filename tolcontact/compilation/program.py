@@ -11,19 +11,21 @@ from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.tape import Tape
-from tolcontact.discretization import Nominal, RoundPoints
+from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
+from tolcontact.mechanics.face_pose import facing_pose
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import GapMap, gap_map
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured
 from tolcontact.mechanics.placement import raw_poses
-from tolcontact.mechanics.pose import ENTRIES, poses_of, relative
+from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import MAKING, quiet
-from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
 from tolcontact.readable import Readable
+from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
 
@@ -41,16 +43,18 @@ class ContactGroup:
 class Program(Readable):
     """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
 
-    place        deviations (realization, locator) [mm] -> poses (realization, 12 * part)
-    observe      poses -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
+    draws        of everything that varies
+    place        deviations (realization, contributor) -> poses (realization, 12 * part)
+    observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
     gaps         one per pair: its gaps at X_RM, if they are affine in it; None of round faces, which have
-    round_gaps   X_RM -> gaps (realization, point) by number of the pair
+    round_gaps   X_RM, deviations -> gaps (realization, point) by number of the pair
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     tapes        the users' own expressions by measure name
     """
 
     nominal: Nominal
+    draws: Draws
     method: Method
     plugin: Plugin
     place: NamedFunction
@@ -79,29 +83,35 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or, if the objective
     is seating, for forces that are missing or move nothing.
     """
+    draws = Draws(nominal)
     with MAKING:  # which also calls users' functions, that may print
         with quiet():
             chosen = plugin(solver)
-        d = ca.SX.sym("deviations", len(nominal.locators))
+        d = ca.SX.sym("deviations", len(nominal.contributors))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
         poses = poses_of(entries)
-        values = measured(nominal, poses)
+        values = measured(nominal, poses, d)
         X_RM = [
-            (poses[pair.moving] if pair.reference is None else relative(poses[pair.moving], poses[pair.reference])).vector()
+            facing_pose(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference], d).vector()
             for pair in nominal.pairs
         ]
         observe = ca.Function(
-            "observe", [entries], [ca.vertcat(*values), ca.vertcat(*X_RM)], ["poses"], ["measured", "relative"]
+            "observe",
+            [entries, d],
+            [ca.vertcat(*values), ca.vertcat(*X_RM)],
+            ["poses", "deviations"],
+            ["measured", "relative"],
         )
         groups = contact_groups(nominal)
         gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
-        of_round = {k: _gaps_only(pair.round) for k, pair in enumerate(nominal.pairs) if pair.round}
+        of_round = {k: _gaps_only(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round}
         if method.minimizes.presses:
             _check_forces(nominal, groups)
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
+            draws=draws,
             method=method,
             plugin=chosen,
             place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
@@ -109,19 +119,19 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             gaps=gaps,
             round_gaps={k: NamedFunction.dense(function) for k, function in of_round.items()},
             groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
-            nominal_measures=observe(_at_rest(len(nominal.parts)))[0].full().ravel(),
+            nominal_measures=observe(_at_rest(len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
-                measure.name: record(value, entries)
+                measure.name: record(value, ca.vertcat(entries, d))
                 for measure, value in zip(nominal.measures, values, strict=True)
                 if not measure.points
             },
         )
 
 
-def _gaps_only(points: RoundPoints) -> ca.Function:
+def _gaps_only(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
-    gaps, *_ = round_gaps(points)(X_RM, ca.SX.zeros(len(points)))
-    return ca.Function("round_gaps", [X_RM], [gaps], ["X_RM"], ["gaps"])
+    gaps, *_ = round_gaps(points)(X_RM, heights(pair, deviations), ca.SX.zeros(len(points)))
+    return ca.Function("round_gaps", [X_RM, deviations], [gaps], ["X_RM", "deviations"], ["gaps"])
 
 
 def _ready(group: Group, program: ContactProgram) -> ContactGroup:

@@ -11,7 +11,7 @@ from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.gap import gap
 from tolcontact.mechanics.gap_map import GapMap
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
-from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
@@ -74,7 +74,9 @@ def contact_rows(
         points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
             reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
-            of_points, by_entries, second, closing = round_gaps(pair.round)(before.vector(), reactions)
+            of_points, by_entries, second, closing = round_gaps(pair.round)(
+                before.vector(), heights(pair, setting.deviations), reactions
+            )
             slopes.append(by_entries @ by_z)
             gaps.append(of_points)
             filled.append(ca.SX.ones(len(pair.round)))

@@ -89,8 +89,10 @@ class Candidates:
         """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
         return project(fixed(self._some[k]), self._pairs[k].surface, relative, self._reaches[k])
 
-    def survey(self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]) -> Seen:
-        """What is seen of raw states, for deviations (realization, locator) [mm]."""
+    def survey(
+        self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
+    ) -> Seen:
+        """What is seen of raw states, for deviations (realization, contributor)."""
         scans = self.scans(relative)
         surveyed = scans if self._method.is_iterated else self._every
         found = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
@@ -114,7 +116,7 @@ class Candidates:
         self,
         scans: Sequence[Scan],
         relative: Float[Array, "realization pair 12"],
-        deviations: Float[Array, "realization locator"],
+        deviations: Float[Array, "realization contributor"],
     ) -> list[Bool[Array, "realization _"] | None]:
         """Which points (realization, point) may carry: in the paper's set those that are active in the raw state."""
         if self._method.is_closed:

@@ -74,7 +74,8 @@ class Doubt:
                     own = carriers.realization[some]
                     beside = side.face.overhang(pose.apply(motion[own], carriers.places[some, None])[:, 0])
                     doubtful[far[own[beside > carriers.spacing]]] = True
-                doubtful[far] |= faces.depth(X_RM) > self.allowed(k)
+                heights = self._group_pairs[k].heights(task.deviations[far])
+                doubtful[far] |= faces.depth(X_RM, heights) > self.allowed(k)
         return doubtful
 
     def _turned(self, task: Task, state: State) -> Bool[Array, " n"]:

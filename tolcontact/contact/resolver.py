@@ -50,10 +50,9 @@ class ContactResolver:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
-        self._energy = group.solve.energy
+        self._energy, self._relate = group.solve.energy, group.solve.relative
         self._step = LinearStep(program, group)
         self._method = program.method
-        self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
         self._candidates = Candidates(program, group)
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)
         self._doubt = Doubt(program.nominal, group.group, self._method, size)
@@ -77,12 +76,12 @@ class ContactResolver:
         self,
         poses: Float[Array, "realization part 12"],
         relative: Float[Array, "realization pair 12"],
-        deviations: Float[Array, "realization locator"],
+        deviations: Float[Array, "realization contributor"],
     ) -> Resolved:
         """Correct the realizations of a block that this group does not leave as they are.
 
         poses (realization, part, 12), raw; relative (realization, pair, 12), X_RM of the pairs, raw; deviations
-        (realization, locator) [mm]. Forces move every realization, else contact those in which a point is inside.
+        (realization, contributor). Forces move every realization, else contact those in which a point is inside.
         """
         relative = relative[:, self.pairs]
         seen = self._candidates.survey(relative, deviations)
@@ -186,14 +185,5 @@ class ContactResolver:
             if carried.movers:
                 lowest = self._group.position(self._group.free[carried.movers[0]])
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
-        return poses, self._relative(poses)
-
-    def _relative(self, poses: Float[Array, "n part 12"]) -> Float[Array, "n pair 12"]:
-        """X_RM (n, pair, 12) at poses (n, part of the group, 12)."""
-        found = []
-        for pair in self._pairs:
-            moving = poses[:, self._group.position(pair.moving)]
-            if pair.reference is not None:
-                moving = pose.relative(moving, poses[:, self._group.position(pair.reference)])
-            found.append(moving)
-        return np.stack(found, axis=1)
+        relative = self._relate(poses=poses, deviations=task.deviations)
+        return poses, relative.reshape(len(task), len(self.pairs), -1)

@@ -12,10 +12,10 @@ from tolcontact.contact.scan import Scan
 class RoundScan(Scan):
     """The points of round faces, found anew at every pose. They always have a row of the QP, so that none is looked for.
 
-    gaps_at    X_RM -> gaps (realization, point)
+    gaps_at    X_RM, deviations -> gaps (realization, point)
     """
 
     gaps_at: NamedFunction
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        return self.gaps_at(X_RM=relative)["gaps"]
+        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]

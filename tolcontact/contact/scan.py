@@ -53,13 +53,13 @@ class Scan:
         return self
 
     def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, "realization point"]:
-        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, locator) [mm]."""
+        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
         raise NotImplementedError
 
     def survey(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
     ) -> "Survey":
         """The points whose gap is below `activity`."""
         active = self.gaps(relative, deviations) < activity
@@ -68,7 +68,7 @@ class Scan:
         return Survey(active.sum(axis=1), moments)
 
     def least(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
         """The least gap of all points (realization,) [mm]."""
         return np.asarray(self.gaps(relative, deviations).min(axis=1))
@@ -97,7 +97,7 @@ class PairScan(Scan):
     clusters: Int[Array, " _"]
 
     def gaps(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, "realization point"]:
         slopes = np.repeat(self.basis[-1:], len(relative), axis=0)
         for entry, row in zip(relative.T, self.basis[:-1], strict=True):
@@ -110,7 +110,7 @@ class PairScan(Scan):
         return result
 
     def rows(
-        self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization locator"]
+        self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization slot 3"], Float[Array, "realization slot 3"], Float[Array, "realization slot 3"]]:
         """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
@@ -141,7 +141,7 @@ class CompiledScan(PairScan):
     """A scan whose passes are compiled; PairScan is the same in NumPy."""
 
     def survey(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"], activity: float
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
     ) -> "Survey":
         count = len(relative)
         active, moments = np.empty(count, dtype=np.int64), np.zeros((count, len(self.tables), MOMENTS))
@@ -151,7 +151,7 @@ class CompiledScan(PairScan):
         return Survey(active, moments)
 
     def least(
-        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization locator"]
+        self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
         return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
 
@@ -256,7 +256,7 @@ def undone(
     scans: Sequence[Scan],
     least: Float[Array, "realization pair"],
     relative: Float[Array, "realization pair 12"],
-    deviations: Float[Array, "realization locator"],
+    deviations: Float[Array, "realization contributor"],
     may_carry: Sequence[Bool[Array, "realization _"] | None],
     slack: Float[Array, "realization pair"],
 ) -> Float[Array, "realization pair"]:
@@ -272,7 +272,7 @@ def undone(
 
 
 def least_gaps(
-    scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization locator"]
+    scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
 ) -> Float[Array, "realization pair"]:
     """Least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

@@ -32,7 +32,7 @@ class Task:
 
     raw: Float[Array, "n part 12"]
     relative: Float[Array, "n pair 12"]
-    deviations: Float[Array, "n locator"]
+    deviations: Float[Array, "n contributor"]
     moments: Float[Array, "n side moment"]
     may_carry: list[Bool[Array, "n _"] | None]
     scans: Sequence[Scan]

@@ -1,16 +1,21 @@
 """The assembly: collects declarations in the order in which a script makes them."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from tolcontact.declaration.contact_pair import ContactPair
+from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.contributor import correlation as _correlation
+from tolcontact.declaration.contributor import population as _population
+from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.names import key_faults, text_faults
-from tolcontact.declaration.part import Face, Part, Point
+from tolcontact.declaration.names import key_faults, repetitions, text_faults
+from tolcontact.declaration.part import Face, Part, face_of
+from tolcontact.declaration.point import Point
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import direction, script_line
 from tolcontact.declaration.vectors import vector as _vector
@@ -36,6 +41,9 @@ class Assembly(Readable):
         self._pairs: list[ContactPair] = []
         self._measures: list[Measure] = []
         self._forces: list[Force] = []
+        self._variables: list[Variable] = []
+        self._correlations: list[Correlation] = []
+        self._populations: list[Population] = []
 
     @classmethod
     def of(
@@ -48,6 +56,9 @@ class Assembly(Readable):
         pairs: Iterable[ContactPair],
         measures: Iterable[Measure],
         forces: Iterable[Force],
+        variables: Iterable[Variable] = (),
+        correlations: Iterable[Correlation] = (),
+        populations: Iterable[Population] = (),
     ) -> "Assembly":
         """An assembly of things that have been declared already."""
         made = cls(name, method=method)
@@ -56,6 +67,9 @@ class Assembly(Readable):
         made._pairs.extend(pairs)
         made._measures.extend(measures)
         made._forces.extend(forces)
+        made._variables.extend(variables)
+        made._correlations.extend(correlations)
+        made._populations.extend(populations)
         return made
 
     @property
@@ -77,6 +91,23 @@ class Assembly(Readable):
     @property
     def forces(self) -> tuple[Force, ...]:
         return tuple(self._forces)
+
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        """Those of all parts, one part after the other."""
+        return tuple(feature for part in self._parts for feature in part.features)
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        return tuple(self._variables)
+
+    @property
+    def correlations(self) -> tuple[Correlation, ...]:
+        return tuple(self._correlations)
+
+    @property
+    def populations(self) -> tuple[Population, ...]:
+        return tuple(self._populations)
 
     def part(
         self,
@@ -115,16 +146,17 @@ class Assembly(Readable):
         self,
         name: str,
         *,
-        moving: Face,
-        reference: Face,
+        moving: Face | Feature,
+        reference: Face | Feature,
         points: int | str | None = None,
         spacing: float | None = None,
         within: float | None = None,
     ) -> ContactPair:
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
-            _expect(f'contact "{name}": {side}', face, Face, 'part.face("+z")')
-        self._pairs.append(ContactPair(name, moving, reference, points, spacing, within, script_line()))
+            _expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
+        sides = face_of(moving), face_of(reference)
+        self._pairs.append(ContactPair(name, *sides, points, spacing, within, script_line()))
         return self._pairs[-1]
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
@@ -148,12 +180,27 @@ class Assembly(Readable):
         self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line()))
         return self._measures[-1]
 
+    def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
+        """Declare a cause that several contributors share, each by a factor (see Variable)."""
+        self._variables.append(Variable(name, _tolerance(tolerance), dict(drives), units, script_line()))
+        return self._variables[-1]
+
+    def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
+        """Declare that contributors are correlated: a matrix, or one coefficient for two of them (see Correlation)."""
+        self._correlations.append(_correlation(labels, matrix, script_line()))
+        return self._correlations[-1]
+
+    def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
+        """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
+        self._populations.append(_population(source, columns, script_line()))
+        return self._populations[-1]
+
     def location_of(self, part: Part) -> Location | None:
         """How `part` is located; None if it is not."""
         return next((location for location in self._locations if location.part is part), None)
 
     def finest(self) -> float:
-        """The smallest width of a tolerance zone [mm] of any locator or measure; infinite if there is none.
+        """The smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite if there is none.
 
         The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one is
         taken for a constant, and does not count.
@@ -163,6 +210,8 @@ class Assembly(Readable):
             own = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
             said += [tolerance or location.tolerance for tolerance in own]
         widths = [tolerance.width for tolerance in said if tolerance is not None]
+        widths += [feature.size.tolerance.width for feature in self.features if feature.size]
+        widths += [float(each.width) for feature in self.features for each in feature.geometric]
         widths += [float(m.tolerance) for m in self._measures if m.tolerance is not None and m.units == "mm"]
         return min((width for width in widths if width > CONSTANT * max(widths)), default=math.inf)
 
@@ -179,6 +228,7 @@ class Assembly(Readable):
         for part in self._parts:
             yield from _named("part", part, part.faults())
             yield from _named("part", part, self._location_faults(part))
+            yield from self._feature_faults(part)
         for location in self._locations:
             yield from _named("part", location.part, location.faults(), location.declared_at)
             yield from self._strangers(
@@ -197,6 +247,30 @@ class Assembly(Readable):
             yield from self._strangers(
                 f'measure "{measure.name}"', measure.declared_at, *(point.part for point in measure.points)
             )
+
+        for kind, causes in (("variable", self._variables), ("correlation", self._correlations)):
+            for cause in causes:
+                yield from _named(kind, cause, cause.faults())
+        for population in self._populations:
+            yield from _named("population", population, population.faults())
+        yield from key_faults("variable", [variable.name for variable in self._variables])
+
+    def _feature_faults(self, part: Part) -> Iterator[str]:
+        names = [feature.name for feature in part.features]
+        yield from key_faults(f'part "{part.name}": feature', names)
+        yield from repetitions(f'part "{part.name}": datum', [each.datum for each in part.features if each.datum])
+        letters = {feature.datum for feature in part.features if feature.datum}
+        for feature in part.features:
+            yield from _named(f'part "{part.name}": feature', feature, feature.faults())
+            for tolerance in feature.geometric:
+                for letter in [letter for place in tolerance.system for letter in place]:
+                    if letter not in letters:
+                        known = ", ".join(sorted(letters)) or "none"
+                        yield (
+                            f'part "{part.name}": feature "{feature.name}" ({feature.declared_at}): {tolerance.word} refers to '
+                            f"datum {letter}, which no feature of the part is; its datums are: {known}; "
+                            f'declare it with part.feature(..., datum="{letter}")'
+                        )
 
     def _location_faults(self, part: Part) -> Iterator[str]:
         count = sum(location.part is part for location in self._locations)
@@ -221,7 +295,17 @@ class Assembly(Readable):
                 yield (f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {known}')
 
     def __str__(self) -> str:
-        rows = [*self._parts, *self._locations, *self._pairs, *self._forces, *self._measures]
+        rows = [
+            *self._parts,
+            *self.features,
+            *self._variables,
+            *self._correlations,
+            *self._populations,
+            *self._locations,
+            *self._pairs,
+            *self._forces,
+            *self._measures,
+        ]
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 

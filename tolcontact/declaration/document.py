@@ -1,14 +1,17 @@
 """An assembly as a plain document (dicts, lists, numbers, texts): what an archive keeps of a model."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any, TypeVar
 
 from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.feature import Feature
+from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Point
+from tolcontact.declaration.part import Face
+from tolcontact.declaration.point import Point
 from tolcontact.declaration.selection import Facing, Inside
 from tolcontact.declaration.tape import Tape
 from tolcontact.declaration.tolerance import Tolerance
@@ -33,6 +36,13 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
         chosen = {"direction": str(only)} if plain else {"triangles": triangles(face)}
         return {"part": face.part.name, **chosen, "inside": boxes}
 
+    def feature(feature: Feature) -> Document:
+        return {
+            "faces": [face(each) for each in feature.faces],
+            "tolerances": [_of_feature(each) for each in feature.tolerances],
+            **_plain(feature, "name", "datum", "declared_at"),
+        }
+
     def measure(measure: Measure) -> Document:
         points = {"of": _point(measure.of)} if isinstance(measure.of, Point) else {"tape": tapes[measure.name]}
         to = {} if measure.to is None else {"to": _point(measure.to)}
@@ -42,7 +52,11 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
         "name": assembly.name,
         "method": None if assembly.method is None else asdict(assembly.method),
         "parts": [
-            {"geometry": _geometry(part.geometry), **_plain(part, "name", "at", "rotation", "fixed", "declared_at")}
+            {
+                "geometry": _geometry(part.geometry),
+                **_plain(part, "name", "at", "rotation", "fixed", "declared_at"),
+                "features": [feature(each) for each in part.features],
+            }
             for part in assembly.parts
         ],
         "locations": [
@@ -58,6 +72,7 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
                             **_plain(locator, "name", "point", "direction", "one_sided"),
                             "stiffness": float(locator.stiffness),
                             "tolerance": _tolerance(locator.tolerance),
+                            **({} if locator.on is None else {"on": locator.on.name}),
                         }
                         for locator in location.scheme
                     ]
@@ -76,6 +91,19 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
         ],
         "measures": [measure(m) for m in assembly.measures],
         "forces": [{"at": _point(f.at), **_plain(f, "name", "vector", "declared_at")} for f in assembly.forces],
+        "variables": [
+            {
+                "tolerance": _tolerance(each.tolerance),
+                "drives": {label: float(factor) for label, factor in each.drives.items()},
+                **_plain(each, "name", "units", "declared_at"),
+            }
+            for each in assembly.variables
+        ],
+        "correlations": [_plain(each, "labels", "matrix", "declared_at") for each in assembly.correlations],
+        "populations": [
+            {"values": each.values.tolist(), **_plain(each, "columns", "source", "declared_at")}
+            for each in assembly.populations
+        ],
     }
 
 
@@ -84,7 +112,8 @@ def _plain(thing: Any, *words: str) -> Document:
 
 
 def _point(point: Point) -> Document:
-    return {"part": point.part.name, "position": point.position}
+    on = {} if point.on is None else {"on": point.on.name}
+    return {"part": point.part.name, **on, **({"end": point.end} if point.position is None else {"position": point.position})}
 
 
 def _geometry(geometry: Box | Mesh) -> Document:
@@ -94,11 +123,27 @@ def _geometry(geometry: Box | Mesh) -> Document:
 def _tolerance(tolerance: Tolerance | None) -> Document | None:
     if tolerance is None:
         return None
+    off = {word: float(value) for word in ("shift", "cp", "cpk") if (value := getattr(tolerance, word))}
     if isinstance(tolerance.distribution, str):
-        return {"range": tolerance.range, "distribution": tolerance.distribution}
-    frozen = tolerance.distribution
+        return {"range": tolerance.range, **_distribution(tolerance.distribution), **off}
+    return _distribution(tolerance.distribution) | off
+
+
+def _distribution(distribution: Any) -> Document:
+    if isinstance(distribution, str):
+        return {"distribution": distribution}
     return {
-        "scipy": frozen.dist.name,
-        "args": [float(a) for a in frozen.args],
-        "kwds": {k: float(v) for k, v in frozen.kwds.items()},
+        "scipy": distribution.dist.name,
+        "args": [float(a) for a in distribution.args],
+        "kwds": {k: float(v) for k, v in distribution.kwds.items()},
     }
+
+
+def _of_feature(tolerance: Size | GeometricTolerance) -> Document:
+    """A tolerance of a feature: its kind, and what it does not have by default."""
+    said = {each.name: getattr(tolerance, each.name) for each in fields(tolerance) if each.name != "distribution"}
+    if isinstance(tolerance, Size):
+        return {"kind": "size", **said, **_distribution(tolerance.distribution)}
+    defaults = {each.name: each.default for each in fields(tolerance)}
+    said["along"] = tolerance.across
+    return {"kind": tolerance.kind} | {word: value for word, value in said.items() if value != defaults[word]}

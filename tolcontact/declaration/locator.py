@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.names import repetitions, text_faults
-from tolcontact.declaration.part import Face, Part
+from tolcontact.declaration.part import Face, Part, face_of
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import Vector, is_finite, is_length
@@ -20,7 +21,8 @@ class Locator(Readable):
 
     A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
     `one_sided` locator is a support: the part may lift off it along `direction`, and may not pass through it.
-    `stiffness` [N/mm] is used by the objective "locator stiffness".
+    `stiffness` [N/mm] is used by the objective "locator stiffness". A locator `on` a feature of its part stands against it,
+    and moves the part as far as the feature deviates there.
     """
 
     name: str
@@ -29,6 +31,7 @@ class Locator(Readable):
     tolerance: Tolerance | None
     one_sided: bool
     stiffness: float
+    on: Feature | None
 
     def __init__(
         self,
@@ -39,6 +42,7 @@ class Locator(Readable):
         *,
         one_sided: bool = False,
         stiffness: float = 1.0,
+        on: Feature | None = None,
     ) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "point", _vector(point))
@@ -46,6 +50,7 @@ class Locator(Readable):
         object.__setattr__(self, "tolerance", None if tolerance is None else _tolerance(tolerance))
         object.__setattr__(self, "one_sided", one_sided)
         object.__setattr__(self, "stiffness", stiffness)
+        object.__setattr__(self, "on", on)
 
     def faults(self) -> Iterator[str]:
         if not is_finite(self.point):
@@ -58,6 +63,8 @@ class Locator(Readable):
             yield f"one_sided is {self.one_sided!r}; expected True or False"
         if not (is_length(self.stiffness) and self.stiffness > 0):
             yield f"stiffness is {self.stiffness!r}; expected a number in N/mm above 0"
+        if not isinstance(self.on, Feature | None):
+            yield f"on is a {type(self.on).__name__}; expected a feature of the part, or None"
 
     def __str__(self) -> str:
         point, along = (", ".join(f"{c:g}" for c in v) for v in (self.point, self.direction))
@@ -92,9 +99,11 @@ class ThreeTwoOne(Readable):
         return f"3-2-1 on {', '.join(str(face) for face in self.faces)}, {self.inset:g} mm inside the edges"
 
 
-def three_two_one(primary: Face, secondary: Face, tertiary: Face, *, inset: float = 0.0) -> ThreeTwoOne:
+def three_two_one(
+    primary: Face | Feature, secondary: Face | Feature, tertiary: Face | Feature, *, inset: float = 0.0
+) -> ThreeTwoOne:
     """A 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne)."""
-    return ThreeTwoOne(primary, secondary, tertiary, inset)
+    return ThreeTwoOne(face_of(primary), face_of(secondary), face_of(tertiary), inset)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,6 +131,8 @@ class Location(Readable):
         else:
             names = [locator.name for locator in self.scheme]
             for locator in self.scheme:
+                if isinstance(locator.on, Feature) and locator.on.part is not self.part:
+                    yield f'locator "{locator.name}" is on feature "{locator.on.name}" of part "{locator.on.part.name}"'
                 yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
                 if locator.tolerance is None and self.tolerance is None:
                     yield f'locator "{locator.name}" has no tolerance; give one to the locator, or to the locate call'

@@ -1,10 +1,13 @@
-"""Parts, and the points and faces that other declarations pick from them."""
+"""Parts, and the faces that other declarations pick from them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from tolcontact.declaration.feature import Feature
+from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.point import Point
 from tolcontact.declaration.selection import Near, Selection, criterion
 from tolcontact.declaration.vectors import Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
@@ -28,8 +31,30 @@ class Part(Readable):
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
     declared_at: str = field(default_factory=script_line)
+    _features: list[Feature] = field(default_factory=list, init=False)
 
-    def point(self, x: float, y: float, z: float) -> "Point":
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        return tuple(self._features)
+
+    def feature(self, name: str, *said: "Face | Size | GeometricTolerance", datum: str | None = None) -> Feature:
+        """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`."""
+        for each in said:
+            if not isinstance(each, Face | Size | GeometricTolerance):
+                raise TypeError(
+                    f'feature "{name}": {type(each).__name__} is neither a face nor a tolerance; expected part.face(...), '
+                    "tc.Size(...), tc.Position(...) or another tolerance of a feature"
+                )
+        faces = tuple(each for each in said if isinstance(each, Face))
+        tolerances = tuple(each for each in said if not isinstance(each, Face))
+        self.add(Feature(name, self, faces, tolerances, datum, script_line()))
+        return self._features[-1]
+
+    def add(self, *features: Feature) -> None:
+        """Features of this part that have been declared already."""
+        self._features.extend(features)
+
+    def point(self, x: float, y: float, z: float) -> Point:
         """The point (x, y, z) [mm] of this part, in its own frame."""
         return Point(self, vector((x, y, z)))
 
@@ -55,21 +80,6 @@ class Part(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Point(Readable):
-    """A point of a part, in the part's own frame [mm]."""
-
-    part: Part
-    position: Vector
-
-    def faults(self) -> Iterator[str]:
-        if not is_finite(self.position):
-            yield f'point of part "{self.part.name}" is not three finite numbers'
-
-    def __str__(self) -> str:
-        return "{} ({:g}, {:g}, {:g})".format(self.part.name, *self.position)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class Face(Readable):
     """The triangles of a part's surface that meet every criterion."""
 
@@ -87,3 +97,12 @@ class Face(Readable):
 
     def __str__(self) -> str:
         return " ".join([self.part.name, *map(str, self.selections)])
+
+
+def face_of(said: Face | Feature) -> Face:
+    """The face that is meant by itself, or by a feature. Raises TypeError for a feature that has two of them."""
+    if isinstance(said, Feature):
+        if len(said.faces) != 1:
+            raise TypeError(f'feature "{said.name}" has {len(said.faces)} faces; choose one of them: .faces[0]')
+        return said.faces[0]
+    return said

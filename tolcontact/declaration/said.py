@@ -27,6 +27,10 @@ class Said:
             raise self.refused(f"it has no {word!r}")
         return Said(self._value[word], f"{self._at}.{word}" if self._at else word)
 
+    def optional(self, word: str) -> Iterator["Said"]:
+        """The items of a list that a group may have under `word`; documents of earlier formats have none."""
+        return iter(self[word]) if word in self else iter(())
+
     def __contains__(self, word: str) -> bool:
         return isinstance(self._value, dict) and word in self._value
 

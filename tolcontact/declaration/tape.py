@@ -1,13 +1,13 @@
 """A user's expression as a list of elementary steps, so that an archive can hold it without any code.
 
-A tape is a tuple of rows (operation, operands...): "input" with an index into the pose entries of all parts, "const" with a
-number, or the name of a CasADi operation with the positions of earlier rows. The last row is the value.
+A tape is a tuple of rows (operation, operands...): "input" with an index into the pose entries of all parts and the deviations
+that follow, "const" with a number, or the name of a CasADi operation with the positions of earlier rows. The last row is the
+value.
 """
 
 from typing import Any
 
 from tolcontact.declaration.said import Said
-from tolcontact.poses import ENTRIES
 
 Tape = tuple[tuple[Any, ...], ...]
 
@@ -23,8 +23,8 @@ OPERANDS = {"input": 1, "const": 1, **dict.fromkeys(UNARY, 1), **dict.fromkeys(B
 LONGEST = 1_000_000  # steps: an expression of more takes minutes to compile
 
 
-def tape_of(said: Said, parts: int) -> Tape:
-    """The tape that a document holds, for an assembly of that many parts.
+def tape_of(said: Said, inputs: int) -> Tape:
+    """The tape that a document holds, of so many inputs at most.
 
     Raises ArchiveError if it is not a list of known steps, each on earlier ones.
     """
@@ -37,7 +37,7 @@ def tape_of(said: Said, parts: int) -> Tape:
         if name == "const":
             rows.append((name, operands[0].constant()))
         else:
-            count = ENTRIES * parts if name == "input" else len(rows)
+            count = inputs if name == "input" else len(rows)
             rows.append((name, *(operand.index(count) for operand in operands)))
         if len(rows) > LONGEST:
             raise said.refused(f"more than {LONGEST} steps")

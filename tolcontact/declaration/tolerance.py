@@ -21,12 +21,17 @@ class Tolerance(Readable):
         triangular         between -range/2 and +range/2, mode 0
         truncated normal   6 sigma = range, cut at -range/2 and +range/2
 
+    The whole of it lies `shift` [mm] off. Of a normal distribution `cp` says how capable the process is: 6 sigma = range / cp,
+    and `cpk` how near its mean comes to a limit: it lies range / 2 * (1 - cpk / cp) farther up.
     Instead of a name, `distribution` may be any frozen continuous distribution of `scipy.stats`. It defines the spread by
     itself; leave `range` out.
     """
 
     range: float | None = None
     distribution: Any = "normal"
+    shift: float = 0.0
+    cp: float | None = None
+    cpk: float | None = None
 
     def faults(self) -> Iterator[str]:
         if isinstance(self.distribution, str):
@@ -52,6 +57,22 @@ class Tolerance(Readable):
         elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
             yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
 
+        if not is_length(self.shift):
+            yield f"shift is {self.shift!r}; expected a number in mm"
+        for word, value in (("cp", self.cp), ("cpk", self.cpk)):
+            if value is not None and not (is_length(value) and (value > 0 or word == "cpk")):
+                yield f"{word} is {value!r}; expected a number{' above 0' if word == 'cp' else ''}"
+            elif value is not None and self.distribution != "normal":
+                yield f"{word} is given, which goes with a normal distribution; leave it out"
+        if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
+            yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk at most as large"
+
+    @property
+    def mean_shift(self) -> float:
+        """How far [mm] the middle of the distribution lies from 0 beyond that of `distribution` itself."""
+        off = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
+        return float(self.shift) + off
+
     @property
     def width(self) -> float:
         """Full width of the zone [mm]: the range, or six standard deviations of a scipy.stats distribution."""
@@ -59,8 +80,11 @@ class Tolerance(Readable):
 
     def __str__(self) -> str:
         if isinstance(self.distribution, str):
-            return f"{self.distribution}, range {self.range:g} mm"
-        return f"scipy.stats.{self.distribution.dist.name}"
+            said = f"{self.distribution}, range {self.range:g} mm"
+        else:
+            said = f"scipy.stats.{self.distribution.dist.name}"
+        capable = "".join(f", {word} {value:g}" for word, value in (("cp", self.cp), ("cpk", self.cpk)) if value is not None)
+        return said + capable + (f", shifted by {self.shift:g} mm" if self.shift else "")
 
 
 def tolerance(value: Any) -> Tolerance:

@@ -115,6 +115,8 @@ from tolcontact.discretization.analytic import form_arrays, forms_of
 from tolcontact.discretization.brep_face import FaceInFile
 from tolcontact.discretization.cad import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.discretization.discretizing import discretize
+from tolcontact.discretization.face_deviation import FaceDeviation
+from tolcontact.discretization.features import Layer, NominalFeature
 from tolcontact.discretization.known_forms import known_surfaces, with_known_surfaces
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
@@ -124,9 +126,12 @@ from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 __all__ = [
     "BodyInFile",
     "ContactPoints",
+    "FaceDeviation",
     "FaceInFile",
+    "Layer",
     "Locators",
     "Nominal",
+    "NominalFeature",
     "NominalPart",
     "Offsets",
     "RoundPoint",

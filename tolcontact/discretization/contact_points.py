@@ -5,13 +5,16 @@ import logging
 import math
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
-from tolcontact.declaration import Assembly, ContactPair, Part
+from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.discretization.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
-from tolcontact.discretization.faces import Meshes, patch
+from tolcontact.discretization.face_deviation import FaceDeviation
+from tolcontact.discretization.faces import Meshes, patch, triangles
 from tolcontact.discretization.fault import GeometryFault, where
+from tolcontact.discretization.features import Features
 from tolcontact.discretization.nominal import ContactPoints, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.overlap import overlap_corners, rim_points
@@ -30,7 +33,9 @@ SAME = 1e-9  # of the part's size: points that are no farther apart are one
 log = logging.getLogger(__name__)
 
 
-def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes) -> ContactPoints:
+def contact_points(
+    assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
+) -> ContactPoints:
     """The contact points of a declared pair, between the parts as `placed`.
 
     Raises GeometryFault if its faces are nowhere within reach, or point the same way.
@@ -40,6 +45,7 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     target = patch(pair.reference, meshes).placed(*reference.placement)
     placed_own = own.placed(*moving.placement)
+    deviating = _deviating(pair.moving, moving, meshes, features), _deviating(pair.reference, reference, meshes, features)
     made = functools.partial(
         ContactPoints,
         pair.name,
@@ -48,6 +54,7 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
         surface=target,
         own=placed_own,
         facets=facet_error(placed_own, target, reach),
+        deviating=deviating,
     )
     if pair.points is None and pair.spacing is None and (found := round_points(placed_own, target, reach)):
         touching, feet, normals = (np.array(each) for each in zip(*(point.nominal() for point in found), strict=True))
@@ -83,7 +90,27 @@ def contact_points(assembly: Assembly, pair: ContactPair, placed: Mapping[Part, 
             f"its faces {pair.moving} and {pair.reference} point the same way, so one cannot rest on the other; "
             "choose faces that face each other"
         )
-    return made(P_m[kept], P_r[kept], n_r[kept], Offsets.none(int(kept.sum())))
+    points = made(P_m[kept], P_r[kept], n_r[kept], Offsets.none(int(kept.sum())))
+    return replace(points, offsets=_heights(deviating, points.facing)) if any(deviating) else points
+
+
+def _deviating(face: Face, part: NominalPart, meshes: Meshes, features: Features) -> FaceDeviation | None:
+    """What a face deviates by, if it is of a feature."""
+    if not part.part.features:
+        return None
+    number = features.face_at(part.part, triangles(face, meshes), part.placement)
+    return None if number is None else features.faces[number]
+
+
+def _heights(deviating: tuple[FaceDeviation | None, FaceDeviation | None], facing: np.ndarray) -> Offsets:
+    """What points stand out by as faces grow; `facing` (point,): 1 where they face each other."""
+    of_side = zip(deviating, (facing, np.ones_like(facing)), strict=True)
+    grown = [
+        Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share))
+        for face, share in of_side
+        if face is not None and face.grows
+    ]
+    return Offsets.joined(grown, len(facing)) if grown else Offsets.none(len(facing))
 
 
 def _announce(pair: ContactPair, area: float, count: int | None) -> None:

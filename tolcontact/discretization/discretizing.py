@@ -1,7 +1,9 @@
 """Discretize: an assembly becomes its nominal model, or a list of all its faults."""
 
+import difflib
 import logging
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,8 +12,9 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.doubtful_sizes import warn_of_units
-from tolcontact.discretization.faces import Meshes
+from tolcontact.discretization.faces import Meshes, triangles
 from tolcontact.discretization.fault import GeometryFault, where
+from tolcontact.discretization.features import Features, in_order
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
@@ -37,20 +40,29 @@ def discretize(assembly: Assembly) -> Nominal:
     shapes = {part: found for part, found in attempts.items() if found is not None}
     meshes = {part: found.mesh for part, found in shapes.items()}
     parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]
+    features = Features(sum(len(part.locators) for part in parts if part is not None))
+    if clean and None not in parts:
+        _add_features(assembly, meshes, features, faults)
+        parts = [_on_features(part, features, meshes, faults) for part in parts if part is not None]
     placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
     pairs = [
-        _attempt(faults, where("contact pair", pair), contact_points, assembly, pair, placed, meshes)
+        _attempt(faults, where("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
         for pair in assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
     if clean:
         faults.extend(_immovable(assembly))
     labels = [label for nominal in placed.values() for label in nominal.locators.labels]
-    faults.extend(
-        f'locator "{label}" is declared {labels.count(label)} times; its draws would be the same, so rename part or locator'
-        for label in dict.fromkeys(labels)
-        if labels.count(label) > 1 and clean
-    )
+    labels += [*features.labels, *(each.name for each in assembly.variables)]
+    if clean:
+        faults.extend(
+            f'contributor "{label}" is declared {labels.count(label)} times; its draws would be the same, so rename part, '
+            "locator, feature or variable"
+            for label in dict.fromkeys(labels)
+            if labels.count(label) > 1
+        )
+    if clean and not faults:
+        faults.extend(_strange_contributors(assembly, labels))
     faults.extend(
         f"{where('contact pair', pair)}: its name is reserved for the one-sided locators of a part; rename it"
         for pair in assembly.pairs
@@ -60,7 +72,69 @@ def discretize(assembly: Assembly) -> Nominal:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     found = tuple(part for part in parts if part is not None)
-    return Nominal(assembly, found, (*(pair for pair in pairs if pair is not None), *_support_pairs(found)), assembly.measures)
+    made = tuple(pair for pair in pairs if pair is not None)
+    return Nominal(assembly, found, (*made, *_support_pairs(found)), assembly.measures, features)
+
+
+def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: list[str]) -> None:
+    for index, part in enumerate(assembly.parts):
+        ordered, circular = in_order(part)
+        for feature in ordered:
+            _attempt(faults, f'part "{part.name}": {where("feature", feature)}', features.add, feature, index, meshes)
+        if circular:
+            names = ", ".join(f'"{feature.name}"' for feature in circular)
+            faults.append(
+                f'part "{part.name}": features {names}: their datums refer to each other in a circle, or to a datum that could '
+                "not be made; leave one of the references out"
+            )
+
+
+def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: list[str]) -> NominalPart:
+    """The part, with what its locators stand against."""
+    location = part.scheme
+    if location is None or not part.part.features:
+        return part
+    standing: list[int | None] = []
+    if isinstance(location, ThreeTwoOne):
+        found = [
+            _attempt(faults, where("part", part.part), features.face_at, part.part, triangles(face, meshes), part.placement)
+            for face in location.faces
+        ]
+        standing = [found[k] for k in (0, 0, 0, 1, 1, 2)]
+    else:
+        for locator in location:
+            own = features.of(locator.on) if locator.on and any(f.feature is locator.on for f in features.found) else None
+            standing.append(None if own is None else features.face(own, _only(own.triangles), part.placement))
+    faces = tuple(None if number is None else features.faces[number] for number in standing)
+    return replace(part, locators=replace(part.locators, faces=faces))
+
+
+def _only(faces: Sequence[Any]) -> int | None:
+    """The number of the only face; None, which stands for their middle, of two."""
+    return 0 if len(faces) == 1 else None
+
+
+def _strange_contributors(assembly: Assembly, labels: Sequence[str]) -> Iterator[str]:
+    """References to contributors that there are not, and contributors that two things would draw."""
+    known = set(labels)
+    variables = {each.name for each in assembly.variables}
+    drawn: dict[str, str] = {}
+    for kind, name, line, named in (
+        *(("variable", each.name, each.declared_at, tuple(each.drives)) for each in assembly.variables),
+        *(("correlation", each.name, each.declared_at, each.labels) for each in assembly.correlations),
+        *(("population", each.name, each.declared_at, each.columns) for each in assembly.populations),
+    ):
+        who = f'{kind} "{name}" ({line})'
+        for label in named:
+            if label not in known:
+                near = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
+                yield f'{who}: unknown contributor "{label}"; contributors are, for example: {", ".join(near)}'
+            elif kind == "variable" and label in variables:
+                yield f'{who}: it drives the variable "{label}"; a variable drives locators and features alone'
+            elif kind != "variable" and label in drawn:
+                yield f'{who}: contributor "{label}" is drawn by {drawn[label]} already; leave it out of one of them'
+            elif kind != "variable":
+                drawn[label] = who
 
 
 def _supports(part: Part) -> str:
@@ -74,8 +148,22 @@ def _support_pairs(parts: tuple[NominalPart, ...]) -> Iterator[ContactPoints]:
         own = np.flatnonzero(part.locators.one_sided)
         if part.free and own.size:
             P, n = part.locators.points[own], part.locators.directions[own]
-            yield ContactPoints(_supports(part.part), index, part.parent, P, P, n, Offsets(first + own, np.eye(len(own))))
+            yield ContactPoints(
+                _supports(part.part), index, part.parent, P, P, n, _raised(part.locators, first, own), locators=first + own
+            )
         first += len(part.locators)
+
+
+def _raised(locators: Locators, first: int, own: np.ndarray) -> Offsets:
+    """What supports stand out by: their own deviations, columns `first` on, and what their faces come out of the part."""
+    every = [Offsets(first + own, np.eye(len(own)))]
+    for place, number in enumerate(own):
+        columns, factors = locators.pushes(number)
+        if columns.size:
+            matrix = np.zeros((len(columns), len(own)))
+            matrix[:, place] = factors
+            every.append(Offsets(columns, matrix))
+    return Offsets.joined(every, len(own)) if len(every) > 1 else every[0]
 
 
 def _attempt(faults: list[str], where: str, build: Callable[..., Any], *arguments: Any) -> Any:
@@ -115,6 +203,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
         vertices=vertices @ R_WP.T + t_WP,
         faces=faces,
         locators=nominal,
+        scheme=location.scheme if len(nominal) and location is not None else None,
         parent=assembly.parts.index(parent) if parent in assembly.parts else None,
         free=is_free(assembly, part),
     )
@@ -130,6 +219,7 @@ def _locators(
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in declared),
         stiffness=np.array([float(locator.stiffness) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
+        faces=(None,) * len(declared),
     )
 
 

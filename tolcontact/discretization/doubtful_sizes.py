@@ -37,8 +37,13 @@ def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> 
     scheme = location.scheme if location and isinstance(location.scheme, tuple) else ()
     declared = [
         *((f'its locator "{locator.name}"', locator.point) for locator in scheme),
-        *((f'the point of measure "{m.name}"', p.position) for m in assembly.measures for p in m.points if p.part is part),
-        *((f'the point of force "{f.name}"', f.at.position) for f in assembly.forces if f.at.part is part),
+        *(
+            (f'the point of measure "{m.name}"', p.position)
+            for m in assembly.measures
+            for p in m.points
+            if p.part is part and p.position
+        ),
+        *((f'the point of force "{f.name}"', f.at.position) for f in assembly.forces if f.at.part is part and f.at.position),
     ]
     points = np.array([point for _, point in declared]).reshape(-1, 3)
     away, size = _away(points, shape.mesh.bounds), float(shape.mesh.scale)

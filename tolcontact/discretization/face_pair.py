@@ -24,11 +24,13 @@ class Side:
     """A face in its nominal place, and the body that it belongs to.
 
     points   (point, 3) [mm], all over the face, its corners among them
+    normals  (point, 3): outward ones there
     """
 
     face: Surface
     body: trimesh.Trimesh
     points: np.ndarray
+    normals: np.ndarray
 
     def depth(self, points: np.ndarray) -> np.ndarray:
         """How deep `points` (point, 3) [mm] lie behind the face, in the body; 0 outside, and beside the face.
@@ -84,14 +86,19 @@ class FacePair:
     moving: Side
     reference: Side
 
-    def depth(self, X_RM: np.ndarray) -> np.ndarray:
-        """Largest depth (row,) [mm] of one face in the other's body at X_RM (row, 12), both ways round."""
+    def depth(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """Largest depth (row,) [mm] of one face in the other's body at X_RM (row, 12), both ways round.
+
+        Faces that lie farther out than they do nominally, by `heights` (row,) [mm] together, count as if one of them did.
+        """
         found = np.zeros(len(X_RM))
         for first in range(0, len(X_RM), TOGETHER):
-            X = X_RM[first : first + TOGETHER]
-            sides = (self.reference, X, self.moving.points), (self.moving, pose.inverse(X), self.reference.points)
-            for body, motion, points in sides:
-                depth = body.depth(pose.apply(motion, points).reshape(-1, 3)).reshape(len(X), -1)
+            X, farther = X_RM[first : first + TOGETHER], heights[first : first + TOGETHER]
+            for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
+                places = pose.apply(motion, side.points)
+                if farther.any():
+                    places += farther[:, None, None] * (side.normals @ pose.rotation(motion).swapaxes(1, 2))
+                depth = body.depth(places.reshape(-1, 3)).reshape(len(X), -1)
                 found[first : first + TOGETHER] = np.maximum(found[first : first + TOGETHER], depth.max(axis=1, initial=0))
         return found
 
@@ -103,7 +110,8 @@ def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
     points = np.unique(_all_over(face.mesh, step, wanted), axis=0)
     if len(points) > MOST:
         points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
-    return Side(face, body, face.project(points)[0] if face.forms else points)
+    triangle, nearest = face.nearest(points)
+    return Side(face, body, face.project(points)[0] if face.forms else points, face.normals(triangle, nearest))
 
 
 def _all_over(mesh: trimesh.Trimesh, step: float, wanted: int) -> np.ndarray:

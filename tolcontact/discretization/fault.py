@@ -1,6 +1,6 @@
 """What is wrong with a shape, and whose."""
 
-from tolcontact.declaration import ContactPair, Part
+from tolcontact.declaration import ContactPair, Feature, Part
 
 
 class GeometryFault(Exception):
@@ -13,6 +13,6 @@ def clipped(words: str, most: int = 400) -> str:
     return line if len(line) <= most else f"{line[:most]}..."
 
 
-def where(kind: str, thing: Part | ContactPair) -> str:
+def where(kind: str, thing: Part | ContactPair | Feature) -> str:
     """How a message names a declared thing: kind, name, and the line of the script."""
     return f'{kind} "{thing.name}" ({thing.declared_at})'

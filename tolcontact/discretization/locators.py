@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import Tolerance
+from tolcontact.discretization.face_deviation import FaceDeviation
 from tolcontact.discretization.fault import GeometryFault
 
 CONDITION_LIMIT = 1e8
@@ -21,6 +22,7 @@ class Locators:
     tolerances   one for each
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
+    faces        of the features that they stand against, one for each; None of one that stands against a nominal face
     """
 
     labels: tuple[str, ...]
@@ -29,6 +31,7 @@ class Locators:
     tolerances: tuple[Tolerance, ...]
     stiffness: np.ndarray
     one_sided: np.ndarray
+    faces: tuple[FaceDeviation | None, ...]
 
     def __len__(self) -> int:
         return len(self.labels)
@@ -44,7 +47,15 @@ class Locators:
             tolerances=tuple(tolerance for own in every for tolerance in own.tolerances),
             stiffness=np.concatenate([own.stiffness for own in every]),
             one_sided=np.concatenate([own.one_sided for own in every]),
+            faces=tuple(face for own in every for face in own.faces),
         )
+
+    def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
+        """Columns (k,) of the deviations by which the face at a locator comes out of its part there, and how far for 1 (k,)."""
+        face = self.faces[locator]
+        if face is None:
+            return np.zeros(0, dtype=int), np.zeros(0)
+        return face.columns, face.outward(self.points[locator, None], -self.directions[locator, None])[0]
 
     @property
     def matrix(self) -> tuple[np.ndarray, np.ndarray]:

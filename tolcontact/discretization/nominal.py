@@ -6,10 +6,12 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Assembly, Face, Measure, Part, Point
+from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.curvature import chord_height
+from tolcontact.discretization.face_deviation import FaceDeviation
 from tolcontact.discretization.face_pair import FacePair, side
-from tolcontact.discretization.faces import triangles
+from tolcontact.discretization.faces import patch, triangles
+from tolcontact.discretization.features import Features, NominalFeature
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoints
@@ -21,7 +23,7 @@ class NominalPart:
     """A part in its nominal place.
 
     vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
-    locators             those that hold it; none if it is fixed
+    locators             those that hold it, as `scheme` declares them; none if it is fixed
     parent               index of the part that it is located on; None for the ground
     """
 
@@ -32,6 +34,7 @@ class NominalPart:
     vertices: np.ndarray
     faces: np.ndarray
     locators: Locators
+    scheme: ThreeTwoOne | tuple[Locator, ...] | None
     parent: int | None
     free: bool
 
@@ -55,6 +58,8 @@ class ContactPoints:
     its nominal place, and `own` the moving one.
     `facets` [mm] is how far their triangles may lie off the round faces that they approximate. Where `round` says
     that a ball or a shaft touches walls, gaps are not those of fixed points: they follow from it at any pose.
+    `deviating` is what the moving and the reference face deviate by, if they are of features; heights of fixed points are
+    among the offsets. `locators` (point,) are the numbers of those that the points are, if they are supports.
     """
 
     name: str
@@ -68,6 +73,24 @@ class ContactPoints:
     own: Surface | None = None
     facets: float = 0.0
     round: RoundPoints | None = None
+    deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
+    locators: np.ndarray | None = None
+
+    @cached_property
+    def facing(self) -> np.ndarray:
+        """-n^m . n^r (point,): the share of the moving face's height by which it comes nearer there."""
+        if self.own is None or self.round:
+            return np.ones(len(self.P_m))
+        triangle, nearest = self.own.nearest(self.P_m)
+        return np.asarray(-(self.own.normals(triangle, nearest) * self.n_r).sum(axis=1))
+
+    def heights(self, deviations: np.ndarray) -> np.ndarray:
+        """How much farther out its two faces lie together (row,) [mm], for deviations (row, contributor)."""
+        found = np.zeros(len(deviations))
+        for face in self.deviating:
+            if face is not None and face.grows:
+                found += face.heights(deviations)
+        return found
 
     @cached_property
     def bulge(self) -> float:
@@ -96,6 +119,7 @@ class Nominal:
     parts: tuple[NominalPart, ...]
     pairs: tuple[ContactPoints, ...]
     measures: tuple[Measure, ...]
+    _features: Features
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
@@ -112,8 +136,23 @@ class Nominal:
 
     @cached_property
     def locators(self) -> Locators:
-        """Those of all parts, one part after the other: the columns of deviations."""
+        """Those of all parts, one part after the other: the first columns of deviations."""
         return Locators.joined(part.locators for part in self.parts)
+
+    @property
+    def features(self) -> tuple[NominalFeature, ...]:
+        """Those of all parts."""
+        return tuple(self._features.found)
+
+    @property
+    def faces(self) -> tuple[FaceDeviation, ...]:
+        """The faces that deviate with features, and are used."""
+        return tuple(self._features.faces)
+
+    @cached_property
+    def contributors(self) -> tuple[str, ...]:
+        """Labels of all that varies, the columns of deviations: locators, freedoms of features, and variables."""
+        return (*self.locators.labels, *self._features.labels, *(each.name for each in self.assembly.variables))
 
     def columns(self, part: int) -> np.ndarray:
         """Which of them belong to a part."""
@@ -129,4 +168,23 @@ class Nominal:
 
     def position(self, point: Point) -> np.ndarray:
         """Nominal assembly coordinates (3,) [mm] of a declared point."""
-        return self.parts[self.part_index(point.part)].placed(np.array(point.position))
+        own = point.position if point.end is None or point.on is None else self._features.of(point.on).geometry.end(point.end)
+        return self.parts[self.part_index(point.part)].placed(np.array(own))
+
+    def face_at(self, point: Point) -> FaceDeviation | None:
+        """What a declared point moves with beside its part; of a feature with two faces their middle."""
+        if point.on is None:
+            return None
+        own = self._features.of(point.on)
+        middle = point.end is not None or len(own.triangles) > 1
+        number = self._features.face(own, None if middle else 0, self.parts[own.part].placement)
+        return self.faces[number]
+
+    def outward(self, point: Point) -> np.ndarray:
+        """Outward normal (3,), in the nominal assembly frame, of the face at a point on a feature."""
+        part = self.parts[self.part_index(point.part)]
+        surface = patch(point.on.faces[0], {each.part: each.mesh for each in self.parts}) if point.on else None
+        if surface is None or point.position is None:
+            return np.zeros(3)
+        triangle, foot = surface.nearest(np.array([point.position]))
+        return np.asarray(part.placement[0] @ surface.normals(triangle, foot)[0])

@@ -1,5 +1,6 @@
 """Offsets: how far contact points stand out of their reference face, linear in what varies."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,15 @@ class Offsets:
     def none(cls, points: int) -> "Offsets":
         """Points that stand out by nothing."""
         return cls(np.zeros(0, dtype=int), np.zeros((0, points)))
+
+    @classmethod
+    def joined(cls, every: "Sequence[Offsets]", points: int) -> "Offsets":
+        """The sum of several offsets of the same points."""
+        columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(own.columns for own in every)]))
+        matrix = np.zeros((len(columns), points))
+        for own in every:
+            matrix[np.searchsorted(columns, own.columns)] += own.matrix
+        return cls(columns, matrix)
 
     def take(self, points: np.ndarray) -> "Offsets":
         """The offsets of some points."""

@@ -45,7 +45,11 @@ def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
 
 
 def _corners(coordinates: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of points (coordinate, point), in order; beyond two coordinates all points."""
+    """Corners of the convex hull of points (coordinate, point), in order; beyond two coordinates all points.
+
+    What all points have in common tells none from the others.
+    """
+    coordinates = coordinates[np.ptp(coordinates, axis=1) > 0]
     if len(coordinates) == 0:
         return np.array([0])
     if len(coordinates) == 1:

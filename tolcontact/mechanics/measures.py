@@ -9,6 +9,7 @@ import numpy as np
 from tolcontact.declaration import Measure, Part, Point
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
+from tolcontact.mechanics.face_pose import face_height, face_pose
 from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.tape import replay
 
@@ -16,9 +17,10 @@ from tolcontact.mechanics.tape import replay
 class SymbolicPoses:
     """What a user's own measure gets: the symbolic poses of the parts, by their declarations."""
 
-    def __init__(self, nominal: Nominal, poses: Sequence[Pose]) -> None:
+    def __init__(self, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> None:
         self._nominal = nominal
         self._poses = poses
+        self._deviations = deviations
 
     def _pose(self, part: Part) -> Pose:
         if part not in self._nominal.assembly.parts:
@@ -28,7 +30,13 @@ class SymbolicPoses:
 
     def position(self, point: Point) -> ca.SX:
         """Where a declared point is, (3, 1) [mm], in the assembly frame."""
-        return self._pose(point.part).apply(ca.DM(self._nominal.position(point)))
+        X, p, face = self._pose(point.part), ca.SX(ca.DM(self._nominal.position(point))), self._nominal.face_at(point)
+        if face is None:
+            return X.apply(p)
+        X_face, height = face_pose(face, self._deviations), face_height(face, self._deviations)
+        if face.grows:
+            p = p + height * ca.DM(self._nominal.outward(point))
+        return X.apply(p if X_face is None else X_face.apply(p))
 
     def rotation(self, part: Part) -> ca.SX:
         """R (3, 3) of a part: its rotation from its nominal place."""
@@ -39,8 +47,8 @@ class SymbolicPoses:
         return self._pose(part).t
 
 
-def measured(nominal: Nominal, poses: Sequence[Pose]) -> list[ca.SX]:
-    """One scalar expression per declared measure.
+def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list[ca.SX]:
+    """One scalar expression per declared measure, of poses and deviations (contributor, 1).
 
     Raises ModelError if a user's function fails or does not return a scalar.
     """
@@ -48,7 +56,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose]) -> list[ca.SX]:
     expressions = []
     for measure in nominal.measures:
         try:
-            expressions.append(_expression(measure, nominal, poses))
+            expressions.append(_expression(measure, nominal, poses, deviations))
         except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
             faults.append(
                 f'measure "{measure.name}" ({measure.declared_at}): its function failed with '
@@ -59,13 +67,13 @@ def measured(nominal: Nominal, poses: Sequence[Pose]) -> list[ca.SX]:
     return expressions
 
 
-def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose]) -> ca.SX:
+def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
+    seen = SymbolicPoses(nominal, poses, deviations)
     if isinstance(measure.of, Point):
-        now = SymbolicPoses(nominal, poses)
-        start = ca.DM(nominal.position(measure.of)) if measure.to is None else now.position(measure.of)
-        end = now.position(measure.to or measure.of)
+        start = ca.DM(nominal.position(measure.of)) if measure.to is None else seen.position(measure.of)
+        end = seen.position(measure.to or measure.of)
         return ca.dot(ca.DM(np.array(measure.along)), end - start)
-    value: Any = replay(measure.of, poses) if isinstance(measure.of, tuple) else measure.of(SymbolicPoses(nominal, poses))
+    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(seen)
     expression = ca.SX(value)
     if expression.shape != (1, 1):
         raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")

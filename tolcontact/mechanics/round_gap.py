@@ -10,7 +10,8 @@ of a hollow cylinder the one counts that is nearest.
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import RoundPoint, RoundPoints
+from tolcontact.discretization import ContactPoints, RoundPoint, RoundPoints
+from tolcontact.mechanics.face_pose import face_height
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
 ROUNDS = 6  # of Newton's method, from the tangent that is nearest to an upright shaft
@@ -21,7 +22,7 @@ STRAIGHT = 1e-9
 
 
 def round_gaps(points: RoundPoints) -> ca.Function:
-    """Function of X_RM (12) and reactions (point), with the results
+    """Function of X_RM (12), heights (2) by which the moving and the reference face have grown, and reactions (point); results:
 
     gaps     (point) [mm]
     slopes   (point, 12): their derivatives by X_RM
@@ -29,17 +30,26 @@ def round_gaps(points: RoundPoints) -> ca.Function:
     wrap     (12, 12): the sum of reactions times how hollow walls close in around what slides along them; positive
                        semidefinite, and to be subtracted from `bow`
     """
-    X, reactions = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("reactions", len(points))
+    X, grown, reactions = (
+        ca.SX.sym(name, size) for name, size in (("X_RM", ENTRIES), ("heights", 2), ("reactions", len(points)))
+    )
     gaps, slopes = [], []
     bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
     for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
-        gap, slope, bend, closing = (_of_tangents if _has_tangents(point) else _of_ball)(point, X)
+        of_body, of_wall = (grown[0], grown[1]) if point.on_moving else (grown[1], grown[0])
+        gap, slope, bend, closing = (_of_tangents if _has_tangents(point) else _of_ball)(point, X, of_body, of_wall)
         gaps.append(gap)
         slopes.append(slope)
         bow += reaction * bend
         wrap += reaction * closing
     outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
-    return ca.Function("round_gaps", [X, reactions], [*outputs.values()], ["X_RM", "reactions"], [*outputs])
+    inputs = {"X_RM": X, "heights": grown, "reactions": reactions}
+    return ca.Function("round_gaps", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+
+
+def heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
+    """How much the moving and the reference face of a pair have grown (2) [mm]."""
+    return ca.vertcat(*(face_height(face, deviations) for face in pair.deviating))
 
 
 def _has_tangents(point: RoundPoint) -> bool:
@@ -54,9 +64,9 @@ def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
     return pose.apply(ca.DM(point.centre)), pose.R @ ca.DM(point.axis)
 
 
-def _of_tangents(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Beside a plane, or of a shaft in a hollow cylinder: gap, slope (1, 12), second derivative (12, 12), and what is to be
-    subtracted from that because the wall closes in (12, 12).
+    subtracted from that because the wall closes in (12, 12); shaft and wall have grown by `of_body` and `of_wall` [mm].
     """
     c, a = _in_wall_frame(point, X)
     o, w, r = ca.DM(point.wall.origin), point.wall.axis, float(point.radius)
@@ -67,17 +77,20 @@ def _of_tangents(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.S
         tilt = 1 / ca.dot(u, a) ** 2
     elif point.axis.any():
         tilt = ca.SX(-1)
+    of_both = ca.vertcat(of_body, of_wall)
     e, t, delta = ca.SX.sym("e", 3), ca.SX.sym("t", 3), ca.SX.sym("delta")
     across = e * ca.cos(delta) + t * ca.sin(delta)
-    gap = float(point.wall.radius) - ca.dot(across, c - o) - r * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
+    gap = (
+        float(point.wall.radius) - of_wall - ca.dot(across, c - o) - (r + of_body) * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
+    )
     slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
     second, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
     symbols = [e, t, delta]
     if point.wall.kind == "plane":
         flat = _put([gap, slope, second], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
         return flat[0], flat[1], flat[2], ca.SX.zeros(ENTRIES, ENTRIES)
-    turning = ca.Function("turning", [X, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
-    there, is_free = _nearest_tangent(point, turning, X, c - o)
+    turning = ca.Function("turning", [X, of_both, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
+    there, is_free = _nearest_tangent(point, turning, X, of_both, c - o)
     least = max(abs(point.wall.radius - r), CLOSE * r)
     closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
     found = _put([gap, slope, second, closing], symbols, [there, ca.cross(ca.DM(w), there), ca.SX(0)])
@@ -89,10 +102,10 @@ def _put(expressions: list[ca.SX], symbols: list[ca.SX], values: list[ca.SX]) ->
     return list(ca.substitute(expressions, symbols, values))  # type: ignore[arg-type]
 
 
-def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
+def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, grown: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if that is where the wall ends, else 1.
 
-    turning  Function of X_RM, e and t: first and second derivative of the gap as e turns towards t
+    turning  Function of X_RM, what shaft and wall have grown by, e and t: derivatives of the gap as e turns towards t
     q        (3, 1) from the wall's axis to the shaft's
     """
     w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
@@ -102,7 +115,7 @@ def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, q: ca.SX
     least = CLOSE * float(point.radius) * 1e-3
     for _ in range(ROUNDS):
         t = ca.cross(w, e)
-        first, second = turning(X, e, t)
+        first, second = turning(X, grown, e, t)
         newton = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
         step = ca.if_else(second > least, newton, ca.if_else(first > 0, -LARGEST, LARGEST))  # away from a farthest tangent
         _, e = _direction(e + step * t)
@@ -125,7 +138,7 @@ def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.if_else(is_free, e, np.cos(opening) * x + np.sin(opening) * aside), ca.if_else(is_free, 1, 0)
 
 
-def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """The same of a ball beside a curved wall."""
     c, _ = _in_wall_frame(point, X)
     side = -1.0 if point.is_hollow else 1.0
@@ -135,7 +148,7 @@ def _of_ball(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
     bend += J.T @ rest @ J if point.is_hollow else J.T @ (around + rest) @ J
     closing = J.T @ around @ J if point.is_hollow else ca.SX.zeros(ENTRIES, ENTRIES)
-    return side * distance - float(point.radius), slope, bend, closing
+    return side * distance - float(point.radius) - of_body - of_wall, slope, bend, closing
 
 
 def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:

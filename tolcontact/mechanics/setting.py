@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from tolcontact.discretization import Nominal
+from tolcontact.mechanics.face_pose import facing_pose
 from tolcontact.mechanics.groups import Group
-from tolcontact.mechanics.pose import Pose, pose_of, relative
+from tolcontact.mechanics.pose import Pose, pose_of
 from tolcontact.method import Method
 
 
@@ -17,7 +18,7 @@ class Setting:
 
     raw          poses from which displacements count
     moments      (10, side) of the points of each side that count in the objective
-    deviations   (locator, 1) of the model [mm]
+    deviations   (contributor, 1) of the model
     firmness     what multiplies the regularization: 1 in the end
     z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
     """
@@ -49,11 +50,9 @@ class Setting:
         return pose_of(self.at_rest(entries) + self.slope(entries) @ self.z)
 
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
-        """X_RM of the group's pairs."""
-        pairs = [self.nominal.pairs[index] for index in self.group.pairs]
-        return [
-            poses[self.group.position(pair.moving)]
-            if pair.reference is None
-            else relative(poses[self.group.position(pair.moving)], poses[self.group.position(pair.reference)])
-            for pair in pairs
-        ]
+        """X_RM of the faces of the group's pairs."""
+        found = []
+        for pair in (self.nominal.pairs[index] for index in self.group.pairs):
+            reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
+            found.append(facing_pose(pair, poses[self.group.position(pair.moving)], reference, self.deviations))
+        return found

@@ -24,12 +24,12 @@ _BINARY: dict[str, Callable[[Any, Any], Any]] = {
 _NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
 
 
-def record(expression: ca.SX, poses: ca.SX) -> Tape:
-    """The steps of a scalar expression of the pose entries `poses` (12 * part, 1).
+def record(expression: ca.SX, entries: ca.SX) -> Tape:
+    """The steps of a scalar expression of `entries`: those of all poses (12 * part, 1), then deviations (contributor, 1).
 
     Raises ValueError for an operation that has no place on a tape, or for too many of them.
     """
-    function = ca.Function("expression", [poses], [expression])
+    function = ca.Function("expression", [entries], [expression])
     if function.n_instructions() > LONGEST:
         raise ValueError(f"an expression of {function.n_instructions()} steps cannot be archived; {LONGEST} can")
     rows: list[tuple[Any, ...]] = []
@@ -52,10 +52,10 @@ def record(expression: ca.SX, poses: ca.SX) -> Tape:
     return tuple(rows)
 
 
-def replay(tape: Tape, poses: Sequence[Pose]) -> ca.SX:
-    """The expression that a tape holds, on the given poses."""
-    entries = ca.vertcat(*(pose.vector() for pose in poses))
-    if entries.numel() != ENTRIES * len(poses):
+def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
+    """The expression that a tape holds, on the given poses and deviations."""
+    entries = ca.vertcat(*(pose.vector() for pose in poses), deviations)
+    if entries.numel() != ENTRIES * len(poses) + deviations.numel():
         raise ValueError("a tape needs 12 entries for each pose")
     values: list[ca.SX] = []
     for operation, *operands in tape:

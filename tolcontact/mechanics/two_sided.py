@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 
 import casadi as ca
+import numpy as np
 
+from tolcontact.mechanics.placement import held
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.setting import Setting
 
@@ -27,7 +29,8 @@ def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> 
     """How far the two-sided locators of the movers are from their deviations [mm] (locator, 1)."""
     apart = []
     for part in setting.group.free:
-        columns = setting.nominal.columns(part)[~setting.nominal.parts[part].locators.one_sided]
-        if columns.size:
-            apart.append(elongation(setting, part, poses, linear=linear) - setting.deviations[columns.tolist()])
+        exact = ~setting.nominal.parts[part].locators.one_sided
+        if exact.any():
+            wanted = held(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
+            apart.append(elongation(setting, part, poses, linear=linear) - wanted)
     return ca.vertcat(*apart) if apart else ca.SX(0, 1)

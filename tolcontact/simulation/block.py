@@ -14,7 +14,7 @@ from tolcontact.vocabulary import STATES, Status
 class Block(Readable):
     """Realizations `start` to `start + n`; the first dimension of every array is the realization.
 
-    deviations    (n, locator) [mm]
+    deviations    (n, contributor), in mm or the units of the contributor
     poses         (n, state, part, 12): R row by row, t [mm]
     measured      (n, state, measure)
     gap_min       (n, state, pair) [mm]: least true gap (5) of all contact points at the archived poses
@@ -30,7 +30,7 @@ class Block(Readable):
     """
 
     start: int
-    deviations: Float[Array, "n locator"]
+    deviations: Float[Array, "n contributor"]
     poses: Float[Array, "n state part 12"]
     measured: Float[Array, "n state measure"]
     gap_min: Float[Array, "n state pair"]
@@ -56,7 +56,7 @@ class Block(Readable):
     def untouched(
         cls,
         start: int,
-        deviations: Float[Array, "n locator"],
+        deviations: Float[Array, "n contributor"],
         raw: Float[Array, "n part 12"],
         measured: Float[Array, "n measure"],
         pairs: int,

@@ -23,14 +23,18 @@ class Outcome(enum.IntEnum):
 
 
 def simulate_block(
-    program: Program, deviations: Float[Array, "n locator"], *, start: int = 0, resolvers: list[ContactResolver] | None = None
+    program: Program,
+    deviations: Float[Array, "n contributor"],
+    *,
+    start: int = 0,
+    resolvers: list[ContactResolver] | None = None,
 ) -> Block:
-    """Raw and corrected states for given deviations (realization, locator) [mm]."""
+    """Raw and corrected states for given deviations (realization, contributor), in mm or the units of the contributor."""
     if resolvers is None:
         resolvers = [ContactResolver(program, group).twin() for group in program.groups]
     placed = program.place(deviations=deviations)["poses"]
     raw = placed.reshape(len(deviations), len(program.nominal.parts), ENTRIES)
-    measured, relative = _observe(program, raw)
+    measured, relative = _observe(program, raw, deviations)
     block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs))
     worst = np.zeros(len(block), dtype=np.int8)
     for resolver in resolvers:
@@ -40,7 +44,7 @@ def simulate_block(
     unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
     worst[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf
     touched = worst > Outcome.UNTOUCHED
-    block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED])
+    block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])
     block.status[:] = _statuses(program.method.is_exact)[worst]
     return block
 
@@ -75,7 +79,9 @@ def _statuses(is_exact: bool) -> np.ndarray:
     return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)
 
 
-def _observe(program: Program, poses: Float[Array, "n part 12"]) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
-    """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
-    seen = program.observe(poses=poses)
+def _observe(
+    program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
+) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
+    """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12), for deviations."""
+    seen = program.observe(poses=poses, deviations=deviations)
     return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

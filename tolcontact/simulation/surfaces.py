@@ -8,7 +8,6 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.simulation.blocks import simulate_block
-from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import CORRECTED
 
 TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
@@ -25,25 +24,34 @@ class Surfaces(NamedTuple):
     beside: Float[Array, "n pair"]
 
 
-def check_surfaces(program: Program, poses: Float[Array, "n part 12"]) -> Surfaces:
-    """Look at the faces of every pair at corrected poses (row, part, 12)."""
+def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]) -> Surfaces:
+    """Look at the faces of every pair at corrected poses (row, part, 12), for deviations (row, contributor)."""
     nominal, fixed = program.nominal, not program.method.is_iterated
     found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None:
             continue
-        X_RM = pose.relative(poses[:, pair.moving], poses[:, pair.reference])
-        found.penetration[:, k] = faces.depth(X_RM)
+        sides = [
+            part if face is None else pose.compose(part, face.poses(deviations))
+            for part, face in zip((poses[:, pair.moving], poses[:, pair.reference]), pair.deviating, strict=True)
+        ]
+        X_RM, heights = pose.relative(*sides), pair.heights(deviations)
+        found.penetration[:, k] = faces.depth(X_RM, heights)
         if fixed and not pair.round:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
-            row, point = np.nonzero(((places - pair.P_r) * pair.n_r).sum(axis=2) < TOUCHES)
+            gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
+            row, point = np.nonzero(gaps < TOUCHES + heights[:, None])
             found.beside[:, k] = 0
             np.maximum.at(found.beside[:, k], row, faces.reference.face.overhang(places[row, point]))
     return found
 
 
-def simulated_poses(program: Program, rows: Int[Array, " n"], seed: int) -> Float[Array, "n part 12"]:
+def simulated_poses(program: Program, deviations: Float[Array, "n contributor"]) -> Float[Array, "n part 12"]:
     """Corrected poses (row, part, 12) of some realizations, simulated once more."""
-    drawn = [draw(program.nominal, seed=seed, start=int(row), stop=int(row) + 1) for row in rows]
-    return simulate_block(program, np.concatenate(drawn)).poses[:, CORRECTED]
+    return simulate_block(program, deviations).poses[:, CORRECTED]
+
+
+def drawn_again(program: Program, rows: Int[Array, " n"], seed: int) -> Float[Array, "n contributor"]:
+    """Deviations (row, contributor) of some realizations."""
+    return np.concatenate([program.draws(seed=seed, start=int(row), stop=int(row) + 1) for row in rows])

@@ -15,7 +15,6 @@ from tolcontact.contact import ContactResolver
 from tolcontact.mechanics import curved_pairs
 from tolcontact.simulation.block import Block
 from tolcontact.simulation.blocks import simulate_block
-from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, LEAST_ROWS = 512, 16
@@ -54,7 +53,7 @@ def map_blocks(
     begun: deque[tuple[Future[T], list[ContactResolver]]] = deque()
 
     def simulate(first: int, resolvers: list[ContactResolver]) -> T:
-        deviations = draw(program.nominal, seed=seed, start=first, stop=min(first + block, samples))
+        deviations = program.draws(seed=seed, start=first, stop=min(first + block, samples))
         return function(simulate_block(program, deviations, start=first, resolvers=resolvers))
 
     def finish_one() -> T:

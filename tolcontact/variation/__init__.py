@@ -48,6 +48,7 @@ Deviations are its quantiles: the same share u gives the same rank in any distri
 deviations is rejected.
 """
 
-from tolcontact.variation.draws import draw
+from tolcontact.variation.contributors import Contributor
+from tolcontact.variation.draws import Draws, draw
 
-__all__ = ["draw"]
+__all__ = ["Contributor", "Draws", "draw"]

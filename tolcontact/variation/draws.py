@@ -1,66 +1,81 @@
-"""Sample: tolerances become deviations of the locators.
+"""Sample: everything that varies becomes deviations.
 
-The draw of a locator in realization k depends on the seed, the locator's label and k alone: not on blocks, on other
-locators, or on the order in which they were declared.
+The draw of a contributor in realization k depends on the seed, the contributor's label and k alone (if it is correlated, also on
+the labels of the others): not on blocks, or on the order in which they were declared.
 """
-
-import hashlib
-from collections.abc import Callable
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from tolcontact.declaration import Tolerance
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
+from tolcontact.variation.contributors import Contributors
+from tolcontact.variation.uniforms import uniform
 
-STREAM = 4096
-TAIL = float(ndtr(-3))
-# Quantiles of the named distributions for a zone of width 1.
-SHAPES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-    "normal": lambda u: ndtri(u) / 6,
-    "uniform": lambda u: u - 0.5,
-    "triangular": lambda u: np.where(u < 0.5, np.sqrt(u / 2) - 0.5, 0.5 - np.sqrt((1 - u) / 2)),
-    "truncated normal": lambda u: ndtri(TAIL + u * (1 - 2 * TAIL)) / 6,
-}
-_BITS = 52
+SURELY = 1e-16  # the least distance of a number from 0 and 1
+
+
+class Draws:
+    """The draws of a model."""
+
+    def __init__(self, nominal: Nominal) -> None:
+        """Raises ModelError if rules cannot be applied to a feature."""
+        self.contributors = Contributors(nominal)
+        self._assembly = nominal.assembly
+        self._column = {each.label: k for k, each in enumerate(self.contributors.every)}
+        self._factors = [np.linalg.cholesky(np.array(each.matrix)) for each in self._assembly.correlations]
+
+    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
+        """Deviations (realization, contributor) of realizations `start` to `stop`, in mm or the units of the contributor.
+
+        Raises ModelError for a distribution that yields non-finite deviations.
+        """
+        every, labels = self.contributors.every, list(self._column)
+        deviations = np.empty((stop - start, len(every)))
+        correlated = self._correlated(seed, start, stop)
+        for column, each in enumerate(every):
+            u = correlated[column] if column in correlated else uniform(seed, each.label, start, stop)
+            deviations[:, column] = each.drawn(u)
+        for together in self.contributors.together:
+            own = [labels[column] for column in together.columns]
+
+            def anew(attempt: int, own: list[str] = own) -> np.ndarray:
+                said = [f"{label} #{attempt}" if attempt else label for label in own]
+                return np.stack([uniform(seed, label, start, stop) for label in said], axis=1)
+
+            deviations[:, together.columns] = together.draw(anew)
+        for number, population in enumerate(self._assembly.populations):
+            rows = uniform(seed, f"population {number + 1}: {', '.join(population.columns)}", start, stop)
+            drawn = population.values[(rows * len(population.values)).astype(int)]
+            deviations[:, [self._column[label] for label in population.columns]] = drawn
+        for bonus in self.contributors.bonuses:
+            deviations[:, bonus.columns] *= bonus.factor(deviations[:, bonus.size])[:, None]
+        for variable in self._assembly.variables:
+            for label, factor in variable.drives.items():
+                deviations[:, self._column[label]] += factor * deviations[:, self._column[variable.name]]
+        self._check(deviations)
+        return deviations
+
+    def _correlated(self, seed: int, start: int, stop: int) -> dict[int, np.ndarray]:
+        """Uniform numbers (realization,) of correlated contributors by their column: a Gaussian copula."""
+        found = {}
+        for correlation, factor in zip(self._assembly.correlations, self._factors, strict=True):
+            normal = np.stack([ndtri(uniform(seed, label, start, stop)) for label in correlation.labels], axis=1)
+            mixed = sum(normal[:, k, None] * factor[:, k] for k in range(len(factor)))  # in a fixed order, whatever the block
+            for label, u in zip(correlation.labels, ndtr(mixed).T, strict=True):
+                found[self._column[label]] = u.clip(SURELY, 1 - SURELY)
+        return found
+
+    def _check(self, deviations: np.ndarray) -> None:
+        for each, column in zip(self.contributors.every, deviations.T, strict=True):
+            if not np.isfinite(column).all():
+                said = each.tolerance or each.said
+                raise ModelError(
+                    self._assembly.name,
+                    [f'{each.source} "{each.label}": its distribution, {said}, yields non-finite deviations'],
+                )
 
 
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
-    """Deviations (realization, locator) [mm] of realizations `start` to `stop`, columns as `nominal.locators`.
-
-    Raises ModelError for a distribution that yields non-finite deviations.
-    """
-    deviations = np.empty((stop - start, len(nominal.locators)))
-    for column, (label, tolerance) in enumerate(zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)):
-        deviations[:, column] = quantile(tolerance, _uniform(seed, label, start, stop))
-        if not np.isfinite(deviations[:, column]).all():
-            raise ModelError(
-                nominal.assembly.name,
-                [f'locator "{label}": its distribution, {tolerance}, yields non-finite deviations'],
-            )
-    return deviations
-
-
-def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:
-    """The deviation [mm] below which a share `u` (0 < u < 1) of parts lies."""
-    if not isinstance(tolerance.distribution, str):
-        return np.asarray(tolerance.distribution.ppf(u), dtype=float)
-    width = float(tolerance.range or 0.0)
-    if width == 0:
-        return np.zeros_like(u)
-    return np.asarray(width * SHAPES[tolerance.distribution](u))
-
-
-def _uniform(seed: int, label: str, start: int, stop: int) -> np.ndarray:
-    """Numbers strictly between 0 and 1 for realizations `start` to `stop` of one locator."""
-    key = int.from_bytes(hashlib.blake2b(label.encode(), digest_size=8).digest(), "little")
-    streams = range(start // STREAM, -(-stop // STREAM))
-    drawn = [
-        np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=(key, stream)))).integers(
-            0, 1 << _BITS, STREAM
-        )
-        for stream in streams
-    ]
-    first = start - streams.start * STREAM
-    return (np.concatenate(drawn)[first : first + stop - start] + 0.5) * 2.0**-_BITS
+    """Deviations (realization, contributor) of realizations `start` to `stop`; see Draws."""
+    return Draws(nominal)(seed=seed, start=start, stop=stop)

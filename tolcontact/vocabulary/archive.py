@@ -12,7 +12,6 @@ from tolcontact.vocabulary.labels import (
     COMPONENT,
     CORNER,
     FACE,
-    LOCATOR,
     MEASURE,
     NUMBER,
     PAIR,
@@ -26,6 +25,7 @@ from tolcontact.vocabulary.labels import (
     VERTEX,
 )
 from tolcontact.vocabulary.variable import Variable, label
+from tolcontact.vocabulary.variation import DEVIATION
 
 NUMBERS = Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
 COORDINATES = (
@@ -116,7 +116,6 @@ ROWS = (
 POSES = (TRANSLATION, ROTATION)
 ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not have; nor have they the group `surface`
 
-DEVIATION = Variable("deviation", (REALIZATION, LOCATOR), "f8", "deviation along the locator's direction", "mm")
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
 ROW_CHECKSUM = Variable(
@@ -156,20 +155,6 @@ LOCATOR_OF_POINT = Variable(
     "i4",
     "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
 )
-
-LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator")
-TOLERANCE_RANGE = Variable(
-    "tolerance_range",
-    (LOCATOR,),
-    "f8",
-    "full width of the tolerance zone; NaN if the distribution alone defines the spread",
-    "mm",
-)
-DISTRIBUTION = Variable("distribution", (LOCATOR,), str, "distribution of the deviation")
-STIFFNESS = Variable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")
-ONE_SIDED = Variable("one_sided", (LOCATOR,), "i1", "1: a support that the part may lift off, 0: held both ways")
-LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
-LOCATOR_DIRECTION = Variable("locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1")
 
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
 FIELD_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")

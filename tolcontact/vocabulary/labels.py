@@ -3,7 +3,7 @@
 import enum
 
 CONVENTIONS = "CF-1.11"
-FORMAT = 3  # of the archive; those of earlier ones can be read; those of format 1 do not say it
+FORMAT = 4  # of the archive; those of earlier ones can be read; those of format 1 do not say it
 STATES = ("raw", "corrected")
 RAW, CORRECTED = 0, 1  # their positions
 AXES = ("x", "y", "z")
@@ -12,6 +12,7 @@ COMPONENTS = (*AXES, "magnitude")
 REALIZATION, STATE, PART, PAIR, MEASURE = "realization", "state", "part", "pair", "measure"
 AXIS, BODY_AXIS, POINT, LOCATOR = "axis", "body_axis", "point", "locator"
 VERTEX, FACE, CORNER, COMPONENT, BOUND = "vertex", "face", "corner", "component", "bound"
+CONTRIBUTOR, FEATURE_FACE, FREEDOM = "contributor", "feature_face", "freedom"
 CHECKPOINT, NUMBER, CHECKED = "checkpoint", "number", "checked"
 BLOCK, ROW_VARIABLE = "block", "row_variable"
 FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first

@@ -1,0 +1,151 @@
+"""What makes deviations vary together: shared causes, correlation, and measured populations.
+
+Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover.H1.size"), or the name of a variable.
+"""
+
+import importlib  # pandas takes longer to import than all the rest: only if it is needed
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tolcontact.declaration.names import is_line
+from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.vectors import is_length
+from tolcontact.errors import shown
+from tolcontact.readable import Readable
+
+DEFINITE = 1e-12  # smallest eigenvalue of a correlation matrix
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Variable(Readable):
+    """A cause that several contributors share: each deviates by its own draw, and by `drives[label]` times this variable."""
+
+    name: str
+    tolerance: Tolerance
+    drives: Mapping[str, float]
+    units: str
+    declared_at: str
+
+    def faults(self) -> Iterator[str]:
+        yield from self.tolerance.faults()
+        if not self.drives:
+            yield 'it drives nothing; give drives={"part.locator": factor, ...}'
+        for label, factor in self.drives.items():
+            if not (isinstance(label, str) and is_length(factor)):
+                yield f"drives has {label!r}: {factor!r}; expected the label of a contributor, and a number"
+        if not (self.units and is_line(self.units)):
+            yield f'units is {self.units!r}; expected a text such as "mm" or "K"'
+
+    def __str__(self) -> str:
+        drives = ", ".join(f"{label} by {factor:g}" for label, factor in self.drives.items())
+        return f"variable {self.name} [{self.units}]: {self.tolerance}; drives {drives}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Correlation(Readable):
+    """Contributors whose draws are correlated: a Gaussian copula with this matrix, which leaves their distributions alone."""
+
+    labels: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+    declared_at: str
+
+    @property
+    def name(self) -> str:
+        return ", ".join(map(str, self.labels))
+
+    def faults(self) -> Iterator[str]:
+        if len(set(self.labels)) < len(self.labels) or len(self.labels) < 2:
+            yield "expected two or more different labels of contributors"
+        try:
+            matrix = np.array(self.matrix, dtype=float)
+        except (TypeError, ValueError):
+            matrix = np.empty(0)
+        count = len(self.labels)
+        if matrix.shape != (count, count) or not np.isfinite(matrix).all():
+            yield f"its matrix is not {count} x {count} finite numbers, one row for each contributor"
+        elif not (np.allclose(matrix, matrix.T, atol=1e-12) and np.allclose(np.diag(matrix), 1, atol=1e-12)):
+            yield "its matrix is not symmetric with ones on the diagonal; expected correlation coefficients, not covariances"
+        elif (least := float(np.linalg.eigvalsh(matrix).min())) < DEFINITE:
+            yield (
+                f"its matrix is not positive definite (smallest eigenvalue {least:.3g}): nothing is correlated like "
+                "that; check the signs, or make the coefficients smaller"
+            )
+
+    def __str__(self) -> str:
+        return f"correlation of {self.name}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Population(Readable):
+    """Measured parts: rows of deviations, drawn whole with replacement, so that their correlation stays.
+
+    columns   labels of the contributors
+    values    (row, column), in the units of the contributors
+    source    where they are from
+    """
+
+    columns: tuple[str, ...]
+    values: np.ndarray
+    source: str
+    declared_at: str
+
+    @property
+    def name(self) -> str:
+        return self.source
+
+    def faults(self) -> Iterator[str]:
+        if not self.columns or len(set(self.columns)) < len(self.columns):
+            yield 'it names no contributors, or one twice; give columns={"part.locator": "column of the table", ...}'
+        elif self.values.ndim != 2 or self.values.shape[1] != len(self.columns):
+            yield f"its values have the shape {self.values.shape}; expected a row for each part, a column for each contributor"
+        elif len(self.values) < 2:
+            yield f"it has {len(self.values)} row(s); a population needs two or more"
+        for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
+            wrong = [row for row, value in enumerate(self.values[:, column]) if not np.isfinite(value)]
+            if wrong:
+                yield f"row {wrong[0] + 1} of the column for {label} is no finite number; mend the table, or leave out the row"
+
+    def __str__(self) -> str:
+        return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
+
+
+def population(source: Any, columns: Mapping[str, str] | None, declared_at: str) -> Population:
+    """A Population from a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
+
+    `columns` says for each contributor what its column is called there; by default as the contributor. What is no number
+    becomes NaN, and a fault of the population. Raises ValueError for a table that cannot be read, or a column it has not.
+    """
+    pd = importlib.import_module("pandas")
+    if isinstance(source, str | Path):
+        said = shown(Path(source).name)
+        try:
+            table = pd.read_csv(source)
+        except (OSError, ValueError) as error:
+            raise ValueError(f'population "{said}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
+    else:
+        table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
+        said = f"of {len(table)} rows"
+    wanted = dict(columns) if columns is not None else {str(name): name for name in table.columns}
+    missing = [name for name in wanted.values() if name not in table.columns]
+    if missing:
+        raise ValueError(
+            f'population "{said}" has no column {missing[0]!r}; its columns are: {", ".join(map(str, table.columns))}'
+        )
+    numbers = [pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float) for name in wanted.values()]
+    values = np.column_stack(numbers) if numbers else np.empty((len(table), 0))
+    return Population(tuple(wanted), values, said, declared_at)
+
+
+def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:
+    """A Correlation; `matrix` may be an array, or one coefficient for two contributors."""
+    if isinstance(matrix, int | float):
+        matrix = [[1.0, matrix], [matrix, 1.0]]
+    try:
+        rows = tuple(tuple(float(number) for number in row) for row in matrix)
+    except (TypeError, ValueError):
+        rows = ()
+    return Correlation(tuple(labels), rows, declared_at)

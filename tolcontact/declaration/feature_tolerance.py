@@ -1,0 +1,255 @@
+"""Tolerances of features, in the words of ISO 1101, ISO 5459 and ISO 2692."""
+
+import re
+from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, ClassVar
+
+from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.vectors import Vector, is_finite, is_length
+from tolcontact.declaration.vectors import direction as _direction
+from tolcontact.readable import Readable
+
+INSIDE = "99.73 % inside"
+EXTREMES = "6 sigma at the extremes"
+RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
+BONUSES = ("fills", "accepts", "none")
+MATERIALS = ("", "M", "L")
+MOVES = ("both", "first", "second")
+ZONES = ("round", "flat")
+COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?")
+
+
+@dataclass(frozen=True, repr=False)
+class Size(Readable):
+    """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
+
+    `tc.Size(8.1, +0.05, -0.02)` has limits 8.05 + ... unevenly about the nominal one, `tc.Size(8.1, 0.05)` evenly. Sizes fill
+    the limits as `distribution` has it (see tc.Tolerance), about their middle. Of two planes `moves` says which take part:
+    "both" by a half each, or the "first" or "second" alone.
+    """
+
+    word: ClassVar[str] = "size"
+
+    nominal: float
+    upper: float
+    lower: float
+    _: KW_ONLY
+    distribution: Any
+    cp: float | None
+    cpk: float | None
+    moves: str
+
+    def __init__(
+        self,
+        nominal: float,
+        upper: float,
+        lower: float | None = None,
+        *,
+        distribution: Any = "normal",
+        cp: float | None = None,
+        cpk: float | None = None,
+        moves: str = "both",
+    ) -> None:
+        lower = -upper if lower is None else lower
+        for name, value in (
+            ("nominal", nominal), ("upper", upper), ("lower", lower), ("distribution", distribution), ("cp", cp), ("cpk", cpk),
+            ("moves", moves),
+        ):  # fmt: skip
+            object.__setattr__(self, name, value)
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """How the size deviates from the nominal one [mm]."""
+        if not isinstance(self.distribution, str):
+            return Tolerance(distribution=self.distribution)
+        width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
+        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
+
+    def faults(self) -> Iterator[str]:
+        for word, value in (("nominal", self.nominal), ("upper", self.upper), ("lower", self.lower)):
+            if not is_length(value):
+                yield f"{word} is {value!r}; expected a number in mm"
+                return
+        if not self.nominal > 0:
+            yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
+        if not self.lower < self.upper:
+            yield f"the lower limit {self.lower:+g} is not below the upper one {self.upper:+g}; swap them"
+        else:
+            yield from self.tolerance.faults()
+        if self.moves not in MOVES:
+            yield f"moves is {self.moves!r}; expected one of {', '.join(MOVES)}"
+
+    def __str__(self) -> str:
+        return f"size {self.nominal:g} {self.upper:+g} {self.lower:+g} mm"
+
+
+@dataclass(frozen=True, repr=False)
+class GeometricTolerance(Readable):
+    """A zone of full width `width` [mm] (of a round zone the diameter) for a feature.
+
+    datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier
+    zone        "round" or "flat", for axes; by default round. `along` is the direction across a flat zone's planes
+    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size, and
+    bonus       what the process makes of that: "fills" the larger zone, "accepts" it only where parts are checked, or "none"
+    projected   [mm] the zone lies beyond the material, that far out of the face of the primary datum
+    outside     [mm] of a profile: how much of the zone lies outside the material; by default half
+    rule        from the zone to a spread, of all the freedoms together: "99.73 % inside" (default): so many features lie
+                inside, if components are equal, independent and normal; "6 sigma at the extremes" of the feature equal the
+                width; "truncated": the same, and features outside are left out; "uniform" in the zone; "translation": no
+                tilt; "polar": uniform angle and normal radius, 6 sigma of which equal the width
+    cp, cpk     how capable the process is: the spread is divided by `cp`, and its mean lies so far off that `cpk` results
+    """
+
+    kind: ClassVar[str] = ""
+    needs_datums: ClassVar[bool] = True
+    own: ClassVar[tuple[str, ...]] = ()  # options that only some kinds have
+
+    width: float
+    datums: str = ""
+    _: KW_ONLY
+    zone: str | None = None
+    along: Any = None
+    material: str = ""
+    bonus: str = "fills"
+    projected: float | None = None
+    outside: float | None = None
+    rule: str = INSIDE
+    cp: float = 1.0
+    cpk: float | None = None
+
+    @property
+    def word(self) -> str:
+        """How a message names it."""
+        return self.kind
+
+    @property
+    def system(self) -> tuple[tuple[str, ...], ...]:
+        """Letters of the datum system: for each place those that are common there."""
+        found = [COMPARTMENT.fullmatch(place) for place in self._places]
+        return tuple(tuple(each.group(1).split("-")) for each in found if each)
+
+    @property
+    def has_datum_shift(self) -> bool:
+        """Whether a datum has a modifier."""
+        return any(each and each.group(2) for each in map(COMPARTMENT.fullmatch, self._places))
+
+    @property
+    def _places(self) -> list[str]:
+        return [place.strip() for place in self.datums.split("|")] if self.datums else []
+
+    @property
+    def across(self) -> Vector | None:
+        """Unit vector across a flat zone."""
+        return None if self.along is None else _direction(self.along)
+
+    def faults(self) -> Iterator[str]:
+        least = "0 or above" if self.material else "above 0"
+        if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
+            yield f"width is {self.width!r}; expected the full width of the zone in mm, {least}"
+        if not isinstance(self.datums, str) or not all(map(COMPARTMENT.fullmatch, self._places)) or len(self._places) > 3:
+            yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)" or "A-B"'
+        elif self.needs_datums and not self.datums:
+            yield f'it needs datums; give them as in tc.{type(self).__name__}({self.width!r}, "A|B|C")'
+        letters = [letter for place in self.system for letter in place]
+        if len(set(letters)) < len(letters):
+            yield f"datums {self.datums!r} names a datum twice"
+        for word, nothing in (("zone", None), ("along", None), ("material", ""), ("projected", None), ("outside", None)):
+            if getattr(self, word) != nothing and word not in self.own:
+                yield f"{word} is given, which {self.kind} does not have; leave it out"
+        if self.zone not in (None, *ZONES):
+            yield f"zone is {self.zone!r}; expected one of {', '.join(ZONES)}"
+        if self.zone == "flat" and self.along is None:
+            yield 'a flat zone needs a direction across it; give along="x", or a vector'
+        if self.across is not None and not is_finite(self.across):
+            yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+        if self.material not in MATERIALS:
+            yield f'material is {self.material!r}; expected "M" (maximum) or "L" (least), or nothing'
+        if self.bonus not in BONUSES:
+            yield f"bonus is {self.bonus!r}; expected one of {', '.join(BONUSES)}"
+        if self.projected is not None and not (is_length(self.projected) and self.projected > 0):
+            yield f"projected is {self.projected!r}; expected a length in mm above 0"
+        if self.outside is not None and not (is_length(self.outside) and 0 <= self.outside <= self.width):
+            yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
+        if self.rule not in RULES:
+            yield f"rule is {self.rule!r}; expected one of: {', '.join(RULES)}"
+        if not (is_length(self.cp) and self.cp > 0):
+            yield f"cp is {self.cp!r}; expected a number above 0"
+        elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
+            yield f"cpk is {self.cpk!r}; expected a number, at most cp"
+        elif (self.cp != 1 or self.cpk is not None) and self.rule in ("truncated", "uniform", "polar"):
+            yield f'cp is given with the rule "{self.rule}"; it goes with normal components'
+
+    def __str__(self) -> str:
+        round_ = "diameter " if self.zone == "round" else ""
+        return f"{self.kind} {round_}{self.width:g}{self.material} mm" + (f" to {self.datums}" if self.datums else "")
+
+
+class Position(GeometricTolerance):
+    """Position of an axis, a centre, or a plane (ISO 1101, 17.12)."""
+
+    kind, own = "position", ("zone", "along", "material", "projected")
+
+
+class Coaxiality(GeometricTolerance):
+    """Of an axis to the axis of its datums: a round zone (ISO 1101, 17.13)."""
+
+    kind, own = "coaxiality", ("material",)
+
+
+class Symmetry(GeometricTolerance):
+    """Of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)."""
+
+    kind, own = "symmetry", ("zone", "along", "material")
+
+
+class Profile(GeometricTolerance):
+    """Of a surface (ISO 1101, 17.8): location, as far as its datums lock it. Without datums it is form alone."""
+
+    kind, own, needs_datums = "profile", ("outside",), False
+
+
+class Parallelism(GeometricTolerance):
+    """Of a plane or an axis to its datums (ISO 1101, 17.9)."""
+
+    kind, own = "parallelism", ("zone", "along", "material")
+
+
+class Perpendicularity(GeometricTolerance):
+    """Of a plane or an axis to its datums (ISO 1101, 17.10)."""
+
+    kind, own = "perpendicularity", ("zone", "along", "material")
+
+
+class Angularity(GeometricTolerance):
+    """Of a plane or an axis, at an angle to its datums (ISO 1101, 17.11)."""
+
+    kind, own = "angularity", ("zone", "along", "material")
+
+
+class CircularRunout(GeometricTolerance):
+    """Radial of a cylinder, in each section, or axial of a plane, to the axis of its datums (ISO 1101, 17.15)."""
+
+    kind = "circular run-out"
+
+
+class TotalRunout(GeometricTolerance):
+    """Radial of a cylinder as a whole, or axial of a plane, to the axis of its datums (ISO 1101, 17.16)."""
+
+    kind = "total run-out"
+
+
+class Flatness(GeometricTolerance):
+    """Of a plane (ISO 1101, 17.4). It is form: nothing of it moves the plane as a whole."""
+
+    kind, needs_datums = "flatness", False
+
+
+KINDS = {
+    each.kind: each
+    for each in (
+        Position, Coaxiality, Symmetry, Profile, Parallelism, Perpendicularity, Angularity, CircularRunout, TotalRunout,
+        Flatness,
+    )
+}  # fmt: skip
+ORIENTATIONS = ("parallelism", "perpendicularity", "angularity")

@@ -1,0 +1,247 @@
+"""What a feature is, and how it can deviate: its coordinates, measured as displacements at its extremes. Part's own frame.
+
+A plane has an offset in its middle and tilts at its edges, an axis shifts in its middle and tilts at its ends, a centre shifts.
+So all of them are in mm, and do not depend on where the origin is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.curvature import is_flat
+from tolcontact.discretization.edges import smooth_pieces
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.surface import Surface
+
+ALONG = 1e-6  # what a direction differs from an axis of the part by that is named after it
+NOTICED = 1e-3  # of a displacement: how much of it a general surface must notice along its normals
+OPPOSED = 1e-3  # rad: how far two planes may be from parallel
+AXES = np.eye(3)
+NONE = np.zeros(3)
+
+
+@dataclass(frozen=True, eq=False)
+class FeatureGeometry:
+    """Kind and coordinates of a feature.
+
+    kind     "plane", "cylinder", "cone", "sphere", "planes" (two opposed ones) or "general"
+    centre   (3,) [mm] about which twists turn
+    names    of the coordinates
+    twists   (6, coordinate): the displacement (tau, rho) of the feature for a coordinate of 1 mm
+    values   (coordinate, 6): the coordinates of a displacement (tau, rho)
+    extremes  rows (point, component, coordinate) of what a location zone is of, at the feature's extremes
+    axis     (3,) normal of a plane, outward; direction of an axis
+    half     [mm] half the length of an axis; else 0
+    size     [mm] diameter or distance that it has nominally; else NaN
+    normals  outward normals (3,) of its faces, if they are planes
+    is_inner  whether its size is that of a gap in the material: a hole, a slot
+    points   (point, 3) of it, its corners among them
+    """
+
+    kind: str
+    centre: np.ndarray
+    names: tuple[str, ...]
+    twists: np.ndarray
+    values: np.ndarray
+    extremes: np.ndarray
+    axis: np.ndarray
+    half: float
+    size: float
+    normals: tuple[np.ndarray, ...]
+    is_inner: bool
+    points: np.ndarray
+
+    def about(self, centre: np.ndarray) -> np.ndarray:
+        """`values` (coordinate, 6) of displacements that turn about another centre (3,)."""
+        # x -> tau + rho x (x - centre) is x -> tau' + rho x (x - own centre), with tau' = tau + rho x (own centre - centre).
+        shift = np.eye(6)
+        shift[:3, 3:] = -_cross_matrix(self.centre - centre)
+        return self.values @ shift
+
+    @property
+    def is_axis(self) -> bool:
+        return self.kind in ("cylinder", "cone")
+
+    @property
+    def is_plane(self) -> bool:
+        return self.kind in ("plane", "planes")
+
+    def end(self, number: int) -> np.ndarray:
+        """The end (3,) [mm] of its axis; of a sphere its centre."""
+        return self.centre + (2 * number - 1) * self.half * self.axis
+
+
+def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
+    """What the faces of a feature are. Raises GeometryFault if one of them spans several surfaces, or two are not opposed."""
+    forms = [_form(face) for face in faces]
+    if len(faces) == 2:
+        return _planes(faces, forms)
+    face, form = faces[0], forms[0]
+    if form is None or form.kind == "torus":
+        return _general(face)
+    if form.kind == "plane":
+        return _plane("plane", form.origin, form.axis, np.asarray(face.mesh.vertices), (form.axis,), np.nan, False)
+    if form.kind == "sphere":
+        is_inner = face.pieces[0].is_hollow
+        names, rows = tuple(f"shift {axis}" for axis in "xyz"), np.eye(3)[None]
+        T = np.vstack([AXES, np.zeros((3, 3))])
+        return FeatureGeometry(
+            "sphere", form.origin, names, T, T.T, rows, AXES[2], 0.0, 2 * form.radius, (), is_inner,
+            np.asarray(face.mesh.vertices),
+        )  # fmt: skip
+    return _axis(face, form)
+
+
+def _form(face: Surface) -> Form | None:
+    """The one surface that a face lies on; None of a general one."""
+    if is_flat(face):
+        corner = face.corner_normals.reshape(-1, 3).mean(axis=0)
+        n = corner / np.linalg.norm(corner)
+        stated = [form for form in face.forms if form.kind == "plane"]
+        if stated:
+            n = stated[0].axis * np.sign(stated[0].axis @ n)
+        height = float((np.asarray(face.mesh.vertices) @ n).mean()) if not stated else float(stated[0].origin @ n)
+        return Form("plane", height * n, n)
+    known = sorted({int(number) for number in face.form_of})
+    pieces = int(smooth_pieces(face.mesh, np.arange(len(face.mesh.faces))).max()) + 1
+    if known == [0]:
+        return face.forms[0]
+    kinds = [face.forms[number].kind if number >= 0 else "general" for number in known]
+    if len(known) > 1 or pieces > 1:
+        said = ", ".join(kinds) if len(known) > 1 else f"{pieces} faces with creases between them"
+        raise GeometryFault(f"its face spans more than one surface ({said}); a feature is one of them, so choose one")
+    return None
+
+
+def _plane(
+    kind: str,
+    place: np.ndarray,
+    n: np.ndarray,
+    points: np.ndarray,
+    normals: tuple[np.ndarray, ...],
+    size: float,
+    is_inner: bool,
+) -> FeatureGeometry:
+    """Of a plane with normal n, as large as `points` (point, 3) on it."""
+    u, v, names = _frame(n)
+    corners = _hull(np.column_stack([points @ u, points @ v]))
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    half, middle = (high - low) / 2, (high + low) / 2
+    centre = middle[0] * u + middle[1] * v + float(place @ n) * n
+    T = np.zeros((6, 3))
+    T[:3, 0], T[3:, 1], T[3:, 2] = n, np.cross(u, n) / half[0], np.cross(v, n) / half[1]
+    B = np.zeros((3, 6))
+    B[0, :3], B[1, 3:], B[2, 3:] = n, np.cross(u, n) * half[0], np.cross(v, n) * half[1]
+    rows = np.column_stack([np.ones(len(corners)), (corners - middle) / half])[:, None]
+    coordinates = ("offset", f"tilt {names[0]}", f"tilt {names[1]}")
+    return FeatureGeometry(kind, centre, coordinates, T, B, rows, n, 0.0, size, normals, is_inner, points)
+
+
+def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGeometry:
+    first, second = forms
+    if first is None or second is None or first.kind != "plane" or second.kind != "plane":
+        kinds = " and ".join("a general face" if form is None else f"a {form.kind}" for form in forms)
+        raise GeometryFault(f"it has two faces, {kinds}; expected two planes that are opposed")
+    if np.linalg.norm(first.axis + second.axis) > OPPOSED:
+        raise GeometryFault("its two planes are not opposed; expected outward normals in opposite directions")
+    n, points = first.axis, [np.asarray(face.mesh.vertices) for face in faces]
+    heights = [float(each.mean(axis=0) @ n) for each in points]
+    middle = sum(heights) / 2
+    both = np.vstack([each - (each @ n - middle)[:, None] * n for each in points])
+    distance = heights[0] - heights[1]  # positive: material is between the planes
+    return _plane("planes", middle * n, n, both, (first.axis, second.axis), abs(distance), distance < 0)
+
+
+def _axis(face: Surface, form: Form) -> FeatureGeometry:
+    """Of a cylinder or a cone."""
+    a = form.axis
+    u, v, names = _frame(a)
+    if form.kind == "cylinder":
+        a = a * np.sign(a[np.abs(a).argmax()])  # whichever way the file has it
+    points = np.asarray(face.mesh.vertices)
+    along = points @ a
+    half, middle = float(np.ptp(along)) / 2, float(along.max() + along.min()) / 2
+    centre = form.origin + (middle - float(form.origin @ a)) * a
+    count = 5 if form.kind == "cone" else 4
+    T, B = np.zeros((6, count)), np.zeros((count, 6))
+    for k, e in enumerate((u, v)):
+        T[:3, k], B[k, :3] = e, e
+        T[3:, 2 + k], B[2 + k, 3:] = np.cross(a, e) / half, np.cross(a, e) * half
+    coordinates = [f"shift {names[0]}", f"shift {names[1]}", f"tilt {names[0]}", f"tilt {names[1]}"]
+    if form.kind == "cone":
+        T[:3, 4], B[4, :3] = a, a
+        coordinates.append("along")
+    size = 2 * form.radius if form.kind == "cylinder" else np.nan
+    rows = axis_rows(np.array([-1.0, 1.0]), count)
+    is_inner = face.pieces[0].is_hollow
+    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, rows, a, half, size, (), is_inner, points)
+
+
+def axis_rows(places: np.ndarray, coordinates: int, across: np.ndarray | None = None) -> np.ndarray:
+    """Rows (place, component, coordinate) of displacements of an axis at `places`, in halves of its length from its middle.
+
+    In both directions across it, or in the one that has the components `across` (2,) in them.
+    """
+    rows = np.zeros((len(places), 2, coordinates))
+    rows[:, 0, 0] = rows[:, 1, 1] = 1.0
+    rows[:, 0, 2] = rows[:, 1, 3] = places
+    return rows if across is None else np.einsum("c,pcq->pq", across, rows)[:, None]
+
+
+def _general(face: Surface) -> FeatureGeometry:
+    """Of a surface of no simple kind: the displacements that its own normals notice, from the plainest on."""
+    mesh = face.mesh
+    points, normals = np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals)
+    centre = np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area_faces.sum())
+    reach = float(np.linalg.norm(points - centre, axis=1).max())
+    every = np.hstack([normals, np.cross(points - centre, normals) / reach])  # of tau, and of rho * reach
+    mean = mesh.area_faces @ mesh.face_normals
+    first = mean / np.linalg.norm(mean) if np.linalg.norm(mean) > 1e-9 * mesh.area else AXES[2]
+    u, v, _ = _frame(first)
+    basis = [np.concatenate([e, NONE]) for e in (first, u, v)] + [np.concatenate([NONE, e]) for e in (u, v, first)]
+    kept: list[np.ndarray] = []
+    for start in basis:
+        direction = start
+        for other in kept:
+            moved = every @ other
+            direction = direction - (every @ direction @ moved) / (moved @ moved) * other
+        if (most := np.abs(every @ direction).max()) > NOTICED:
+            kept.append(direction / most)
+    scaled = np.column_stack(kept)
+    to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
+    metric = every.T @ every
+    values = np.linalg.solve(scaled.T @ metric @ scaled, scaled.T @ metric) @ np.linalg.inv(to_twist)
+    names = tuple(f"freedom {k + 1}" for k in range(len(kept)))
+    rows = (every @ scaled)[:, None]
+    return FeatureGeometry("general", centre, names, to_twist @ scaled, values, rows, first, 0.0, np.nan, (), False, points)
+
+
+def _frame(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
+    """Two unit vectors across `a` (3,) and each other, and what they are called: axes of the part where they are that."""
+    least = int(np.abs(a).argmin())
+    along = int(np.abs(a).argmax())
+    if abs(a[along]) > 1 - ALONG:
+        first, second = (k for k in range(3) if k != along)
+        u = AXES[first] - (AXES[first] @ a) * a
+        u = u / np.linalg.norm(u)
+        v = AXES[second] - (AXES[second] @ a) * a - (AXES[second] @ u) * u
+        return u, v / np.linalg.norm(v), ("xyz"[first], "xyz"[second])
+    u = AXES[least] - a[least] * a
+    u = u / np.linalg.norm(u)
+    v = np.cross(a, u)
+    return u, v, ("xyz"[least] if abs(a[least]) < ALONG else "u", "v")
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Corners (corner, 2) of the convex hull of points (point, 2)."""
+    try:
+        return np.asarray(points[ConvexHull(points).vertices])
+    except QhullError as error:
+        raise GeometryFault("its face is so narrow that it has no area") from error
+
+
+def _cross_matrix(v: np.ndarray) -> np.ndarray:
+    return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])

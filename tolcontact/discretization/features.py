@@ -1,0 +1,274 @@
+"""Features with numbers: which freedoms their tolerances control, and how their faces deviate with what varies."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tolcontact.declaration import Feature, GeometricTolerance, Part
+from tolcontact.discretization.datum_system import Datum, DatumFrame, datum_frame
+from tolcontact.discretization.face_deviation import FaceDeviation
+from tolcontact.discretization.faces import Meshes, patch, triangles
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.feature_geometry import FeatureGeometry, feature_geometry
+from tolcontact.discretization.zone_rows import zone_rows
+
+SAME = 1e-9  # smallest singular value of what is another direction
+SIZES = 1e-6  # of a size: what a shape's may differ from the one stated
+
+
+@dataclass(frozen=True, eq=False)
+class Layer:
+    """What one tolerance controls of a feature, beside those that are contained in it.
+
+    rows        (point, component, coordinate): its zone (see zone_rows)
+    controlled  (coordinate, n): orthonormal directions that its datums lock, and
+    added       (coordinate, k): those of them that no narrower tolerance has, each a contributor
+    frame       of its datum system
+    """
+
+    tolerance: GeometricTolerance
+    rows: np.ndarray
+    controlled: np.ndarray
+    added: np.ndarray
+    frame: DatumFrame
+
+
+@dataclass(frozen=True, eq=False)
+class NominalFeature:
+    """A feature in its part: its contributors are columns `first` on: the directions of its layers, then its size.
+
+    labels       "part.feature.freedom" of its contributors
+    coordinates  (coordinate, column): of the feature, for deviations of 1 of the columns of all features before, and its own
+    triangles    of each of its faces
+    """
+
+    feature: Feature
+    part: int
+    geometry: FeatureGeometry
+    layers: tuple[Layer, ...]
+    first: int
+    labels: tuple[str, ...]
+    coordinates: np.ndarray
+    triangles: tuple[np.ndarray, ...]
+
+    @property
+    def label(self) -> str:
+        return f"{self.feature.part.name}.{self.feature.name}"
+
+    @property
+    def size_column(self) -> int | None:
+        """The column of its size, if that is toleranced."""
+        return self.first + len(self.labels) - 1 if self.feature.size else None
+
+
+@dataclass(eq=False)
+class Features:
+    """The features of a model while it is discretized, and the faces that deviate with them."""
+
+    first: int
+    found: list[NominalFeature] = field(default_factory=list)
+    faces: list[FaceDeviation] = field(default_factory=list)
+    _face_of: dict[tuple[Feature, int | None], int] = field(default_factory=dict)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        return tuple(label for each in self.found for label in each.labels)
+
+    def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
+        """The next feature, whose datums have been added before. Raises GeometryFault."""
+        surfaces = [patch(face, meshes) for face in feature.faces]
+        chosen = tuple(triangles(face, meshes) for face in feature.faces)
+        self._check_shared(feature, chosen)
+        geometry = feature_geometry(surfaces)
+        first = self.first + len(self.labels)
+        layers = _layers(feature, geometry, {own.feature.datum: own for own in self.found if own.part == part}, first)
+        names = [name for layer in layers for name in _names(geometry, layer.added)]
+        if feature.size is not None:
+            _check_size(feature, geometry)
+            names.append("size")
+        count = first + len(names)
+        Q, column = np.zeros((len(geometry.names), count)), first
+        for layer in layers:
+            new = layer.added.shape[1]
+            Q[:, column : column + new] = layer.added
+            Q[:, :first] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
+            column += new
+        labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
+        self.found.append(NominalFeature(feature, part, geometry, layers, first, labels, Q, chosen))
+
+    def _check_shared(self, feature: Feature, chosen: Sequence[np.ndarray]) -> None:
+        for other in self.found:
+            if other.feature.part is feature.part:
+                for face, own in zip(_moving(feature, chosen), chosen, strict=True):
+                    for taken, theirs in zip(_moving(other.feature, other.triangles), other.triangles, strict=True):
+                        if face and taken and np.intersect1d(own, theirs).size:
+                            raise GeometryFault(
+                                f'it shares a face with feature "{other.feature.name}", so that would deviate twice; give all '
+                                "tolerances of a face to one feature"
+                            )
+
+    def face_at(self, part: Part, chosen: np.ndarray, placement: tuple[np.ndarray, np.ndarray]) -> int | None:
+        """The number of the face that deviates with a feature and has all of the `chosen` triangles; None if none has any.
+
+        Raises GeometryFault if one has only some of them.
+        """
+        for own in self.found:
+            if own.feature.part is not part or not own.labels:
+                continue
+            for number, theirs in enumerate(own.triangles):
+                shared = np.isin(chosen, theirs)
+                if shared.all() and _moving(own.feature, own.triangles)[number]:
+                    return self.face(own, number, placement)
+                if shared.any() and not shared.all():
+                    raise GeometryFault(
+                        f'its face on part "{part.name}" is partly that of feature "{own.feature.name}", which deviates by '
+                        "itself; declare one pair (or scheme) for the feature, and another one for the rest"
+                    )
+        return None
+
+    def of(self, feature: Feature) -> NominalFeature:
+        """The numbers of a declared feature."""
+        return next(own for own in self.found if own.feature is feature)
+
+    def face(self, own: NominalFeature, number: int | None, placement: tuple[np.ndarray, np.ndarray]) -> int:
+        """The number of a face of a feature among those that deviate; of its middle, whose size does not count, if None."""
+        key = (own.feature, number)
+        if key not in self._face_of:
+            self._face_of[key] = len(self.faces)
+            self.faces.append(_face_deviation(own, number, placement))
+        return self._face_of[key]
+
+
+def _moving(feature: Feature, faces: Sequence[np.ndarray]) -> list[bool]:
+    """Which faces of a feature deviate with it: one that only its partner's distance is measured from does not."""
+    if feature.size is None or feature.size.moves == "both":
+        return [True] * len(faces)
+    return [feature.size.moves == "first", feature.size.moves == "second"]
+
+
+def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
+    size = feature.size
+    if size is None or not np.isfinite(geometry.size):
+        raise GeometryFault(f"a size is for cylinders, spheres and two opposed planes, and it is a {geometry.kind} face")
+    if abs(geometry.size - size.nominal) > SIZES * geometry.size:
+        raise GeometryFault(
+            f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
+            "shape, with the limits about it"
+        )
+
+
+def _layers(
+    feature: Feature, geometry: FeatureGeometry, datums: Mapping[str | None, NominalFeature], columns: int
+) -> tuple[Layer, ...]:
+    """What each tolerance controls, from the one that controls least on."""
+    reach = float(np.linalg.norm(geometry.points - geometry.centre, axis=1).max())
+    found = []
+    for tolerance in feature.geometric:
+        system = [
+            [Datum(datums[letter].geometry, _padded(datums[letter].coordinates, columns)) for letter in place]
+            for place in tolerance.system
+        ]
+        rows = zone_rows(tolerance, geometry, system[0][0].geometry if system else None)
+        frame = datum_frame(system, geometry.centre, reach, columns)
+        controlled = _controlled(rows, geometry, frame) if system else np.zeros((len(geometry.names), 0))
+        if len(rows) and system and not controlled.shape[1]:
+            raise GeometryFault(
+                f"{tolerance.kind}: the datum system {tolerance.datums} does not lock any of what is toleranced; "
+                "add the datum that does"
+            )
+        found.append((tolerance, rows, controlled, frame))
+    found.sort(key=lambda each: (each[2].shape[1], each[0].width))
+    layers: list[Layer] = []
+    before = np.zeros((len(geometry.names), 0))
+    for tolerance, rows, controlled, frame in found:
+        for inner in layers:
+            contains = inner.controlled.shape[1] and _rest(inner.controlled, controlled).shape[1] == 0
+            if contains and tolerance.width < inner.tolerance.width and not (tolerance.material or inner.tolerance.material):
+                raise GeometryFault(
+                    f"{tolerance.kind} {tolerance.width:g} is narrower than {inner.tolerance.kind} {inner.tolerance.width:g}, "
+                    "which it contains; expected orientation within location"
+                )
+        added = _named(_rest(controlled, before), geometry)
+        if controlled.shape[1] and not added.shape[1]:
+            raise GeometryFault(
+                f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
+            )
+        before = np.hstack([before, added])
+        layers.append(Layer(tolerance, rows, controlled, added, frame))
+    return tuple(layers)
+
+
+def _controlled(rows: np.ndarray, geometry: FeatureGeometry, frame: DatumFrame) -> np.ndarray:
+    """Directions (coordinate, n) that the zone limits, and that no motion which the datums leave open changes."""
+    limited = _span(rows.reshape(-1, rows.shape[-1]).T)
+    return _rest(limited, _span(limited @ limited.T @ geometry.values @ frame.free))
+
+
+def _span(vectors: np.ndarray) -> np.ndarray:
+    """An orthonormal basis (row, n) of columns (row, m)."""
+    if not vectors.size:
+        return np.zeros((len(vectors), 0))
+    U, S, _ = np.linalg.svd(vectors, full_matrices=False)
+    return np.asarray(U[:, SAME * max(1.0, S.max(initial=0.0)) < S])
+
+
+def _rest(vectors: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """What of the span of orthonormal columns is across the span of others."""
+    return _span(vectors - other @ (other.T @ vectors))
+
+
+def _named(directions: np.ndarray, geometry: FeatureGeometry) -> np.ndarray:
+    """Directions along coordinates, if they span those."""
+    projector = directions @ directions.T
+    whole = np.flatnonzero(np.diag(projector) > 1 - 1e-6)
+    return np.eye(len(geometry.names))[:, whole] if len(whole) == directions.shape[1] else directions
+
+
+def _names(geometry: FeatureGeometry, added: np.ndarray) -> list[str]:
+    """What the directions are called: as the coordinates that they are along."""
+    largest = np.abs(added).argmax(axis=0)
+    along = np.abs(added).max(axis=0, initial=0) > 1 - 1e-6
+    return [
+        geometry.names[k] if is_one else f"mixed {number + 1}"
+        for number, (k, is_one) in enumerate(zip(largest, along, strict=True))
+    ]
+
+
+def _padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
+    found = np.zeros((len(coordinates), columns))
+    found[:, : coordinates.shape[1]] = coordinates
+    return found
+
+
+def _face_deviation(own: NominalFeature, number: int | None, placement: tuple[np.ndarray, np.ndarray]) -> FaceDeviation:
+    geometry, size = own.geometry, own.feature.size
+    twist, height = geometry.twists @ own.coordinates, np.zeros(own.coordinates.shape[1])
+    if size is not None and number is not None:
+        sign = -1.0 if geometry.is_inner else 1.0
+        if geometry.kind == "planes":
+            share = 0.5 if size.moves == "both" else float(_moving(own.feature, own.triangles)[number])
+            twist[:3, own.size_column] += sign * share * geometry.normals[number]
+        else:
+            height[own.size_column] = sign / 2
+    columns = np.flatnonzero(twist.any(axis=0) | (height != 0))
+    R, t = placement
+    turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
+    return FaceDeviation(own.label, columns, R @ geometry.centre + t, turned, height[columns])
+
+
+def in_order(part: Part) -> tuple[list[Feature], list[Feature]]:
+    """The features of a part, each after the datums that its tolerances refer to; and those that refer to each other."""
+    left, done, ordered = list(part.features), set[str](), list[Feature]()
+    while left:
+        ready = [each for each in left if _letters(each) <= done]
+        if not ready:
+            return ordered, left
+        ordered += ready
+        done |= {each.datum for each in ready if each.datum}
+        left = [each for each in left if each not in ready]
+    return ordered, []
+
+
+def _letters(feature: Feature) -> set[str]:
+    return {letter for each in feature.geometric for place in each.system for letter in place}

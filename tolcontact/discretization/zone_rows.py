@@ -1,0 +1,88 @@
+"""The zone of a tolerance as rows: a feature is inside if none of their lengths, at its coordinates, exceeds half the width."""
+
+import itertools
+
+import numpy as np
+
+from tolcontact.declaration import GeometricTolerance
+from tolcontact.declaration.feature_tolerance import ORIENTATIONS
+from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.feature_geometry import FeatureGeometry, axis_rows
+
+ACROSS = 0.999  # of a direction: how much of it must lie across an axis
+
+
+def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
+    """Rows (point, component, coordinate); none of a tolerance of form. `primary` is the first datum feature.
+
+    Raises GeometryFault if features of that kind cannot have the tolerance.
+    """
+    kind, count = tolerance.kind, len(feature.names)
+    if kind == "flatness":
+        _need(tolerance, feature, feature.is_plane, "planes")
+        return np.zeros((0, 1, count))
+    if kind in ORIENTATIONS:
+        _need(tolerance, feature, feature.is_plane or feature.is_axis, "planes, cylinders and cones")
+        return _halved_differences(feature) if feature.is_plane else _at(tolerance, feature, np.array([1.0]), tilt_only=True)
+    if kind in ("circular run-out", "total run-out"):
+        _need(tolerance, feature, feature.is_plane or feature.is_axis, "planes, cylinders and cones")
+        if feature.is_plane:
+            return _halved_differences(feature)
+        return axis_rows(np.array([0.0] if kind == "circular run-out" else [-1.0, 1.0]), count)
+    if kind == "profile":
+        return feature.extremes
+    if feature.kind == "general":
+        raise GeometryFault(
+            f"{kind} needs a plane, cylinder, cone or sphere, and its face is none of these to within 1 um; use tc.Profile"
+        )
+    if kind == "coaxiality":
+        _need(tolerance, feature, feature.is_axis or feature.kind == "sphere", "cylinders, cones and spheres")
+    if kind == "symmetry":
+        _need(
+            tolerance,
+            feature,
+            feature.kind == "planes" or tolerance.zone == "flat",
+            'two opposed planes, or axes with zone="flat"',
+        )
+    if not feature.is_axis:
+        return feature.extremes
+    return _at(tolerance, feature, _places(tolerance, feature, primary))
+
+
+def _need(tolerance: GeometricTolerance, feature: FeatureGeometry, has_it: bool, wanted: str) -> None:
+    if not has_it:
+        what = {"planes": "a pair of planes", "general": "a general surface"}.get(feature.kind, f"a {feature.kind}")
+        raise GeometryFault(f"{tolerance.kind} is for {wanted}, and it is {what}")
+
+
+def _halved_differences(feature: FeatureGeometry) -> np.ndarray:
+    """Of a plane: half of what one of its extremes stands higher than another."""
+    rows = feature.extremes[:, 0]
+    pairs = np.array(list(itertools.combinations(range(len(rows)), 2)))
+    return np.asarray((rows[pairs[:, 0]] - rows[pairs[:, 1]])[:, None] / 2)
+
+
+def _at(tolerance: GeometricTolerance, feature: FeatureGeometry, places: np.ndarray, *, tilt_only: bool = False) -> np.ndarray:
+    """Of an axis, at some places: in a round zone, or between planes."""
+    across = None
+    if tolerance.zone == "flat" and tolerance.across is not None:
+        across = feature.twists[:3, :2].T @ np.array(tolerance.across)
+        if np.linalg.norm(across) < ACROSS:
+            raise GeometryFault(f"{tolerance.kind}: along={tolerance.along!r} is not across its axis; give a direction that is")
+    rows = axis_rows(places, len(feature.names), across)
+    if tilt_only:
+        rows[..., :2] = 0
+    return rows
+
+
+def _places(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: FeatureGeometry | None) -> np.ndarray:
+    """Where on the axis the zone is, in halves of its length from its middle."""
+    if tolerance.projected is None:
+        return np.array([-1.0, 1.0])
+    slope = 0.0 if primary is None or not primary.is_plane else float(primary.axis @ feature.axis)
+    if abs(slope) < ACROSS:
+        raise GeometryFault(
+            f"{tolerance.kind}: a projected zone needs a plane across the axis as its primary datum, out of which it stands"
+        )
+    end = np.sign(slope)
+    return np.array([end, end * (1 + tolerance.projected / feature.half)])

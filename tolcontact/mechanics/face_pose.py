@@ -1,0 +1,34 @@
+"""Faces that deviate: the pose of a face in its part, and of the two faces of a pair to each other.
+
+A small rigid deviation enters as the pose of the face. So it costs no rows: contact points, their hull and the QP stay.
+"""
+
+import casadi as ca
+
+from tolcontact.discretization import ContactPoints, FaceDeviation
+from tolcontact.mechanics.pose import Pose, relative, rotation
+
+
+def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
+    """The pose by which points of the nominal face come to where they are, in the nominal assembly frame; None of none."""
+    if face is None or not face.twist.any():
+        return None
+    q = ca.DM(face.twist) @ deviations[face.columns.tolist()]
+    R, c = rotation(q[3:]), ca.DM(face.centre)
+    return Pose(R, q[:3] + c - R @ c)
+
+
+def face_height(face: FaceDeviation | None, deviations: ca.SX) -> ca.SX:
+    """How much farther out of the material it lies [mm]."""
+    if face is None or not face.grows:
+        return ca.SX(0)
+    return ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
+
+
+def facing_pose(pair: ContactPoints, X_WM: Pose, X_WR: Pose | None, deviations: ca.SX) -> Pose:
+    """X_RM of a pair: the pose of its moving face in the frame of its reference face; X_WR of the ground is None."""
+    moving, reference = (face_pose(face, deviations) for face in pair.deviating)
+    of_moving = X_WM if moving is None else X_WM @ moving
+    if X_WR is None:
+        return of_moving
+    return relative(of_moving, X_WR if reference is None else X_WR @ reference)

@@ -1,0 +1,231 @@
+"""Contributors: everything that varies, and how. Each is a column of the deviations."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from tolcontact.declaration import GeometricTolerance, Tolerance
+from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
+from tolcontact.discretization import Layer, Nominal, NominalFeature
+from tolcontact.errors import ModelError
+from tolcontact.variation import zones
+from tolcontact.variation.quantiles import quantile
+
+JOINT = ("truncated", "uniform", "polar")  # rules by which components are drawn together
+LOCATOR, FEATURE, VARIABLE = "locator", "feature", "variable"  # sources
+
+
+class Contributor(NamedTuple):
+    """A column of the deviations.
+
+    source     "locator", "feature" or "variable"
+    tolerance  of a locator, a size or a variable
+    layer      of a freedom of a feature: what it is controlled by, with
+    spread     [mm] its standard deviation, where it is normal, and
+    mean       [mm]
+    """
+
+    label: str
+    source: str
+    units: str
+    tolerance: Tolerance | None = None
+    layer: Layer | None = None
+    spread: float = 0.0
+    mean: float = 0.0
+
+    @property
+    def range(self) -> float:
+        """Full width of its zone; NaN if its distribution alone says how it varies."""
+        if self.layer is not None:
+            return float(self.layer.tolerance.width)
+        return np.nan if self.tolerance is None or self.tolerance.range is None else float(self.tolerance.range)
+
+    @property
+    def said(self) -> str:
+        """Its distribution in words: a name, and the rule from the zone to the spread."""
+        if self.layer is not None:
+            return f"{self.layer.tolerance}; {self.layer.tolerance.rule}"
+        if self.tolerance is None:
+            return ""
+        name = self.tolerance.distribution
+        return name if isinstance(name, str) else str(name.dist.name)
+
+    def drawn(self, u: np.ndarray) -> np.ndarray:
+        """Its deviations for numbers between 0 and 1."""
+        if self.tolerance is not None:
+            return quantile(self.tolerance, u)
+        return np.asarray(self.mean + self.spread * ndtri(u))
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Components of a feature that are drawn together.
+
+    columns   of the deviations
+    draw      made of uniform numbers: attempt -> (n, component), anew for each attempt
+    """
+
+    columns: np.ndarray
+    draw: Callable[[Callable[[int], np.ndarray]], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Bonus:
+    """Components that fill the zone which the size of their feature leaves: those of the nominal zone times its growth.
+
+    columns, size   of the deviations: the components, and the size of their feature
+    factor          (n,) of size deviations (n,)
+    """
+
+    columns: np.ndarray
+    size: int
+    factor: Callable[[np.ndarray], np.ndarray]
+
+
+class Contributors:
+    """All contributors of a model, in the order of the columns of deviations."""
+
+    def __init__(self, nominal: Nominal) -> None:
+        self.together: list[Together] = []
+        self.bonuses: list[Bonus] = []
+        locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
+        self.every = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
+        self._nominal = nominal
+        for feature in nominal.features:
+            self.every += self._of_feature(feature)
+        self.every += [Contributor(each.name, VARIABLE, each.units, each.tolerance) for each in nominal.assembly.variables]
+
+    def _of_feature(self, own: NominalFeature) -> Iterator[Contributor]:
+        """The freedoms of a feature's layers, from the innermost on, and its size."""
+        labels, column = iter(own.labels), own.first
+        basis, known = np.zeros((len(own.geometry.names), 0)), np.zeros(0)
+        for layer in own.layers:
+            count = layer.added.shape[1]
+            if not count:
+                continue
+            tolerance, columns = layer.tolerance, np.arange(column, column + count)
+            basis = np.hstack([basis, layer.added])
+            seen = layer.controlled @ layer.controlled.T @ basis
+            rows = layer.rows @ seen
+            self._check(own, layer, first=not len(known))
+            width = float(tolerance.width) or self._unit(own, tolerance, first=not len(known))
+            s, is_drawn = _spreads(own, layer, rows, known, count, width)
+            known = np.concatenate([known, np.where(is_drawn, s, 0.0)])
+            mean = _mean(own, layer, s)
+            if tolerance.rule in JOINT:
+                self.together.append(Together(columns, _joint(tolerance.rule, rows, s, is_drawn, width)))
+            if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
+                self.bonuses.append(Bonus(columns, own.size_column, _growth(own, tolerance, width)))
+            for k in range(count):
+                spread = s / tolerance.cp if is_drawn[k] else 0.0
+                yield Contributor(next(labels), FEATURE, "mm", layer=layer, spread=spread, mean=float(mean[k]))
+            column += count
+        if own.feature.size is not None:
+            yield Contributor(next(labels), FEATURE, "mm", own.feature.size.tolerance)
+
+    def _check(self, own: NominalFeature, layer: Layer, *, first: bool) -> None:
+        rule, layers = layer.tolerance.rule, sum(each.added.shape[1] > 0 for each in own.layers)
+        if rule in JOINT and (not first or layers > 1):
+            self._refuse(
+                own, f'{layer.tolerance.word}: the rule "{rule}" is for features with one tolerance of place or orientation; '
+                f'choose "{INSIDE}" or "{EXTREMES}"'
+            )  # fmt: skip
+        if rule == "polar" and (layer.rows.shape[1] != 2 or own.geometry.kind != "cylinder"):
+            self._refuse(own, f'{layer.tolerance.word}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
+        if rule in ("translation", "polar") and not _is_translation(own, layer).any():
+            self._refuse(own, f'{layer.tolerance.word}: the rule "{rule}" leaves nothing, as its datums lock tilts alone')
+
+    def _unit(self, own: NominalFeature, tolerance: GeometricTolerance, *, first: bool) -> float:
+        """The width for which a zone is scaled that has none but its bonus: 1 mm."""
+        if tolerance.bonus != "fills" or not first:
+            self._refuse(
+                own,
+                f'{tolerance.word}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
+            )
+        return 1.0
+
+    def _refuse(self, own: NominalFeature, fault: str) -> None:
+        feature = own.feature
+        where = f'part "{feature.part.name}": feature "{feature.name}" ({feature.declared_at})'
+        raise ModelError(self._nominal.assembly.name, [f"{where}: {fault}"])
+
+
+def _is_translation(own: NominalFeature, layer: Layer) -> np.ndarray:
+    """Which added directions (component,) do not turn the feature."""
+    turned = own.geometry.twists[3:] @ layer.added
+    return np.asarray(np.abs(turned).max(axis=0) < 1e-12)
+
+
+def _spreads(
+    own: NominalFeature, layer: Layer, rows: np.ndarray, known: np.ndarray, count: int, width: float
+) -> tuple[float, np.ndarray]:
+    """The standard deviation of the added components before `cp`, and which of them are drawn (component,)."""
+    rule = layer.tolerance.rule
+    is_drawn = _is_translation(own, layer) if rule in ("translation", "polar") else np.ones(count, dtype=bool)
+    kept = np.concatenate([np.arange(len(known)), len(known) + np.flatnonzero(is_drawn)])
+    spread = zones.extreme_spread if rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
+    return spread(rows[..., kept], known, int(is_drawn.sum()), width), is_drawn
+
+
+def _mean(own: NominalFeature, layer: Layer, s: float) -> np.ndarray:
+    """Means (component,) of the added components: of an uneven profile, and what `cpk` says, along the first."""
+    tolerance, mean = layer.tolerance, np.zeros(layer.added.shape[1])
+    if tolerance.outside is not None and own.geometry.is_plane:
+        mean += (tolerance.outside - tolerance.width / 2) * layer.added[0]
+    if tolerance.cpk is not None and mean.size:
+        mean[0] += 3 * s * (1 - tolerance.cpk / tolerance.cp)
+    return mean
+
+
+def _growth(own: NominalFeature, tolerance: GeometricTolerance, width: float) -> Callable[[np.ndarray], np.ndarray]:
+    """The zone that a size leaves, beside the `width` that its spread was computed for."""
+
+    def factor(size: np.ndarray) -> np.ndarray:
+        return np.asarray((tolerance.width + bonus(own, tolerance, size)) / width)
+
+    return factor
+
+
+def bonus(own: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:
+    """How much a zone grows (n,) [mm] for deviations of the feature's size (n,): its departure from the limit that counts."""
+    limits = own.feature.size
+    if limits is None or not tolerance.material:
+        return np.zeros_like(size)
+    from_lower = own.geometry.is_inner == (tolerance.material == "M")
+    return np.maximum(size - limits.lower if from_lower else limits.upper - size, 0.0)
+
+
+def _joint(
+    rule: str, rows: np.ndarray, s: float, is_drawn: np.ndarray, width: float
+) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:
+    """How components (n, component) are drawn together."""
+    if rule == "polar":
+        return lambda uniforms: _polar(uniforms(0), s, is_drawn)
+    far = zones.reach(rows, width)
+
+    def attempt(u: np.ndarray) -> np.ndarray:
+        return np.asarray(s * ndtri(u) if rule == "truncated" else far * (2 * u - 1))
+
+    def draw(uniforms: Callable[[int], np.ndarray]) -> np.ndarray:
+        found = attempt(uniforms(0))
+        left = np.flatnonzero(~zones.is_inside(rows, found, width))
+        number = 0
+        while left.size:
+            number += 1
+            found[left] = attempt(uniforms(number)[left])
+            left = left[~zones.is_inside(rows, found[left], width)]
+        return found
+
+    return draw
+
+
+def _polar(u: np.ndarray, s: float, is_drawn: np.ndarray) -> np.ndarray:
+    """Two components with a uniform angle and a normal radius."""
+    found = np.zeros((len(u), len(is_drawn)))
+    first, second = np.flatnonzero(is_drawn)
+    angle, radius = np.pi * u[:, second], s * ndtri(u[:, first])
+    found[:, first], found[:, second] = radius * np.cos(angle), radius * np.sin(angle)
+    return found
