@@ -133,7 +133,7 @@ def test_only_continuous_distributions_of_scipy_are_made(said, document, monkeyp
     [
         [],
         [["input"]],
-        [["input", 24]],
+        [["input", 42]],
         [["input", -1]],
         [["input", 0.0]],
         [["input", True]],

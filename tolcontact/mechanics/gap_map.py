@@ -49,7 +49,7 @@ def _corners(coordinates: np.ndarray) -> np.ndarray:
 
     What all points have in common tells none from the others.
     """
-    coordinates = coordinates[np.ptp(coordinates, axis=1) > 0]
+    coordinates = coordinates[[np.ptp(row) > 0 for row in coordinates]] if len(coordinates) else coordinates
     if len(coordinates) == 0:
         return np.array([0])
     if len(coordinates) == 1:
