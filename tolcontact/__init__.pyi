@@ -48,13 +48,13 @@ from .method import Method
 from .simulation import simulate_blocks
 from .version import __version__
 from .vocabulary import Status
-from .workflow import build, check, compare, run, summarize
+from .workflow import build, check, check_population, compare, run, summarize
 
 __all__ = [
     "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "Coaxiality", "ContactPair",
     "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
-    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "command_line", "compare",
+    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population", "command_line", "compare",
     "faces_in", "main", "model_of", "open_archive", "parts_from", "run", "simulate_blocks", "summarize", "three_two_one",
 ]  # fmt: skip

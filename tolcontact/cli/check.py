@@ -1,9 +1,14 @@
 """tolcontact check."""
 
+from typing import Annotated
+
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Solver, app, chosen
+from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen
+from tolcontact.cli.output import console
 from tolcontact.declaration.script import load_model
+from tolcontact.report import population_text
+from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import DEFAULT_SOLVER, build
 
 
@@ -13,9 +18,14 @@ def check(
     solver: Solver = DEFAULT_SOLVER,
     resolution: Resolution = None,
     objective: Objective = None,
+    population: Annotated[
+        int | None, typer.Option(metavar="N", help="Also draw N of every feature, and measure which share lies in its zones.")
+    ] = None,
+    seed: Seed = 1,
 ) -> None:
     """Check a model, and these options, and list every fault; runs nothing."""
-    program = build(load_model(model), solver=solver, method=chosen(resolution=resolution, objective=objective))
+    declared = load_model(model)
+    program = build(declared, solver=solver, method=chosen(resolution=resolution, objective=objective))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
@@ -23,3 +33,5 @@ def check(
     for pair in program.nominal.pairs:
         typer.echo(f"  contact {pair.name}: {pair.in_words}")
     typer.echo("no faults found")
+    if population is not None:
+        console().print(population_text(check_population(declared, samples=population, seed=seed)))

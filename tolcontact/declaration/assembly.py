@@ -126,9 +126,15 @@ class Assembly(Readable):
         return part
 
     def locate(
-        self, part: Part, scheme: ThreeTwoOne | Sequence[Locator], *, tolerance: Any = None, on: Part | None = None
+        self,
+        part: Part,
+        scheme: ThreeTwoOne | Sequence[Locator],
+        *,
+        tolerance: Any = None,
+        on: Part | None = None,
+        floating: bool = False,
     ) -> Location:
-        """Locate a part by six locators, on the ground or `on` another part.
+        """Locate a part by six locators, on the ground or `on` another part; by fewer, if it is `floating` (see Location).
 
         `tolerance` holds for every locator that has none of its own: the full width of its zone [mm], a Tolerance, or
         a frozen scipy.stats distribution.
@@ -139,7 +145,8 @@ class Assembly(Readable):
         for locator in scheme if isinstance(scheme, tuple) else ():
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
         common = None if tolerance is None else _tolerance(tolerance)
-        self._locations.append(Location(part, scheme, common, on, script_line()))
+        _expect(f'locate "{part.name}": floating', floating, bool, "True or False")
+        self._locations.append(Location(part, scheme, common, on, script_line(), floating))
         return self._locations[-1]
 
     def contact(
@@ -273,6 +280,12 @@ class Assembly(Readable):
                         )
 
     def _location_faults(self, part: Part) -> Iterator[str]:
+        own = self.location_of(part)
+        if own is not None and own.floating:
+            if not any(part in (pair.moving.part, pair.reference.part) for pair in self._pairs):
+                yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
+            if part.fixed is True:
+                yield "it is floating, so contact has to move it; leave fixed out"
         count = sum(location.part is part for location in self._locations)
         if count > 1:
             yield f"it is located {count} times; locate it once"

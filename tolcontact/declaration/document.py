@@ -78,6 +78,7 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
                     ]
                 ),
                 "declared_at": location.declared_at,
+                **({"floating": True} if location.floating else {}),
             }
             for location in assembly.locations
         ],

@@ -5,10 +5,12 @@ from tolcontact.declaration.part import Part
 
 
 def is_free(assembly: Assembly, part: Part) -> bool:
-    """Whether contact may move the part: as declared, else whether it is a moving side or has one-sided locators."""
+    """Whether contact may move the part: as declared, else whether it is a moving side, floats or has one-sided locators."""
     if part.fixed is not None:
         return not part.fixed
-    return any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
+    location = assembly.location_of(part)
+    floats = location is not None and location.floating
+    return floats or any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
 
 
 def has_supports(assembly: Assembly, part: Part) -> bool:

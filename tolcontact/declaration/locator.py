@@ -108,13 +108,17 @@ def three_two_one(
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Location(Readable):
-    """How one part is located: its locators, their common tolerance, and what they are attached to (None: the ground)."""
+    """How one part is located: its locators, their common tolerance, and what they are attached to (None: the ground).
+
+    A `floating` part has fewer of them: what they leave open keeps its nominal value in the raw state, and contact decides it.
+    """
 
     part: Part
     scheme: ThreeTwoOne | tuple[Locator, ...]
     tolerance: Tolerance | None
     on: Part | None
     declared_at: str
+    floating: bool = False
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
@@ -139,12 +143,21 @@ class Location(Readable):
             yield from text_faults("locator", names)
             yield from repetitions("locator", names)
             two_sided = sum(locator.one_sided is False for locator in self.scheme)
-            if len(self.scheme) < 6 or two_sided > 6:
-                count = "1 locator" if len(self.scheme) == 1 else f"{len(self.scheme)} locators"
+            count = "1 locator" if len(self.scheme) == 1 else f"{len(self.scheme)} locators"
+            if len(self.scheme) < 6 and not self.floating:
                 yield (
-                    f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or more if at most six are "
-                    "two-sided"
+                    f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or "
+                    "locate(..., floating=True) if contact holds it in the other directions"
                 )
+            elif two_sided > 6:
+                yield (
+                    f"it is over-constrained: {two_sided} of its {count} hold it both ways, and six are enough; make those that "
+                    "it may lift off one_sided=True, or leave some out"
+                )
+            elif self.floating and two_sided == 6:
+                yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
+        if isinstance(self.scheme, ThreeTwoOne) and self.floating:
+            yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
         elif isinstance(self.scheme, ThreeTwoOne):
@@ -153,4 +166,7 @@ class Location(Readable):
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
         ground = self.on.name if self.on else "the ground"
-        return f"location of {self.part.name} on {ground}: {scheme}" + (f"; {self.tolerance}" if self.tolerance else "")
+        floating = ", floating" if self.floating else ""
+        return f"location of {self.part.name} on {ground}: {scheme}{floating}" + (
+            f"; {self.tolerance}" if self.tolerance else ""
+        )

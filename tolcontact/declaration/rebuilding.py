@@ -140,7 +140,8 @@ class _Reader:
             scheme = tuple(self.locator(part, each) for each in said["scheme"])
         self.contributors += 6 if isinstance(scheme, ThreeTwoOne) else len(scheme)
         common, on = _optional(said["tolerance"], _tolerance_of), _optional(said["on"], self.known)
-        return Location(self.known(said["part"]), scheme, common, on, said["declared_at"].text())
+        floating = "floating" in said and said["floating"].boolean()
+        return Location(self.known(said["part"]), scheme, common, on, said["declared_at"].text(), floating)
 
     def pair(self, said: Said) -> ContactPair:
         points = said["points"].one_of([VERTICES]) if said["points"].is_text else _optional(said["points"], _count)

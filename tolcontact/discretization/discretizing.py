@@ -192,6 +192,8 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
             locators = location.scheme
     common = location.tolerance if location else None
     nominal = _locators(part, locators, common, R_WP, t_WP)
+    if location is not None and location.floating:
+        nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         _attempt(faults, where("part", part), nominal.check_independent)
     parent = location.on if location else None
@@ -207,6 +209,11 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
         parent=assembly.parts.index(parent) if parent in assembly.parts else None,
         free=is_free(assembly, part),
     )
+
+
+def _middle(mesh: Any) -> np.ndarray:
+    """The middle (3,) of a mesh's surface."""
+    return np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area)
 
 
 def _locators(

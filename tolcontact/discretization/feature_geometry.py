@@ -32,13 +32,13 @@ class FeatureGeometry:
     names    of the coordinates
     twists   (6, coordinate): the displacement (tau, rho) of the feature for a coordinate of 1 mm
     values   (coordinate, 6): the coordinates of a displacement (tau, rho)
-    extremes  rows (point, component, coordinate) of what a location zone is of, at the feature's extremes
+    places   (point, 3) [mm] of its extremes: corners of a plane, ends of an axis, a centre, vertices of a general surface
+    directions  (point, entry, 3): unit vectors along which it is measured there
     axis     (3,) normal of a plane, outward; direction of an axis
     half     [mm] half the length of an axis; else 0
     size     [mm] diameter or distance that it has nominally; else NaN
     normals  outward normals (3,) of its faces, if they are planes
     is_inner  whether its size is that of a gap in the material: a hole, a slot
-    points   (point, 3) of it, its corners among them
     """
 
     kind: str
@@ -46,13 +46,24 @@ class FeatureGeometry:
     names: tuple[str, ...]
     twists: np.ndarray
     values: np.ndarray
-    extremes: np.ndarray
+    places: np.ndarray
+    directions: np.ndarray
     axis: np.ndarray
     half: float
     size: float
     normals: tuple[np.ndarray, ...]
     is_inner: bool
-    points: np.ndarray
+
+    @property
+    def extremes(self) -> np.ndarray:
+        """What is measured at its extremes, for coordinates of 1 mm: rows (point, entry, coordinate)."""
+        moved = self.twists[:3].T + np.cross(self.twists[3:].T, (self.places - self.centre)[:, None])
+        return np.asarray(np.einsum("pqk,pek->peq", moved, self.directions))
+
+    @property
+    def reach(self) -> float:
+        """How far [mm] its extremes are from its centre; of a sphere its radius."""
+        return self.size / 2 if self.kind == "sphere" else float(np.linalg.norm(self.places - self.centre, axis=1).max())
 
     def about(self, centre: np.ndarray) -> np.ndarray:
         """`values` (coordinate, 6) of displacements that turn about another centre (3,)."""
@@ -86,11 +97,10 @@ def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
         return _plane("plane", form.origin, form.axis, np.asarray(face.mesh.vertices), (form.axis,), np.nan, False)
     if form.kind == "sphere":
         is_inner = face.pieces[0].is_hollow
-        names, rows = tuple(f"shift {axis}" for axis in "xyz"), np.eye(3)[None]
+        names = tuple(f"shift {axis}" for axis in "xyz")
         T = np.vstack([AXES, np.zeros((3, 3))])
         return FeatureGeometry(
-            "sphere", form.origin, names, T, T.T, rows, AXES[2], 0.0, 2 * form.radius, (), is_inner,
-            np.asarray(face.mesh.vertices),
+            "sphere", form.origin, names, T, T.T, form.origin[None], AXES[None], AXES[2], 0.0, 2 * form.radius, (), is_inner,
         )  # fmt: skip
     return _axis(face, form)
 
@@ -135,9 +145,10 @@ def _plane(
     T[:3, 0], T[3:, 1], T[3:, 2] = n, np.cross(u, n) / half[0], np.cross(v, n) / half[1]
     B = np.zeros((3, 6))
     B[0, :3], B[1, 3:], B[2, 3:] = n, np.cross(u, n) * half[0], np.cross(v, n) * half[1]
-    rows = np.column_stack([np.ones(len(corners)), (corners - middle) / half])[:, None]
+    places = centre + (corners - middle) @ np.array([u, v])
+    directions = np.tile(n, (len(places), 1, 1))
     coordinates = ("offset", f"tilt {names[0]}", f"tilt {names[1]}")
-    return FeatureGeometry(kind, centre, coordinates, T, B, rows, n, 0.0, size, normals, is_inner, points)
+    return FeatureGeometry(kind, centre, coordinates, T, B, places, directions, n, 0.0, size, normals, is_inner)
 
 
 def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGeometry:
@@ -175,9 +186,10 @@ def _axis(face: Surface, form: Form) -> FeatureGeometry:
         T[:3, 4], B[4, :3] = a, a
         coordinates.append("along")
     size = 2 * form.radius if form.kind == "cylinder" else np.nan
-    rows = axis_rows(np.array([-1.0, 1.0]), count)
+    ends = centre + half * np.array([[-1.0], [1.0]]) * a
+    directions = np.array([[u, v]] * 2)
     is_inner = face.pieces[0].is_hollow
-    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, rows, a, half, size, (), is_inner, points)
+    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, ends, directions, a, half, size, (), is_inner)
 
 
 def axis_rows(places: np.ndarray, coordinates: int, across: np.ndarray | None = None) -> np.ndarray:
@@ -215,8 +227,9 @@ def _general(face: Surface) -> FeatureGeometry:
     metric = every.T @ every
     values = np.linalg.solve(scaled.T @ metric @ scaled, scaled.T @ metric) @ np.linalg.inv(to_twist)
     names = tuple(f"freedom {k + 1}" for k in range(len(kept)))
-    rows = (every @ scaled)[:, None]
-    return FeatureGeometry("general", centre, names, to_twist @ scaled, values, rows, first, 0.0, np.nan, (), False, points)
+    return FeatureGeometry(
+        "general", centre, names, to_twist @ scaled, values, points, normals[:, None], first, 0.0, np.nan, (), False
+    )
 
 
 def _frame(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

@@ -162,7 +162,6 @@ def _layers(
     feature: Feature, geometry: FeatureGeometry, datums: Mapping[str | None, NominalFeature], columns: int
 ) -> tuple[Layer, ...]:
     """What each tolerance controls, from the one that controls least on."""
-    reach = float(np.linalg.norm(geometry.points - geometry.centre, axis=1).max())
     found = []
     for tolerance in feature.geometric:
         system = [
@@ -170,7 +169,7 @@ def _layers(
             for place in tolerance.system
         ]
         rows = zone_rows(tolerance, geometry, system[0][0].geometry if system else None)
-        frame = datum_frame(system, geometry.centre, reach, columns)
+        frame = datum_frame(system, geometry.centre, geometry.reach, columns)
         controlled = _controlled(rows, geometry, frame) if system else np.zeros((len(geometry.names), 0))
         if len(rows) and system and not controlled.shape[1]:
             raise GeometryFault(

@@ -29,6 +29,6 @@ How to read it:
 Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line states it.
 """
 
-from tolcontact.report.text import comparison_text, grouped, summary_text
+from tolcontact.report.text import comparison_text, grouped, population_text, summary_text
 
-__all__ = ["comparison_text", "grouped", "summary_text"]
+__all__ = ["comparison_text", "grouped", "population_text", "summary_text"]

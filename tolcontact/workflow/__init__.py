@@ -44,6 +44,9 @@ True
 
 `methods=[{"resolution": "linearized"}, {"resolution": "exact"}]` compares methods in the same way.
 
+`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside of
+every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
+
 `tc.summarize` gives the statistics of results, or of the archive of that path (see `tolcontact.statistics`).
 
 A wrong model, option or path raises a `tc.TolcontactError` before anything is simulated or written. The `faults` of a
@@ -56,6 +59,7 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 """
 
 from tolcontact.workflow.compare import compare
+from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
 
-__all__ = ["build", "check", "compare", "run", "summarize"]
+__all__ = ["build", "check", "check_population", "compare", "run", "summarize"]
