@@ -55,6 +55,7 @@ __all__ = [
     "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
-    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population", "command_line", "compare",
-    "faces_in", "main", "model_of", "open_archive", "parts_from", "run", "simulate_blocks", "summarize", "three_two_one",
+    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
+    "command_line", "compare", "faces_in", "main", "model_of", "open_archive", "parts_from", "run", "simulate_blocks",
+    "summarize", "three_two_one",
 ]  # fmt: skip

@@ -19,7 +19,7 @@ def flat_feet(z: float = 0.0) -> list[tc.Locator]:
 def floating_shaft_in_a_v(sections: int = 48, radius: float = 10.0, frame: Frame | None = None) -> tc.Assembly:
     """A shaft along y whose diameter varies, under its weight in a V of two plates whose faces do.
 
-    Its axis comes to (left + right + diameter) / sqrt 2 above its nominal place, with deviations of the offsets and the diameter.
+    Its axis comes to (left + right + diameter) / sqrt 2 above its nominal place: deviations of the offsets and of the diameter.
     """
     base = frame or STILL
     a = tc.Assembly("V", method=SEATED)

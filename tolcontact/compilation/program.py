@@ -13,7 +13,7 @@ from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.tape import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
-from tolcontact.mechanics.face_pose import facing_pose
+from tolcontact.mechanics.face_pose import face_poses, facing_pose
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import GapMap, gap_map
 from tolcontact.mechanics.groups import Group, contact_groups
@@ -93,7 +93,9 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         poses = poses_of(entries)
         values = measured(nominal, poses, d)
         X_RM = [
-            facing_pose(pair, poses[pair.moving], None if pair.reference is None else poses[pair.reference], d).vector()
+            facing_pose(
+                face_poses(pair, d), poses[pair.moving], None if pair.reference is None else poses[pair.reference]
+            ).vector()
             for pair in nominal.pairs
         ]
         observe = ca.Function(

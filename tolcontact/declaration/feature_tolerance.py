@@ -13,6 +13,7 @@ from tolcontact.readable import Readable
 INSIDE = "99.73 % inside"
 EXTREMES = "6 sigma at the extremes"
 RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
+TRANSLATIONS = ("translation", "polar")  # rules that tilt nothing
 BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 MOVES = ("both", "first", "second")
@@ -147,13 +148,21 @@ class GeometricTolerance(Readable):
         least = "0 or above" if self.material else "above 0"
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
             yield f"width is {self.width!r}; expected the full width of the zone in mm, {least}"
+        yield from self._datum_faults()
+        yield from self._zone_faults()
+        yield from self._process_faults()
+
+    def _datum_faults(self) -> Iterator[str]:
         if not isinstance(self.datums, str) or not all(map(COMPARTMENT.fullmatch, self._places)) or len(self._places) > 3:
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)" or "A-B"'
-        elif self.needs_datums and not self.datums:
+            return
+        if self.needs_datums and not self.datums:
             yield f'it needs datums; give them as in tc.{type(self).__name__}({self.width!r}, "A|B|C")'
         letters = [letter for place in self.system for letter in place]
         if len(set(letters)) < len(letters):
             yield f"datums {self.datums!r} names a datum twice"
+
+    def _zone_faults(self) -> Iterator[str]:
         for word, nothing in (("zone", None), ("along", None), ("material", ""), ("projected", None), ("outside", None)):
             if getattr(self, word) != nothing and word not in self.own:
                 yield f"{word} is given, which {self.kind} does not have; leave it out"
@@ -163,16 +172,15 @@ class GeometricTolerance(Readable):
             yield 'a flat zone needs a direction across it; give along="x", or a vector'
         if self.across is not None and not is_finite(self.across):
             yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
-        if self.material not in MATERIALS:
-            yield f'material is {self.material!r}; expected "M" (maximum) or "L" (least), or nothing'
-        if self.bonus not in BONUSES:
-            yield f"bonus is {self.bonus!r}; expected one of {', '.join(BONUSES)}"
         if self.projected is not None and not (is_length(self.projected) and self.projected > 0):
             yield f"projected is {self.projected!r}; expected a length in mm above 0"
         if self.outside is not None and not (is_length(self.outside) and 0 <= self.outside <= self.width):
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
-        if self.rule not in RULES:
-            yield f"rule is {self.rule!r}; expected one of: {', '.join(RULES)}"
+
+    def _process_faults(self) -> Iterator[str]:
+        for word, known in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
+            if getattr(self, word) not in known:
+                yield f"{word} is {getattr(self, word)!r}; expected one of: {', '.join(map(repr, known))}"
         if not (is_length(self.cp) and self.cp > 0):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):

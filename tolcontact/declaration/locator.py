@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.names import repetitions, text_faults
 from tolcontact.declaration.part import Face, Part, face_of
@@ -127,41 +129,45 @@ class Location(Readable):
         return tuple(part for face in faces for part in face.parts)
 
     def faults(self) -> Iterator[str]:
-        if isinstance(self.scheme, ThreeTwoOne):
-            yield from self.scheme.faults()
-            for face in self.scheme.faces:
-                if face.part is not self.part:
-                    yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
-        else:
-            names = [locator.name for locator in self.scheme]
-            for locator in self.scheme:
-                if isinstance(locator.on, Feature) and locator.on.part is not self.part:
-                    yield f'locator "{locator.name}" is on feature "{locator.on.name}" of part "{locator.on.part.name}"'
-                yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
-                if locator.tolerance is None and self.tolerance is None:
-                    yield f'locator "{locator.name}" has no tolerance; give one to the locator, or to the locate call'
-            yield from text_faults("locator", names)
-            yield from repetitions("locator", names)
-            two_sided = sum(locator.one_sided is False for locator in self.scheme)
-            count = "1 locator" if len(self.scheme) == 1 else f"{len(self.scheme)} locators"
-            if len(self.scheme) < 6 and not self.floating:
-                yield (
-                    f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or "
-                    "locate(..., floating=True) if contact holds it in the other directions"
-                )
-            elif two_sided > 6:
-                yield (
-                    f"it is over-constrained: {two_sided} of its {count} hold it both ways, and six are enough; make those that "
-                    "it may lift off one_sided=True, or leave some out"
-                )
-            elif self.floating and two_sided == 6:
-                yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
-        if isinstance(self.scheme, ThreeTwoOne) and self.floating:
-            yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
+        yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
-        elif isinstance(self.scheme, ThreeTwoOne):
+
+    def _faces_faults(self) -> Iterator[str]:
+        yield from self.scheme.faults() if isinstance(self.scheme, ThreeTwoOne) else ()
+        for face in self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ():
+            if face.part is not self.part:
+                yield f'face {face} belongs to part "{face.part.name}", not to part "{self.part.name}"'
+        if self.floating:
+            yield "a 3-2-1 scheme leaves nothing open; leave floating out, or give it fewer locators"
+        if self.tolerance is None:
             yield "its 3-2-1 scheme has no tolerance; give one to the locate call"
+
+    def _locator_faults(self, scheme: tuple[Locator, ...]) -> Iterator[str]:
+        names = [locator.name for locator in scheme]
+        for locator in scheme:
+            if isinstance(locator.on, Feature) and locator.on.part is not self.part:
+                yield f'locator "{locator.name}" is on feature "{locator.on.name}" of part "{locator.on.part.name}"'
+            yield from (f'locator "{locator.name}": {fault}' for fault in locator.faults())
+            if locator.tolerance is None and self.tolerance is None:
+                yield f'locator "{locator.name}" has no tolerance; give one to the locator, or to the locate call'
+        yield from text_faults("locator", names)
+        yield from repetitions("locator", names)
+        two_sided = [locator for locator in scheme if locator.one_sided is False]
+        count = "1 locator" if len(scheme) == 1 else f"{len(scheme)} locators"
+        if len(scheme) < 6 and not self.floating:
+            yield (
+                f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) if "
+                "contact holds it in the other directions"
+            )
+        elif len(two_sided) > 6:
+            idle = ", ".join(locator.name for locator in _repeating(two_sided))
+            yield (
+                f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {idle} hold what those before "
+                "them hold already; make them one_sided=True, or leave them out"
+            )
+        elif self.floating and len(two_sided) == 6:
+            yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
 
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
@@ -170,3 +176,14 @@ class Location(Readable):
         return f"location of {self.part.name} on {ground}: {scheme}{floating}" + (
             f"; {self.tolerance}" if self.tolerance else ""
         )
+
+
+def _repeating(locators: list[Locator]) -> list[Locator]:
+    """Those that hold nothing which the ones before them do not hold."""
+    points = np.array([locator.point for locator in locators])
+    arms = points - points.mean(axis=0)
+    arms /= np.abs(arms).max() or 1.0
+    directions = np.array([locator.direction for locator in locators])
+    rows = np.nan_to_num(np.hstack([directions, np.cross(arms, directions)]))
+    ranks = [0, *(int(np.linalg.matrix_rank(rows[: k + 1], tol=1e-6)) for k in range(len(rows)))]
+    return [locator for locator, before, after in zip(locators, ranks, ranks[1:], strict=False) if after == before]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tolcontact.declaration import Feature, GeometricTolerance, Part
+from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.discretization.datum_system import Datum, DatumFrame, datum_frame
 from tolcontact.discretization.face_deviation import FaceDeviation
 from tolcontact.discretization.faces import Meshes, patch, triangles
@@ -23,7 +24,7 @@ class Layer:
 
     rows        (point, component, coordinate): its zone (see zone_rows)
     controlled  (coordinate, n): orthonormal directions that its datums lock, and
-    added       (coordinate, k): those of them that no narrower tolerance has, each a contributor
+    added       (coordinate, k): those of them that no narrower tolerance has, and that its rule draws; each a contributor
     frame       of its datum system
     """
 
@@ -189,6 +190,8 @@ def _layers(
                     "which it contains; expected orientation within location"
                 )
         added = _named(_rest(controlled, before), geometry)
+        if tolerance.rule in TRANSLATIONS:
+            added = _translating(tolerance, geometry, added)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
                 f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
@@ -196,6 +199,16 @@ def _layers(
         before = np.hstack([before, added])
         layers.append(Layer(tolerance, rows, controlled, added, frame))
     return tuple(layers)
+
+
+def _translating(tolerance: GeometricTolerance, geometry: FeatureGeometry, added: np.ndarray) -> np.ndarray:
+    """Those of the added directions (coordinate, n) that do not turn the feature."""
+    turned = geometry.twists[3:] @ added * geometry.reach
+    _, S, Vt = np.linalg.svd(turned)
+    kept = added @ Vt[int((S > SAME).sum()) :].T
+    if not kept.shape[1]:
+        raise GeometryFault(f'{tolerance.kind}: the rule "{tolerance.rule}" leaves nothing, as its datums lock tilts alone')
+    return _named(kept, geometry)
 
 
 def _controlled(rows: np.ndarray, geometry: FeatureGeometry, frame: DatumFrame) -> np.ndarray:

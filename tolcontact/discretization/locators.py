@@ -69,8 +69,8 @@ class Locators:
     def placing_matrix(self) -> tuple[np.ndarray, np.ndarray]:
         """The matrix M (6, locator) of q = M d, and the centroid c (3,) about which the part turns.
 
-        Where they leave freedoms the part moves as little as it can. Six locators give M = J^-1. Of more than six the two-sided ones are kept exactly, and the one-sided ones as well as
-        it goes, in the sense of least squares.
+        Where they leave freedoms the part moves as little as it can. Six locators give M = J^-1. Of more than six the
+        two-sided ones are kept exactly, and the one-sided ones as well as it goes, in the sense of least squares.
         """
         J, centre = self.matrix
         if self.floating is not None:
@@ -124,7 +124,7 @@ class Locators:
             names = self._contradicting(two_sided)
             held = f"{names} hold the same, so they contradict each other and leave a direction free; " if names else ""
             raise GeometryFault(
-                f"its {len(J)} locators do not fix it: {held}the locator matrix has condition number {condition:.1e}, the limit is "
-                f"{CONDITION_LIMIT:.0e}; the points of the primary face must not lie on a line, and the directions "
+                f"its {len(J)} locators do not fix it: {held}the locator matrix has condition number {condition:.1e}, the "
+                f"limit is {CONDITION_LIMIT:.0e}; the points of the primary face must not lie on a line, and the directions "
                 "together must constrain all three translations and all three rotations"
             )

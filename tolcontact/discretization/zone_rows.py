@@ -9,6 +9,7 @@ from tolcontact.declaration.feature_tolerance import ORIENTATIONS
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.feature_geometry import FeatureGeometry, axis_rows
 
+RUNOUTS = ("circular run-out", "total run-out")
 ACROSS = 0.999  # of a direction: how much of it must lie across an axis
 
 
@@ -18,35 +19,33 @@ def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: 
     Raises GeometryFault if features of that kind cannot have the tolerance.
     """
     kind, count = tolerance.kind, len(feature.names)
+    _check_kind(tolerance, feature)
+    if kind == "flatness":
+        return np.zeros((0, 1, count))
+    if kind == "profile" or not (feature.is_axis or kind in ORIENTATIONS or kind in RUNOUTS):
+        return feature.extremes
+    if feature.is_plane:
+        return _halved_differences(feature)
+    if kind in ORIENTATIONS:
+        return _at(tolerance, feature, np.array([1.0]), tilt_only=True)
+    if kind == "circular run-out":
+        return axis_rows(np.array([0.0]), count)
+    return _at(tolerance, feature, _places(tolerance, feature, primary))
+
+
+def _check_kind(tolerance: GeometricTolerance, feature: FeatureGeometry) -> None:
+    kind = tolerance.kind
     if kind == "flatness":
         _need(tolerance, feature, feature.is_plane, "planes")
-        return np.zeros((0, 1, count))
-    if kind in ORIENTATIONS:
+    elif kind in ORIENTATIONS or kind in RUNOUTS:
         _need(tolerance, feature, feature.is_plane or feature.is_axis, "planes, cylinders and cones")
-        return _halved_differences(feature) if feature.is_plane else _at(tolerance, feature, np.array([1.0]), tilt_only=True)
-    if kind in ("circular run-out", "total run-out"):
-        _need(tolerance, feature, feature.is_plane or feature.is_axis, "planes, cylinders and cones")
-        if feature.is_plane:
-            return _halved_differences(feature)
-        return axis_rows(np.array([0.0] if kind == "circular run-out" else [-1.0, 1.0]), count)
-    if kind == "profile":
-        return feature.extremes
-    if feature.kind == "general":
-        raise GeometryFault(
-            f"{kind} needs a plane, cylinder, cone or sphere, and its face is none of these to within 1 um; use tc.Profile"
-        )
-    if kind == "coaxiality":
+    elif kind == "coaxiality":
         _need(tolerance, feature, feature.is_axis or feature.kind == "sphere", "cylinders, cones and spheres")
-    if kind == "symmetry":
-        _need(
-            tolerance,
-            feature,
-            feature.kind == "planes" or tolerance.zone == "flat",
-            'two opposed planes, or axes with zone="flat"',
-        )
-    if not feature.is_axis:
-        return feature.extremes
-    return _at(tolerance, feature, _places(tolerance, feature, primary))
+    elif kind == "symmetry":
+        between = feature.kind == "planes" or (feature.is_axis and tolerance.zone == "flat")
+        _need(tolerance, feature, between, 'two opposed planes, or axes with zone="flat"')
+    elif kind == "position" and feature.kind == "general":
+        raise GeometryFault("position needs a plane, cylinder, cone or sphere, and its face is none of these; use tc.Profile")
 
 
 def _need(tolerance: GeometricTolerance, feature: FeatureGeometry, has_it: bool, wanted: str) -> None:

@@ -25,9 +25,18 @@ def face_height(face: FaceDeviation | None, deviations: ca.SX) -> ca.SX:
     return ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
 
 
-def facing_pose(pair: ContactPoints, X_WM: Pose, X_WR: Pose | None, deviations: ca.SX) -> Pose:
-    """X_RM of a pair: the pose of its moving face in the frame of its reference face; X_WR of the ground is None."""
-    moving, reference = (face_pose(face, deviations) for face in pair.deviating)
+def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pose | None]:
+    """The poses of the moving and the reference face of a pair in their parts."""
+    moving, reference = pair.deviating
+    return face_pose(moving, deviations), face_pose(reference, deviations)
+
+
+def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose | None) -> Pose:
+    """X_RM of a pair: the pose of its moving face in the frame of its reference face; X_WR of the ground is None.
+
+    `faces` are the poses of the two in their parts.
+    """
+    moving, reference = faces
     of_moving = X_WM if moving is None else X_WM @ moving
     if X_WR is None:
         return of_moving

@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
 from tolcontact.discretization import Nominal
-from tolcontact.mechanics.face_pose import facing_pose
+from tolcontact.mechanics.face_pose import face_poses, facing_pose
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.pose import Pose, pose_of
 from tolcontact.method import Method
@@ -52,7 +53,13 @@ class Setting:
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
         """X_RM of the faces of the group's pairs."""
         found = []
-        for pair in (self.nominal.pairs[index] for index in self.group.pairs):
+        for index, faces in zip(self.group.pairs, self._faces, strict=True):
+            pair = self.nominal.pairs[index]
             reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
-            found.append(facing_pose(pair, poses[self.group.position(pair.moving)], reference, self.deviations))
+            found.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
         return found
+
+    @cached_property
+    def _faces(self) -> list[tuple[Pose | None, Pose | None]]:
+        """Poses of the faces of the group's pairs in their parts: expressions that all else shares."""
+        return [face_poses(self.nominal.pairs[index], self.deviations) for index in self.group.pairs]

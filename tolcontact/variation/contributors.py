@@ -112,16 +112,16 @@ class Contributors:
             rows = layer.rows @ seen
             self._check(own, layer, first=not len(known))
             width = float(tolerance.width) or self._unit(own, tolerance, first=not len(known))
-            s, is_drawn = _spreads(own, layer, rows, known, count, width)
-            known = np.concatenate([known, np.where(is_drawn, s, 0.0)])
+            spread = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
+            s = spread(rows, known, count, width)
+            known = np.concatenate([known, np.full(count, s)])
             mean = _mean(own, layer, s)
             if tolerance.rule in JOINT:
-                self.together.append(Together(columns, _joint(tolerance.rule, rows, s, is_drawn, width)))
+                self.together.append(Together(columns, _joint(tolerance.rule, rows, s, width)))
             if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
                 self.bonuses.append(Bonus(columns, own.size_column, _growth(own, tolerance, width)))
             for k in range(count):
-                spread = s / tolerance.cp if is_drawn[k] else 0.0
-                yield Contributor(next(labels), FEATURE, "mm", layer=layer, spread=spread, mean=float(mean[k]))
+                yield Contributor(next(labels), FEATURE, "mm", layer=layer, spread=s / tolerance.cp, mean=float(mean[k]))
             column += count
         if own.feature.size is not None:
             yield Contributor(next(labels), FEATURE, "mm", own.feature.size.tolerance)
@@ -133,10 +133,8 @@ class Contributors:
                 own, f'{layer.tolerance.word}: the rule "{rule}" is for features with one tolerance of place or orientation; '
                 f'choose "{INSIDE}" or "{EXTREMES}"'
             )  # fmt: skip
-        if rule == "polar" and (layer.rows.shape[1] != 2 or own.geometry.kind != "cylinder"):
+        if rule == "polar" and not (own.geometry.is_axis and layer.rows.shape[1] == layer.added.shape[1] == 2):
             self._refuse(own, f'{layer.tolerance.word}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
-        if rule in ("translation", "polar") and not _is_translation(own, layer).any():
-            self._refuse(own, f'{layer.tolerance.word}: the rule "{rule}" leaves nothing, as its datums lock tilts alone')
 
     def _unit(self, own: NominalFeature, tolerance: GeometricTolerance, *, first: bool) -> float:
         """The width for which a zone is scaled that has none but its bonus: 1 mm."""
@@ -151,23 +149,6 @@ class Contributors:
         feature = own.feature
         where = f'part "{feature.part.name}": feature "{feature.name}" ({feature.declared_at})'
         raise ModelError(self._nominal.assembly.name, [f"{where}: {fault}"])
-
-
-def _is_translation(own: NominalFeature, layer: Layer) -> np.ndarray:
-    """Which added directions (component,) do not turn the feature."""
-    turned = own.geometry.twists[3:] @ layer.added
-    return np.asarray(np.abs(turned).max(axis=0) < 1e-12)
-
-
-def _spreads(
-    own: NominalFeature, layer: Layer, rows: np.ndarray, known: np.ndarray, count: int, width: float
-) -> tuple[float, np.ndarray]:
-    """The standard deviation of the added components before `cp`, and which of them are drawn (component,)."""
-    rule = layer.tolerance.rule
-    is_drawn = _is_translation(own, layer) if rule in ("translation", "polar") else np.ones(count, dtype=bool)
-    kept = np.concatenate([np.arange(len(known)), len(known) + np.flatnonzero(is_drawn)])
-    spread = zones.extreme_spread if rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
-    return spread(rows[..., kept], known, int(is_drawn.sum()), width), is_drawn
 
 
 def _mean(own: NominalFeature, layer: Layer, s: float) -> np.ndarray:
@@ -198,12 +179,10 @@ def bonus(own: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) 
     return np.maximum(size - limits.lower if from_lower else limits.upper - size, 0.0)
 
 
-def _joint(
-    rule: str, rows: np.ndarray, s: float, is_drawn: np.ndarray, width: float
-) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:
+def _joint(rule: str, rows: np.ndarray, s: float, width: float) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:
     """How components (n, component) are drawn together."""
     if rule == "polar":
-        return lambda uniforms: _polar(uniforms(0), s, is_drawn)
+        return lambda uniforms: _polar(uniforms(0), s)
     far = zones.reach(rows, width)
 
     def attempt(u: np.ndarray) -> np.ndarray:
@@ -222,10 +201,7 @@ def _joint(
     return draw
 
 
-def _polar(u: np.ndarray, s: float, is_drawn: np.ndarray) -> np.ndarray:
+def _polar(u: np.ndarray, s: float) -> np.ndarray:
     """Two components with a uniform angle and a normal radius."""
-    found = np.zeros((len(u), len(is_drawn)))
-    first, second = np.flatnonzero(is_drawn)
-    angle, radius = np.pi * u[:, second], s * ndtri(u[:, first])
-    found[:, first], found[:, second] = radius * np.cos(angle), radius * np.sin(angle)
-    return found
+    angle, radius = np.pi * u[:, 1], s * ndtri(u[:, 0])
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])

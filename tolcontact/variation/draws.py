@@ -1,7 +1,7 @@
 """Sample: everything that varies becomes deviations.
 
-The draw of a contributor in realization k depends on the seed, the contributor's label and k alone (if it is correlated, also on
-the labels of the others): not on blocks, or on the order in which they were declared.
+The draw of a contributor in realization k depends on the seed, the contributor's label and k alone (if it is correlated, on the
+labels of the others, too): not on blocks, or on the order of declarations.
 """
 
 import numpy as np

@@ -44,8 +44,8 @@ True
 
 `methods=[{"resolution": "linearized"}, {"resolution": "exact"}]` compares methods in the same way.
 
-`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside of
-every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
+`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside
+of every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
 
 `tc.summarize` gives the statistics of results, or of the archive of that path (see `tolcontact.statistics`).
 

@@ -1,0 +1,83 @@
+"""Parts with a feature of every kind and a tolerance of every kind."""
+
+import numpy as np
+import trimesh
+
+import tolcontact as tc
+from tests.cases.frames import STILL, Frame
+from tests.cases.round_contact import BARREL
+
+BORE = tc.Cylinder(inner=True)
+
+
+def block_with(feature: str, *tolerances, frame: Frame = STILL, **datums) -> tc.Assembly:
+    """A fixed block of 100 x 50 x 10 with datums A (bottom), B (side), C (end), and tolerances of its top, end or thickness."""
+    a = tc.Assembly("block")
+    b = a.part("block", tc.Box(100, 50, 10), **frame.place(10, 20, 30), fixed=True)
+    b.feature("bottom", b.face("-z"), *datums.get("A", ()), datum="A")
+    if feature != "width":
+        b.feature("side", b.face("-y"), *datums.get("B", ()), datum="B")
+    b.feature("end", b.face("-x"), *datums.get("C", ()), datum="C")
+    faces = {"top": ["+z"], "far": ["+x"], "width": ["+y", "-y"]}[feature]
+    own = b.feature(feature, *map(b.face, faces), *tolerances)
+    for name, point in {"corner": (100, 50, 10), "middle": (50, 25, 10), "edge": (100, 25, 10)}.items():
+        a.measure(name, own.point(*point), along=frame.along(0, 0, 1))
+    return a
+
+
+def ring_with(feature: str, *tolerances, frame: Frame = STILL) -> tc.Assembly:
+    """A fixed ring of 10 x 40 x 30, with datums A (bottom) and B (rim), and tolerances of its bore, or of its top."""
+    a = tc.Assembly("ring")
+    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(5, 20, 30, sections=48)), **frame.place(5, -7, 3), fixed=True)
+    ring.feature("bottom", ring.face("-z"), datum="A")
+    ring.feature("rim", ring.face(BARREL), datum="B")
+    own = ring.feature(feature, ring.face(BORE if feature == "bore" else "+z"), *tolerances)
+    point = own.axis(1) if feature == "bore" else own.point(0, 0, 15)
+    a.measure("x", point, along=frame.along(1, 0, 0))
+    a.measure("z", point, along=frame.along(0, 0, 1))
+    return a
+
+
+def ball_with(*tolerances, frame: Frame = STILL) -> tc.Assembly:
+    """A fixed block with a ball on it, which is toleranced to its faces."""
+    a = tc.Assembly("ball")
+    base = trimesh.creation.box(extents=(40, 40, 10))
+    sphere = trimesh.creation.icosphere(subdivisions=3, radius=6).apply_translation((3, 2, 20))
+    part = a.part("base", tc.Mesh(trimesh.util.concatenate([base, sphere])), **frame.place(0, 0, 0), fixed=True)
+    for letter, (direction, height) in {"A": ("-z", 5), "B": ("-x", 20), "C": ("-y", 20)}.items():
+        axis = "xyz".index(direction[1])
+        part.feature(letter, part.face(direction, lambda c, n, k=axis, h=height: abs(c[:, k] + h) < 1e-9), datum=letter)
+    own = part.feature("ball", part.face(lambda c, n: np.linalg.norm(c - (3, 2, 20), axis=1) < 7), *tolerances)
+    a.measure("x", own.axis(0), along=frame.along(1, 0, 0))
+    return a
+
+
+EVERY = {  # of the kinds that move features; all state 99.73 % inside
+    "size of planes": lambda frame: block_with("width", tc.Size(50, 0.1, -0.05), frame=frame),
+    "size of a bore": lambda frame: ring_with("bore", tc.Size(10, 0.05, 0.01), frame=frame),
+    "position of a plane": lambda frame: block_with("far", tc.Position(0.2, "A|B|C"), frame=frame),
+    "position of an axis": lambda frame: ring_with("bore", tc.Position(0.2, "A|B"), frame=frame),
+    "position in a flat zone": lambda frame: ring_with("bore", tc.Position(0.2, "A|B", zone="flat", along="x"), frame=frame),
+    "projected position": lambda frame: ring_with("bore", tc.Position(0.2, "A|B", projected=25), frame=frame),
+    "position with a bonus": lambda frame: ring_with(
+        "bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", material="M"), frame=frame
+    ),
+    "bonus alone": lambda frame: ring_with("bore", tc.Size(10, 0.2, 0.1), tc.Position(0, "A|B", material="M"), frame=frame),
+    "position of a centre": lambda frame: ball_with(tc.Position(0.2, "A|B|C"), frame=frame),
+    "position as far as datums lock it": lambda frame: ring_with("bore", tc.Position(0.2, "A"), frame=frame),
+    "symmetry": lambda frame: block_with("width", tc.Size(50, 0.1), tc.Symmetry(0.1, "A|C"), frame=frame),
+    "coaxiality": lambda frame: ring_with("bore", tc.Coaxiality(0.1, "B"), frame=frame),
+    "profile": lambda frame: block_with("top", tc.Profile(0.3, "A", outside=0.2), frame=frame),
+    "parallelism": lambda frame: block_with("top", tc.Parallelism(0.1, "A"), frame=frame),
+    "perpendicularity to one": lambda frame: block_with("far", tc.Perpendicularity(0.1, "A"), frame=frame),
+    "perpendicularity of an axis": lambda frame: ring_with("bore", tc.Perpendicularity(0.1, "A"), frame=frame),
+    "angularity": lambda frame: block_with("far", tc.Angularity(0.1, "A|B"), frame=frame),
+    "circular run-out": lambda frame: ring_with("bore", tc.CircularRunout(0.1, "B"), frame=frame),
+    "total run-out": lambda frame: ring_with("bore", tc.TotalRunout(0.1, "B"), frame=frame),
+    "axial run-out": lambda frame: ring_with("top", tc.TotalRunout(0.1, "B"), frame=frame),
+    "orientation within location": lambda frame: block_with("top", tc.Profile(0.3, "A"), tc.Parallelism(0.1, "A"), frame=frame),
+    "composite": lambda frame: ring_with("bore", tc.Position(0.4, "A|B"), tc.Position(0.1, "A"), frame=frame),
+    "datums that deviate": lambda frame: block_with(
+        "far", tc.Position(0.2, "B|A"), frame=frame, B=(tc.Perpendicularity(0.2, "A"),)
+    ),
+}

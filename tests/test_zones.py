@@ -1,0 +1,121 @@
+"""From zones to spreads: the table of known factors, other rules, and populations that are measured back."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+import tolcontact as tc
+from tests.cases import Frame, toleranced
+from tolcontact.discretization import discretize
+from tolcontact.variation import Draws
+from tolcontact.variation.zones import equal_spread, share_inside
+
+MOVED = Frame(turn=(0.4, -1.1, 2.0), shift=(1000, -700, 300))
+SAMPLES = 20_000
+FACTORS = {  # t / s for 99.73 % inside; the first ten from VARIATION's table, computed by others with 4e6 draws
+    "size": (lambda: toleranced.ring_with("bore", tc.Size(10, 0.5)), 6.000),
+    "orientation, one tilt": (lambda: toleranced.block_with("far", tc.Perpendicularity(1, "A")), 6.000),
+    "orientation": (lambda: toleranced.block_with("top", tc.Parallelism(1, "A")), 9.07),
+    "location, rectangle": (lambda: toleranced.block_with("top", tc.Profile(1, "A")), 11.77),
+    "location, disk": (lambda: toleranced.ring_with("top", tc.Profile(1, "A")), 10.02),
+    "axis, tilt": (lambda: toleranced.ring_with("bore", tc.Perpendicularity(1, "A")), 6.88),
+    "axis, shift": (lambda: toleranced.ring_with("bore", tc.Position(1, "A|B", rule="translation")), 6.88),
+    "axis": (lambda: toleranced.ring_with("bore", tc.Position(1, "A|B")), 7.28 * np.sqrt(2)),  # ends, of shift and tilt
+    "axis between planes": (
+        lambda: toleranced.ring_with("bore", tc.Position(1, "A|B", zone="flat", along="y")), 6.42 * np.sqrt(2)
+    ),
+    "centre": (lambda: toleranced.ball_with(tc.Position(1, "A|B|C")), 7.53),
+    "at the extremes, rectangle": (
+        lambda: toleranced.block_with("top", tc.Profile(1, "A", rule="6 sigma at the extremes")), 10.39
+    ),
+    "at the extremes, axis": (
+        lambda: toleranced.ring_with("bore", tc.Position(1, "A|B", rule="6 sigma at the extremes")), 6 * np.sqrt(2)
+    ),
+    "capable": (lambda: toleranced.block_with("top", tc.Parallelism(1, "A", cp=1.5)), 9.07 * 1.5),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", FACTORS)
+def test_spreads_are_those_of_the_table(name):
+    model, factor = FACTORS[name]
+    contributors = Draws(discretize(model())).contributors.every
+    spreads = [each.spread for each in contributors if each.layer is not None] or [contributors[-1].tolerance.width / 6]
+    assert spreads == pytest.approx([1 / factor] * len(spreads), rel=2e-3)
+
+
+def test_the_share_inside_is_that_of_draws():
+    rng = np.random.default_rng(0)
+    for entries, components in ((1, 3), (2, 4), (3, 3), (1, 6)):
+        rows, sds = rng.normal(size=(7, entries, components)), rng.uniform(0.02, 0.1, size=components)
+        width = equal_spread(rows, sds[:0], components, 1.0) and 1.0
+        drawn = rng.normal(size=(400_000, components)) * sds
+        inside = (np.linalg.norm(np.einsum("pec,nc->npe", rows, drawn), axis=2).max(axis=1) <= width / 2).sum()
+        low, high = binom.interval(0.9999, len(drawn), share_inside(rows, sds, width))
+        assert low - 40 <= inside <= high + 40  # the directions' own error: 1e-4
+
+
+@pytest.mark.parametrize("name", toleranced.EVERY)
+def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
+    found = tc.check_population(toleranced.EVERY[name](toleranced.STILL), samples=SAMPLES, seed=3)
+    assert found.sizes["zone"]
+    for zone in range(found.sizes["zone"]):
+        stated, inside = float(found.stated_share[zone]), float(found.share_inside[zone, 0]) * SAMPLES
+        low, high = binom.interval(0.9999, SAMPLES, stated if np.isfinite(stated) else 0.9973)
+        assert low <= inside and (inside <= high or not np.isfinite(stated)), str(found.zone_tolerance[zone].values)
+    moved = tc.check_population(toleranced.EVERY[name](MOVED), samples=SAMPLES, seed=3)
+    assert (moved.share_inside.values == found.share_inside.values).all()
+    assert moved.needed_width.values == pytest.approx(found.needed_width.values, rel=1e-9)
+
+
+@pytest.mark.parametrize("rule", ["truncated", "uniform"])
+@pytest.mark.parametrize("kind", ["top", "bore"])
+def test_features_outside_are_left_out(rule, kind):
+    tolerance = tc.Profile(0.2, "A", rule=rule) if kind == "top" else tc.Position(0.2, "A|B", rule=rule)
+    model = (toleranced.block_with if kind == "top" else toleranced.ring_with)(kind, tolerance)
+    assert float(tc.check_population(model, samples=SAMPLES).share_inside[0, 0]) == 1
+    drawn = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES)
+    assert (Draws(discretize(model))(seed=1, start=5000, stop=5100) == drawn[5000:5100]).all()
+    if rule == "uniform":  # the T-Map reading: sd of a corner t / 3.65, of an axis' end t / 4.00
+        extreme, factor = (drawn.sum(axis=1), 3.65) if kind == "top" else (drawn[:, 0] + drawn[:, 2], 4.00)
+        assert 0.2 / extreme.std() == pytest.approx(factor, rel=0.02)
+
+
+def test_polar_draws_have_a_normal_radius_and_any_angle():
+    model = toleranced.ring_with("bore", tc.Position(0.2, "A|B", rule="polar"))
+    x, y = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
+    assert 0.2 / x.std() == pytest.approx(8.48, rel=0.02) and 0.2 / y.std() == pytest.approx(8.48, rel=0.02)
+    assert np.hypot(x, y).std() ** 2 + np.hypot(x, y).mean() ** 2 == pytest.approx((0.2 / 6) ** 2, rel=0.03)
+
+
+def test_the_bonus_fills_the_zone_of_each_part():
+    """Hole 10 +0.1/0, position 0.2 M: the spread grows by 25 %, with the part's own size."""
+    said = {"material": "M", "rule": "translation"}
+    spread = {}
+    for bonus in ("fills", "accepts", "none"):
+        model = toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said))
+        x, _, size = Draws(discretize(model))(seed=1, start=0, stop=SAMPLES).T
+        spread[bonus] = x.std()
+        if bonus == "fills":
+            plain = x / (1 + np.maximum(size, 0) / 0.2)
+    assert spread["fills"] / spread["none"] == pytest.approx(1.25, rel=0.01) and spread["accepts"] == spread["none"]
+    assert plain.std() == pytest.approx(spread["none"], rel=1e-12)
+    shares = [
+        float(tc.check_population(
+            toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", bonus=bonus, **said)), samples=SAMPLES
+        ).share_inside[1, 0])
+        for bonus in ("accepts", "none")
+    ]  # fmt: skip
+    assert shares[0] > 0.9995 and shares[1] == pytest.approx(0.9973, abs=0.0015)
+
+
+def test_capability_and_shifts():
+    size = tc.Size(10, 0.1, -0.02, cp=1.33, cpk=1.0)
+    drawn = Draws(discretize(toleranced.ring_with("bore", size)))(seed=1, start=0, stop=SAMPLES)[:, -1]
+    sigma = 0.12 / 6 / 1.33
+    assert drawn.std() == pytest.approx(sigma, rel=0.02)
+    assert (0.1 - drawn.mean()) / 3 / sigma == pytest.approx(1.0, abs=0.02)  # Cpk itself
+    shifted = tc.Tolerance(0.6, "uniform", shift=0.25)
+    assert str(shifted) == "uniform, range 0.6 mm, shifted by 0.25 mm"
+    other = tc.Size(10, 0.1, -0.02, distribution=norm(0.03, 0.01))
+    drawn = Draws(discretize(toleranced.ring_with("bore", other)))(seed=1, start=0, stop=SAMPLES)[:, -1]
+    assert drawn.mean() == pytest.approx(0.03, abs=3e-4) and drawn.std() == pytest.approx(0.01, rel=0.02)
