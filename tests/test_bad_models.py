@@ -113,7 +113,7 @@ MISTAKES = {
     ),
     "seven two-sided locators": (
         {"top": COLLINEAR.replace("(0, 10, 5)]", "(0, 10, 5), (5, 20, 0)]").replace("zzzyyx", "zzzyyxz")},
-        ['part "top"', "7 locators", "at most six"],
+        ['part "top"', "7 locators", "over-constrained"],
     ),
     "no measure": ({"measure": ""}, ["measures nothing"]),
     "no assembly() at all": ({"whole": "x = 1\n"}, ["model.py", "no function assembly()"]),

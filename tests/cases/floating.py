@@ -128,17 +128,13 @@ def lid_on_studs(
     return a
 
 
-def drawn_of_lid(results) -> tuple[np.ndarray, np.ndarray]:
-    """How far each hole of the lid is off its stud (realization, hole, 2) [mm], and half of what diameters differ by."""
+def drawn_of_lid(results) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Shifts of the lid's holes and of the studs (realization, 4, 2) [mm], and half of the holes' deviations in size."""
     drawn = results["sample"].deviation
-    off = np.stack(
-        [
-            [
-                drawn.sel(contributor=f"lid.H{k}.shift {axis}") - drawn.sel(contributor=f"base.S{k}.shift {axis}")
-                for axis in "xy"
-            ]
-            for k in range(4)
-        ]
-    )
-    room = np.stack([drawn.sel(contributor=f"lid.H{k}.size") for k in range(4)]) / 2
-    return off.transpose(2, 0, 1), room.T
+
+    def shifts(part: str) -> np.ndarray:
+        of = [[drawn.sel(contributor=f"{part}{k}.shift {axis}").values for axis in "xy"] for k in range(4)]
+        return np.array(of).transpose(2, 0, 1)
+
+    sizes = np.array([drawn.sel(contributor=f"lid.H{k}.size").values for k in range(4)])
+    return shifts("lid.H"), shifts("base.S"), sizes.T / 2

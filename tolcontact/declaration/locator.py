@@ -157,8 +157,8 @@ class Location(Readable):
         count = "1 locator" if len(scheme) == 1 else f"{len(scheme)} locators"
         if len(scheme) < 6 and not self.floating:
             yield (
-                f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) if "
-                "contact holds it in the other directions"
+                f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
+                "if contact holds it in the other directions"
             )
         elif len(two_sided) > 6:
             idle = ", ".join(locator.name for locator in _repeating(two_sided))

@@ -7,6 +7,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.curvature import chord_height
 from tolcontact.discretization.edges import CREASE, rim
 from tolcontact.discretization.round_points import RoundPoint
 from tolcontact.discretization.round_walls import NotRoundError, arc, directions, tangent, touched
@@ -17,6 +18,7 @@ PARALLEL = 1e-3  # rad: how far the axis of a shaft may stand off its wall's
 MARGIN = math.radians(5.0)  # between where a shaft that is not round all about touches, and its ends
 STATIONS = 200  # places along an axis that are looked at
 HALVINGS = 40
+ASIDE = 0.3  # sine of half the angle between facets, at most
 CLOSE = 1e-6  # of a face's size: what is no farther apart is in one place
 FLAT = 1e-7  # between normals of neighbouring triangles of one plane
 
@@ -129,12 +131,16 @@ def _on_plane(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[R
     if opening < math.pi and -n @ towards < math.cos(max(opening - MARGIN, 0)):
         raise NotRoundError  # a little turn, and its edge or the face beside it touches
 
+    # Beside a flat triangle's rim what lies on the round face stands aside by some of the height between the two.
+    slacks = [CLOSE * piece.surface.mesh.scale + ASIDE * chord_height(piece.surface) for piece in (body, wall)]
+
     def touches(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whether the shaft, and the wall, is where they would touch at places s (place,) [mm] along the axis."""
         line = shaft.origin + np.atleast_1d(s)[:, None] * shaft.axis - shaft.radius * n
         feet = line - ((line - wall.form.origin) @ n)[:, None] * n
         return tuple(  # type: ignore[return-value]
-            piece.surface.overhang(places) <= CLOSE * piece.surface.mesh.scale for piece, places in ((body, line), (wall, feet))
+            surface.overhang(where) <= slack
+            for surface, where, slack in ((body.surface, line, slacks[0]), (wall.surface, feet, slacks[1]))
         )
 
     start, end = _extent(body.surface, shaft)

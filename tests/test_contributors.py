@@ -1,0 +1,142 @@
+"""What varies together: shared causes, correlation, measured populations. Draws depend on seed, label and number alone."""
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tests.cases import toleranced
+from tolcontact.discretization import discretize
+from tolcontact.testing import assert_gaps_recompute, assert_same_run
+from tolcontact.variation import Draws
+from tolcontact.variation.uniforms import STREAM
+
+SAMPLES = 20_000
+
+
+def draws_of(model, start=0, stop=SAMPLES):
+    nominal = discretize(model)
+    found = Draws(nominal)(seed=4, start=start, stop=stop)
+    return {label: found[:, k] for k, label in enumerate(nominal.contributors)}
+
+
+def correlated(*labels, matrix):
+    a = cases.ra1()
+    a.correlate(labels, matrix)
+    return a
+
+
+def test_correlated_draws_have_their_correlation_and_their_own_distributions():
+    labels = ("top.A1", "top.A2", "base.C1")
+    matrix = np.array([[1, 0.8, -0.3], [0.8, 1, 0.1], [-0.3, 0.1, 1]])
+    drawn = draws_of(correlated(*labels, matrix=matrix))
+    found = np.corrcoef([drawn[label] for label in labels])
+    low, high = (np.tanh(np.arctanh(matrix - np.eye(3)) + sign * 3.9 / np.sqrt(SAMPLES - 3)) for sign in (-1, 1))
+    off = ~np.eye(3, dtype=bool)
+    assert (low[off] < found[off]).all() and (found[off] < high[off]).all()
+    alone = draws_of(cases.ra1())
+    assert (drawn["top.A1"] == pytest.approx(alone["top.A1"], abs=1e-12)) and (drawn["top.B1"] == alone["top.B1"]).all()
+    for label in labels:
+        assert stats.kstest(drawn[label], "norm", (0, alone[label].std())).pvalue > 1e-3
+
+
+def test_marginals_of_other_shapes_stay():
+    a = tc.Assembly("uniform")
+    top = a.part("top", tc.Box(50, 25, 10))
+    a.locate(top, tc.three_two_one(top.face("-z"), top.face("-y"), top.face("-x")), tolerance=tc.Tolerance(0.6, "uniform"))
+    a.measure("x", top.point(0, 0, 0), along="x")
+    a.correlate(["top.A1", "top.A2"], -0.7)
+    drawn = draws_of(a)
+    for label in ("top.A1", "top.A2"):
+        assert stats.kstest(drawn[label], "uniform", (-0.3, 0.6)).pvalue > 1e-3
+    rank = stats.spearmanr(drawn["top.A1"], drawn["top.A2"]).statistic
+    assert rank == pytest.approx(6 / np.pi * np.arcsin(-0.7 / 2), abs=0.02)
+
+
+def with_everything():
+    a = toleranced.block_with("top", tc.Profile(0.3, "A", rule="uniform"))
+    block = a.parts[0]
+    block.feature("far", block.face("+x"), tc.Position(0.2, "A|B|C"))
+    a.variable("warmth", tc.Tolerance(20, "uniform"), drives={"block.top.offset": 0.002, "block.far.offset": -0.001}, units="K")
+    a.correlate(["block.far.tilt y", "block.far.tilt z"], 0.5)
+    rows = np.random.default_rng(1).normal(size=(7, 1)) * [0.01]
+    a.population(pd.DataFrame(rows, columns=["measured"]), {"block.far.offset": "measured"})
+    return a
+
+
+def test_draws_do_not_depend_on_blocks():
+    whole = draws_of(with_everything(), 0, 3 * STREAM)
+    for start, stop in ((0, 1), (1000, 1003), (STREAM - 2, STREAM + 3), (2 * STREAM, 3 * STREAM)):
+        part = draws_of(with_everything(), start, stop)
+        for label, values in part.items():
+            assert (values == whole[label][start:stop]).all(), label
+
+
+def test_a_shared_cause_drives_all_that_it_names():
+    drawn, alone = draws_of(with_everything()), draws_of(toleranced.block_with("top", tc.Profile(0.3, "A", rule="uniform")))
+    assert drawn["block.top.offset"] == pytest.approx(alone["block.top.offset"] + 0.002 * drawn["warmth"], abs=1e-15)
+    assert np.ptp(drawn["warmth"]) == pytest.approx(20, rel=1e-3)
+    results = tc.run(with_everything(), samples=300)
+    sample = results["sample"].to_dataset()
+    assert sample["contributor_units"].sel(contributor="warmth") == "K"
+    assert sample["source"].sel(contributor=["block.top.offset", "warmth"]).values.tolist() == ["feature", "variable"]
+    assert_gaps_recompute(results)
+    assert_same_run(results, tc.run(tc.model_of(results), samples=300))
+
+
+@pytest.mark.parametrize("kind", ["frame", "dataset", "csv", "mapping"])
+def test_rows_of_a_population_stay_together(kind, tmp_path):
+    rng = np.random.default_rng(0)
+    first = rng.normal(size=50) * 0.1
+    table = {"one": first, "two": -2 * first + 0.01}
+    sources = {
+        "frame": pd.DataFrame(table),
+        "dataset": xr.Dataset({name: ("part", values) for name, values in table.items()}),
+        "mapping": table,
+        "csv": tmp_path / "Maße, gemessen.csv",
+    }
+    pd.DataFrame(table).to_csv(sources["csv"], index=False)
+    a = cases.ra1()
+    a.population(sources[kind], {"top.A1": "one", "top.A2": "two"})
+    drawn = draws_of(a)
+    assert drawn["top.A2"] == pytest.approx(-2 * drawn["top.A1"] + 0.01, abs=1e-12)
+    assert set(np.round(drawn["top.A1"], 12)) == set(np.round(first, 12))
+    counts = np.unique(drawn["top.A1"], return_counts=True)[1]
+    assert stats.chisquare(counts).pvalue > 1e-3
+    results = tc.run(a, samples=100, surfaces=0)
+    assert_same_run(results, tc.run(tc.model_of(results), samples=100, surfaces=0))
+
+
+@pytest.mark.parametrize(
+    ("declare", "said"),
+    [
+        (lambda a: a.correlate(["top.A1", "top.A2"], 1.5), "not positive definite"),
+        (lambda a: a.correlate(["top.A1", "top.A2"], [[1, 0.5], [0.4, 1]]), "not symmetric"),
+        (lambda a: a.correlate(["top.A1", "top.A2"], [[4, 0.5], [0.5, 4]]), "correlation coefficients, not covariances"),
+        (lambda a: a.correlate(["top.A1"], [[1]]), "two or more different labels"),
+        (lambda a: a.correlate(["top.A1", "top.X9"], 0.5), 'unknown contributor "top.X9"; contributors are, for example: top.'),
+        (lambda a: [a.correlate(["top.A1", f"top.A{k}"], 0.5) for k in (2, 3)], "is drawn by correlation"),
+        (lambda a: a.variable("heat", 1, drives={"top.Q": 1}), 'unknown contributor "top.Q"'),
+        (lambda a: a.variable("heat", 1, drives={}), "it drives nothing"),
+        (lambda a: a.variable("top.A1", 1, drives={"top.A2": 1}), 'contributor "top.A1" is declared 2 times'),
+        (lambda a: a.population({"top.A1": [0.1]}), "it has 1 row(s); a population needs two or more"),
+        (lambda a: a.population({"top.A1": [0.1, "wide", 0.2]}), "row 2 of the column for top.A1 is no finite number"),
+        (lambda a: a.population({"top.A1": [0.1, np.nan]}), "row 2 of the column for top.A1 is no finite number"),
+    ],
+)
+def test_wrong_causes_have_one_message(declare, said):
+    a = cases.ra1()
+    declare(a)
+    (fault,) = tc.check(a)
+    assert said in fault and ("test_contributors.py" in fault or "declared 2 times" in fault)
+
+
+def test_tables_that_cannot_be_read_are_named(tmp_path):
+    a = cases.ra1()
+    with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):
+        a.population(tmp_path / "none.csv")
+    with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):
+        a.population({"one": [1, 2], "two": [1, 2]}, {"top.A1": "width"})

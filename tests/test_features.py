@@ -1,0 +1,262 @@
+"""Features: one deviation for all that uses them, closed forms of measures, contacts and locators, archives, datums."""
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+from scipy.stats import binom
+
+import tolcontact as tc
+from tests.cases import Frame, toleranced
+from tests.cases.fasteners import fasteners
+from tests.cases.round_contact import BARREL
+from tolcontact.discretization import discretize
+from tolcontact.simulation import simulate_block
+from tolcontact.simulation.surfaces import check_surfaces
+from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+from tolcontact.variation import Draws
+
+MOVED = Frame(turn=(0.4, -1.1, 2.0), shift=(1000, -700, 300))
+EXACT = tc.Method(resolution="exact")
+
+
+def drawn(results, label):
+    return results["sample"].deviation.sel(contributor=label).values
+
+
+@pytest.mark.parametrize("frame", [toleranced.STILL, MOVED], ids=["still", "moved"])
+def test_points_of_a_plane_move_as_its_offset_and_tilts_say(frame):
+    results = tc.run(toleranced.block_with("top", tc.Profile(0.3, "A|B|C"), frame=frame), samples=500)
+    z, a, b = (drawn(results, f"block.top.{name}") for name in ("offset", "tilt x", "tilt y"))
+    measured = results.measured.sel(state="raw")
+    expected = {"corner": z + a + b, "middle": z, "edge": z + a}
+    for name, value in expected.items():
+        assert np.abs(measured.sel(measure=name).values - value).max() < 2e-6  # turns, to second order
+    assert np.abs(results.measured.sel(state="corrected").values - measured.values).max() == 0
+
+
+def test_spread_of_a_measure_is_that_of_the_closed_form():
+    results = tc.run(toleranced.block_with("top", tc.Profile(0.3, "A")), samples=20_000)
+    summary = tc.summarize(results)["statistic_value"].sel(state="raw", statistic="standard deviation")
+    for name, count in {"corner": 3, "edge": 2, "middle": 1}.items():
+        estimate, low, high = summary.sel(measure=name).values  # twice the interval: three of them are tested
+        low, high = estimate - 2 * (estimate - low), estimate + 2 * (high - estimate)
+        assert low < 0.3 / 11.768 * np.sqrt(count) < high, name
+
+
+def test_opposed_planes_share_their_size_and_their_middle():
+    for moves, shares in {"both": (0.5, 0.5), "first": (1, 0), "second": (0, 1)}.items():
+        a = tc.Assembly("tab")
+        tab = a.part("tab", tc.Box(10, 4, 6), fixed=True)
+        tab.feature("foot", tab.face("-z"), datum="A")
+        tab.feature("width", tab.face("+y"), tab.face("-y"), tc.Size(4, 0.1, moves=moves), tc.Symmetry(0.05, "A"))
+        for name, face in (("up", "+y"), ("down", "-y")):
+            wall = a.part(name, tc.Box(30, 30, 30), at=(-10, 4.5 if name == "up" else -30.5, -10))
+            a.locate(wall, tc.three_two_one(wall.face("-z"), wall.face("-y"), wall.face("-x")), tolerance=0)
+            a.contact(name, moving=wall.face("-y" if name == "up" else "+y"), reference=tab.face(face), within=20)
+        a.measure("x", tab.point(0, 0, 0), along="x")
+        program = tc.build(a)
+        block = simulate_block(program, program.draws(seed=1, start=0, stop=50))
+        size, tilt = (block.deviations[:, program.nominal.contributors.index(f"tab.width.{n}")] for n in ("size", "tilt z"))
+        for pair, (gap, share) in enumerate(zip((0.5, 0.5), shares, strict=True)):
+            leans = np.abs(tilt) if share else 0.0  # a face from which the other's distance is measured stays
+            assert np.abs(block.gap_min[:, 0, pair] - (gap - share * size - leans)).max() < 1e-4
+
+
+def test_slots_widen_against_their_normals():
+    a = tc.Assembly("slot")
+    walls = [trimesh.creation.box(extents=(10, 2, 6)).apply_translation((0, y, 0)) for y in (-3, 3)]
+    part = a.part("slot", tc.Mesh(trimesh.util.concatenate(walls)), fixed=True)
+    inner = [part.face(way, lambda c, n, s=s: s * c[:, 1] > 1.9) for way, s in (("-y", 1), ("+y", -1))]
+    slot = part.feature("slot", *inner, tc.Size(4, 0.1))
+    nominal = discretize(_measured(a, part))
+    geometry = nominal.features[0].geometry
+    assert geometry.is_inner and geometry.size == pytest.approx(4)
+    number = nominal._features.face(nominal.features[0], 0, nominal.parts[0].placement)
+    assert nominal.faces[number].twist[:3, 0] == pytest.approx([0, 0.5, 0]) and slot.name == "slot"
+
+
+def _measured(a, part):
+    a.measure("x", part.point(0, 0, 0), along="x")
+    return a
+
+
+def test_locators_follow_the_faces_that_they_stand_against():
+    """Two equal parts, one with 3-2-1 on features, one with locators `on` them: they move as far as the faces come out."""
+    a = tc.Assembly("held")
+    parts = []
+    for k in range(2):
+        part = a.part(f"p{k}", tc.Box(50, 30, 10), at=(0, 100 * k, 0))
+        part.feature("top", part.face("+z"), datum="A")
+        foot = part.feature("foot", part.face("-z"), tc.Profile(0.3, "A"))
+        parts.append((part, foot))
+    (one, foot), (other, again) = parts
+    a.locate(one, tc.three_two_one(foot, one.face("-y"), one.face("-x")), tolerance=0)
+    feet = [((0, 0, 0), "z"), ((50, 0, 0), "z"), ((25, 30, 0), "z")]
+    rest = [((0, 0, 5), "y"), ((50, 0, 5), "y"), ((0, 15, 5), "x")]
+    held = [tc.Locator(f"Z{k}", p, d, 0, on=again) for k, (p, d) in enumerate(feet)]
+    a.locate(other, [*held, *(tc.Locator(f"S{k}", p, d, 0) for k, (p, d) in enumerate(rest))])
+    for part, _ in parts:
+        for name, point in {"middle": (25, 15, 0), "corner": (0, 0, 0)}.items():
+            a.measure(f"{part.name} {name}", part.point(*point), along="z")
+    a.measure("stays", foot.point(25, 15, 0), along="z")
+    results = tc.run(a, samples=300)
+    measured = results.measured.sel(state="raw")
+    for name in ("p0", "p1"):
+        z, x, y = (drawn(results, f"{name}.foot.{freedom}") for freedom in ("offset", "tilt x", "tilt y"))
+        assert np.abs(measured.sel(measure=f"{name} middle").values - z).max() < 1e-4
+        assert np.abs(measured.sel(measure=f"{name} corner").values - (z - x - y)).max() < 1e-4
+    assert np.abs(measured.sel(measure="stays").values).max() < 1e-4  # the face stands where the locators are
+
+
+def test_supports_follow_their_faces_too():
+    a = tc.Assembly("table", method=tc.Method(resolution="exact", objective="seating"))
+    table = a.part("table", tc.Box(50, 30, 10))
+    table.feature("top", table.face("+z"), datum="A")
+    foot = table.feature("foot", table.face("-z"), tc.Profile(0.3, "A"))
+    corners = [(0, 0, 0), (50, 0, 0), (0, 30, 0), (50, 30, 0)]
+    feet = [tc.Locator(f"Z{k}", p, "z", 0.1, one_sided=True, on=foot) for k, p in enumerate(corners)]
+    rest = [((0, 0, 5), "y"), ((50, 0, 5), "y"), ((0, 15, 5), "x")]
+    a.locate(table, [*feet, *(tc.Locator(f"S{k}", p, d, 0) for k, (p, d) in enumerate(rest))])
+    a.force("weight", at=table.point(20, 15, 5), vector=(0, 0, -9))
+    a.measure("foot", foot.point(20, 15, 0), along="z")
+    results = tc.run(a, samples=200)
+    assert_resolved(results)
+    assert_gaps_recompute(results)
+
+
+def test_one_feature_deviates_once_whatever_uses_it():
+    """The pair does not say that its faces are features; the archive alone gives the gaps again."""
+    a = tc.Assembly("stack")
+    lower = a.part("lower", tc.Box(60, 40, 10), fixed=True)
+    upper = a.part("upper", tc.Box(60, 40, 10), at=(0, 0, 10))
+    lower.feature("under", lower.face("-z"), datum="A")
+    top = lower.feature("top", lower.face("+z"), tc.Profile(0.2, "A"))
+    upper.feature("over", upper.face("+z"), datum="A")
+    foot = upper.feature("foot", upper.face("-z"), tc.Profile(0.1, "A"))
+    a.locate(upper, tc.three_two_one(foot, upper.face("-y"), upper.face("-x")), tolerance=0.05)
+    a.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"))
+    a.measure("gap", top.point(60, 40, 10), to=foot.point(60, 40, 0), along="z")
+    a.measure("expression", lambda poses: (poses.position(foot.point(60, 40, 0)) - poses.position(top.point(60, 40, 10)))[2])
+    results = tc.run(a, samples=2000, method=EXACT, solver="daqp")
+    assert_resolved(results)
+    assert_gaps_recompute(results)
+    gap, same = results.measured.values[:, 1].T
+    assert np.abs(gap - same).max() < 1e-12 and gap.min() > -1e-4  # corners slide over tilted planes: second order
+    assert float(results["surface"].surface_penetration.max()) < 1e-6
+    rebuilt = tc.run(tc.model_of(results), samples=2000, method=EXACT, solver="daqp")
+    assert_same_run(results, rebuilt)
+
+
+@pytest.mark.parametrize("solver", ["qpoases", "daqp"])
+@pytest.mark.parametrize("points", [None, 60])
+def test_diameters_vary_as_offsets(points, solver):
+    """Of exact round contact and of sampled points: the centre of a ball on a plate is as high as half its diameter."""
+    a = tc.Assembly("ball", method=tc.Method(resolution="exact", objective="seating"))
+    plate = a.part("plate", tc.Box(60, 60, 5), at=(-30, -30, -5), fixed=True)
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=10)), at=(0, 0, 10))
+    skin = ball.feature("skin", ball.face(), tc.Size(20, 0.05, -0.1))
+    sides = [tc.Locator(n, (0, 0, 0), d, 0) for n, d in (("X", "x"), ("Y", "y"))]
+    turns = [tc.Locator(n, (0, 0, 5), d, 0) for n, d in (("TX", "x"), ("TY", "y"))]
+    a.locate(ball, [*sides, *turns, tc.Locator("TZ", (5, 0, 0), "y", 0)], floating=True)
+    a.force("weight", at=ball.point(0, 0, 0), vector=(0, 0, -1))
+    reach = {} if points is None else {"points": points, "within": 12}
+    a.contact("foot", moving=skin, reference=plate.face("+z"), **reach)
+    a.measure("height", ball.point(0, 0, 0), along="z")
+    results = tc.run(a, samples=200, solver=solver)
+    assert_resolved(results)
+    assert_gaps_recompute(results)
+    expected = drawn(results, "ball.skin.size") / 2
+    apart = results.measured.sel(state="corrected", measure="height").values - expected
+    assert (
+        np.abs(apart).max() < 1e-9 if points is None else np.ptp(apart) < 0.05 * np.ptp(expected)
+    )  # a point aside grows aside
+    assert float(results["surface"].surface_penetration.max()) < (1e-6 if points is None else 0.5)
+
+
+def test_surfaces_are_checked_as_large_as_they_are():
+    """A pin that outgrows its hole lies in it as deep as it is too large, and one that shrank does not, whatever the shapes."""
+    a = tc.Assembly("fit")
+    plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5, 20, 10, sections=64)), fixed=True)
+    pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=64)))
+    barrel = pin.feature("barrel", pin.face(BARREL), tc.Size(10, 0.1))
+    points = [(4, 0, 0), (-4, 0, 0), (0, 4, 0), (0, 0, 0), (0, 0, 0), (4, 0, 0)]
+    held = [tc.Locator(f"{n}{k}", p, n.lower(), 0) for k, (n, p) in enumerate(zip("ZZZXYY", points, strict=True))]
+    a.locate(pin, held)
+    a.contact("fit", moving=barrel, reference=plate.face(tc.Cylinder(radius=5)))
+    a.measure("x", pin.point(0, 0, 0), along="x")
+    program = tc.build(a, method=EXACT)
+    deviations = np.zeros((2, len(program.nominal.contributors)))
+    deviations[:, -1] = 0.04, -0.04
+    rest = np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), (2, 2, 1))
+    depth = check_surfaces(program, rest, deviations).penetration[:, 0]
+    assert depth == pytest.approx([0.02, 0.0], abs=1e-6)
+
+
+def test_axes_of_an_archive_are_where_the_position_says():
+    results = tc.run(toleranced.ring_with("bore", tc.Position(0.2, "A|B")), samples=300)
+    x = drawn(results, "ring.bore.shift x") + drawn(results, "ring.bore.tilt x")
+    assert np.abs(results.measured.sel(state="raw", measure="x").values - x).max() < 1e-6
+
+
+def test_a_feature_follows_the_datums_that_it_refers_to():
+    """The top, flush to a tilted side B: it turns with it, and shifts as B goes."""
+    side = tc.Perpendicularity(0.5, "A")
+    model = toleranced.block_with("far", tc.Position(0.01, "B|A"), B=(side,))
+    nominal = discretize(model)
+    draws = Draws(nominal)(seed=1, start=0, stop=100)
+    labels = list(nominal.contributors)
+    far = next(each for each in nominal.features if each.feature.name == "far")
+    coordinates = draws[:, : far.coordinates.shape[1]] @ far.coordinates.T
+    tilt_of_side = draws[:, labels.index("block.side.tilt z")]
+    # B tilts about x (along z): the far face is normal to x, which that turns in itself. Parallel to B itself it follows.
+    own = draws[:, [labels.index(f"block.far.{n}") for n in ("tilt y", "tilt z") if f"block.far.{n}" in labels]]
+    assert own.shape[1] and np.abs(coordinates).max() < 0.02 < np.abs(tilt_of_side).max()
+    again = toleranced.block_with("top", tc.Perpendicularity(1e-6, "B"), B=(side,))
+    nominal = discretize(again)
+    draws, top = Draws(nominal)(seed=1, start=0, stop=100), nominal.features[-1]
+    tilts = (draws[:, : top.coordinates.shape[1]] @ top.coordinates.T)[:, top.geometry.names.index("tilt y")]
+    side_tilt = draws[:, list(nominal.contributors).index("block.side.tilt z")]
+    # side -y tilts by t over half its height 5 (outward); the top, square to it, by as much over half its width 25.
+    assert np.abs(tilts) == pytest.approx(np.abs(side_tilt) * 25 / 5, abs=1e-5)
+    assert np.sign(tilts * side_tilt)[0] == np.sign(tilts * side_tilt).mean()
+    points = Rotation.from_rotvec((1e-3, 0, 0)).apply([[50, 0, 10], [50, 50, 10], [50, 0, 5.0 + 5], [50, 0, 0]])
+    top_slope, side_slope = points[1][2] - points[0][2], points[2][1] - points[3][1]
+    assert np.sign(top_slope * -side_slope) == np.sign(tilts * side_tilt)[0]  # outward of the side is -y
+
+
+def test_a_pocket_of_four_freedoms():
+    """CASES C5: P(gap < 0) = 5.22305 % exact."""
+    t = 0.31
+    a = tc.Assembly("pocket")
+    corners = {}
+    for name, length in (("male", 99.8), ("pocket", 100.0)):
+        part = a.part(name, tc.Box(length, 10, 5), fixed=True)
+        part.feature("stop", part.face("-x"), datum="A")
+        # Equal spreads t / 6 of the offset and of both tilts; the second tilt does nothing in the middle of the face.
+        wall = part.feature("wall", part.face("+x"), tc.Position(t / 6 * 11.7683, "A"))
+        corners[name] = [wall.point(length, y, 2.5) for y in (0, 10)]
+    for k in (0, 1):
+        a.measure(f"gap {k}", corners["male"][k], to=corners["pocket"][k], along="x")
+    gaps = tc.run(a, samples=400_000, surfaces=0, fields="none", keep="measures").measured.sel(state="raw").values.min(axis=1)
+    low, high = binom.interval(0.9999, len(gaps), 0.0522305)
+    assert low < (gaps < 0).sum() < high
+    assert gaps.mean() == pytest.approx(0.14170, abs=1e-3) and gaps.std() == pytest.approx(0.08532, abs=1e-3)
+
+
+@pytest.mark.parametrize(("is_fixed", "pull", "distance"), [(True, -3, 47), (True, 3, 53), (False, -3, 46), (False, 3, 54)])
+def test_extremes_of_fasteners(is_fixed, pull, distance):
+    """CASES C4 with float, by contact: all features at the ends of their zones."""
+    program = tc.build(fasteners(is_fixed, pull), solver="daqp")
+    plate, share = ("thread", 0.25) if is_fixed else ("hole", 0.5)
+    sign = np.sign(pull)
+    at = {
+        f"plate.left {plate}.shift x": -sign * share,
+        f"plate.right {plate}.shift x": sign * share,
+        "left.hole.shift x": sign / 2,
+        "right.hole.shift x": -sign / 2,
+    }
+    labels = program.nominal.contributors
+    assert set(at) <= set(labels)
+    block = simulate_block(program, np.array([[at.get(label, 0.0) for label in labels]]))
+    assert block.measured[0, 1, 0] == pytest.approx(distance, abs=1e-9)
