@@ -44,13 +44,6 @@ def opening() -> trimesh.Trimesh:
     return trimesh.util.concatenate(bars)
 
 
-def upright() -> list[tc.Locator]:
-    """Locators of a stop of which only the height varies; the five others are exact."""
-    rest = [((0, 0, 0), "z"), ((0, 2, 0), "z"), ((STOP, 0, 0), "z"), ((0, 0, 0), "x"), ((0, 2, 0), "x")]
-    exact = [tc.Locator(f"held {k + 1}", point, along) for k, (point, along) in enumerate(rest)]
-    return [tc.Locator("height", (STOP / 2, 0, STOP / 2), "y", STOP_Y), *exact]
-
-
 def over(x: float, z: float) -> tc.Inside:
     """What of the door lies over the stop at (x, z)."""
     return tc.Inside((x - STOP / 2, -1, z - STOP / 2), (x + STOP / 2, 1, z + STOP / 2))
@@ -75,8 +68,9 @@ def assembly() -> tc.Assembly:
     )
     for name, (x, z) in STOPS.items():
         stop = model.part(f"{name} stop", tc.Box(STOP, 2, STOP), at=(x - STOP / 2, -2, z - STOP / 2), fixed=True)
-        model.locate(stop, upright(), tolerance=0, on=body)
-        model.contact(name, moving=door.face("-y", over(x, z)), reference=stop.face("+y"), spacing=STOP / 2)
+        stop.feature("foot", stop.face("-y"), datum="A")
+        height = stop.feature("height", stop.face("+y"), tc.Profile(STOP_Y, "A", rule="translation"))
+        model.contact(name, moving=door.face("-y", over(x, z)), reference=height, spacing=STOP / 2)
     for name, (x, z, along) in SEAMS.items():
         at_door = door.point(x, THICKNESS, z)
         across = (x + GAP * (along == "x"), THICKNESS, z + GAP * (along == "z"))

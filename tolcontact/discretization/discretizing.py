@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.doubtful_sizes import warn_of_units
-from tolcontact.discretization.faces import Meshes, triangles
+from tolcontact.discretization.faces import Meshes, kept_triangles
 from tolcontact.discretization.fault import GeometryFault, where
 from tolcontact.discretization.features import Features, in_order
 from tolcontact.discretization.locators import Locators
@@ -97,7 +97,9 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
     standing: list[int | None] = []
     if isinstance(location, ThreeTwoOne):
         found = [
-            _attempt(faults, where("part", part.part), features.face_at, part.part, triangles(face, meshes), part.placement)
+            _attempt(
+                faults, where("part", part.part), features.face_at, part.part, kept_triangles(face, meshes), part.placement
+            )
             for face in location.faces
         ]
         standing = [found[k] for k in (0, 0, 0, 1, 1, 2)]

@@ -77,6 +77,18 @@ def triangles(face: Face, meshes: Meshes) -> np.ndarray:
     return np.flatnonzero(chosen)
 
 
+def kept_triangles(face: Face, meshes: Meshes) -> np.ndarray:
+    """Indices (triangle,) of the triangles that are left of a face, whole or cut, once its boxes have cut it."""
+    mesh = meshes[face.part]
+    chosen = triangles(face, meshes)
+    corners = np.asarray(mesh.triangles)[chosen]
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    kept = np.ones(len(chosen), dtype=bool)
+    for box in (each for each in face.selections if isinstance(each, Inside)):
+        kept &= ((high >= np.array(box.lower)) & (low <= np.array(box.upper))).all(axis=1)
+    return np.asarray(chosen[kept])
+
+
 def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.ndarray:
     indices = np.asarray(selection.indices, dtype=int)
     if indices.size and not (0 <= indices.min() and indices.max() < len(mesh.faces)):

@@ -117,8 +117,8 @@ def _form(face: Surface) -> Form | None:
         return Form("plane", height * n, n)
     known = sorted({int(number) for number in face.form_of})
     pieces = int(smooth_pieces(face.mesh, np.arange(len(face.mesh.faces))).max()) + 1
-    if known == [0]:
-        return face.forms[0]
+    if len(known) == 1 and known[0] >= 0:
+        return face.forms[known[0]]
     kinds = [face.forms[number].kind if number >= 0 else "general" for number in known]
     if len(known) > 1 or pieces > 1:
         said = ", ".join(kinds) if len(known) > 1 else f"{pieces} faces with creases between them"

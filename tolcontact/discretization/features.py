@@ -9,7 +9,7 @@ from tolcontact.declaration import Feature, GeometricTolerance, Part
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.discretization.datum_system import Datum, DatumFrame, datum_frame
 from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.faces import Meshes, patch, triangles
+from tolcontact.discretization.faces import Meshes, kept_triangles, patch
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.feature_geometry import FeatureGeometry, feature_geometry
 from tolcontact.discretization.zone_rows import zone_rows
@@ -79,7 +79,7 @@ class Features:
     def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
         """The next feature, whose datums have been added before. Raises GeometryFault."""
         surfaces = [patch(face, meshes) for face in feature.faces]
-        chosen = tuple(triangles(face, meshes) for face in feature.faces)
+        chosen = tuple(kept_triangles(face, meshes) for face in feature.faces)
         self._check_shared(feature, chosen)
         geometry = feature_geometry(surfaces)
         first = self.first + len(self.labels)

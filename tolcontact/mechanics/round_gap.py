@@ -19,6 +19,9 @@ LARGEST = 0.5  # rad: step of it
 ASIDE = 1e-13  # mm: what a point on an axis is taken to be beside it
 CLOSE = 1e-3  # of the ball's or shaft's radius: freedom that curvature is taken for at least
 STRAIGHT = 1e-9
+ALIKE = 0.05  # rad: tangents in one direction
+
+Terms = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # of a point: gap, slope, second derivative, and how its wall closes in
 
 
 def round_gaps(points: RoundPoints) -> ca.Function:
@@ -34,10 +37,16 @@ def round_gaps(points: RoundPoints) -> ca.Function:
         ca.SX.sym(name, size) for name, size in (("X_RM", ENTRIES), ("heights", 2), ("reactions", len(points)))
     )
     gaps, slopes = [], []
+    nearest: tuple[RoundPoint, Terms] | None = None  # the last tangent that turns along a hollow wall
     bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
     for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
         of_body, of_wall = (grown[0], grown[1]) if point.on_moving else (grown[1], grown[0])
-        gap, slope, bend, closing = (_of_tangents if _has_tangents(point) else _of_ball)(point, X, of_body, of_wall)
+        found = (_of_tangents if _has_tangents(point) else _of_ball)(point, X, of_body, of_wall)
+        if point.is_hollow:
+            nearest = (point, found)
+        elif nearest is not None and _touches(point, nearest[0]):
+            found = _unless_alike(found, nearest[1])
+        gap, slope, bend, closing = found
         gaps.append(gap)
         slopes.append(slope)
         bow += reaction * bend
@@ -45,6 +54,26 @@ def round_gaps(points: RoundPoints) -> ca.Function:
     outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
     inputs = {"X_RM": X, "heights": grown, "reactions": reactions}
     return ca.Function("round_gaps", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
+
+
+def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
+    """Whether a plane is one of the fixed tangents of a hollow wall, for the same ball, or the same end of a shaft."""
+    wall, n = hollow.wall, plane.wall.axis
+    if plane.wall.kind != "plane" or not (plane.centre == hollow.centre).all():
+        return False
+    off = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n looks inward
+    lean = 0.0 if wall.kind == "sphere" else float(n @ wall.axis) - np.sin(wall.angle)
+    return abs(off) < STRAIGHT * plane.radius and abs(lean) < STRAIGHT
+
+
+def _unless_alike(fixed: Terms, nearest: Terms) -> Terms:
+    """A fixed tangent; the nearest one in its place, if the two are in one direction.
+
+    Either could carry then, to a solver's accuracy, and they differ in direction: steps would not come to rest.
+    """
+    is_alike = ca.sumsqr(fixed[1] - nearest[1]) < ALIKE**2 * ca.sumsqr(fixed[1])
+    gap, slope, bend, closing = (ca.if_else(is_alike, b, a) for a, b in zip(fixed, nearest, strict=True))
+    return gap, slope, bend, closing
 
 
 def heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
@@ -64,7 +93,7 @@ def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
     return pose.apply(ca.DM(point.centre)), pose.R @ ca.DM(point.axis)
 
 
-def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
     """Beside a plane, or of a shaft in a hollow cylinder: gap, slope (1, 12), second derivative (12, 12), and what is to be
     subtracted from that because the wall closes in (12, 12); shaft and wall have grown by `of_body` and `of_wall` [mm].
     """
@@ -138,7 +167,7 @@ def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.if_else(is_free, e, np.cos(opening) * x + np.sin(opening) * aside), ca.if_else(is_free, 1, 0)
 
 
-def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
     """The same of a ball beside a curved wall."""
     c, _ = _in_wall_frame(point, X)
     side = -1.0 if point.is_hollow else 1.0
