@@ -3,8 +3,8 @@
 The pins are off their places by the tolerance of the holes that they are pressed into; the cover is set down by hand, up to
 half a millimetre off, and the pins move it to where its hole (clearance 0.1 on the diameter) and its slot fit over them.
 Expected: an edge is off as the nearest pin is, and by half the clearance more; without contact the cover passes through its
-pins. Pins are round, so one linear step is not enough, and the model asks for the exact resolution. Dimensions were chosen for
-this model; cover_cad.py makes both STEP files from them.
+pins. Pins and hole vary in size, too. They are round, so one linear step is not enough, and the model asks for the exact
+resolution. Dimensions were chosen for this model; cover_cad.py makes both STEP files from them.
 
 Needs the extra `tolcontact[step]`. Lengths in mm. A tolerance is the full width of its zone.
 """
@@ -44,8 +44,11 @@ def assembly() -> tc.Assembly:
         stub = trimesh.creation.cylinder(PIN / 2, COVER, sections=180)
         pin = model.part(f"{name} pin", tc.Mesh(stub), at=(x, y, TOP + COVER / 2), fixed=True)
         model.locate(pin, six(0, 0, PIN, PIN), tolerance=INSERTED)
-        wall = tc.Brep((x + HOLE / 2, y, 1)) if name == "round" else tc.Near(pin, 0.2)
-        model.contact(f"{name} hole", moving=cover.face(wall), reference=pin.face(tc.Cylinder(radius=PIN / 2)))
+        barrel = pin.feature("barrel", pin.face(tc.Cylinder(radius=PIN / 2)), tc.Size(PIN, 0.0, -0.015))
+        wall = cover.face(tc.Near(pin, 0.2))
+        if name == "round":
+            wall = cover.feature("hole", cover.face(tc.Brep((x + HOLE / 2, y, 1))), tc.Size(HOLE, 0.03))
+        model.contact(f"{name} hole", moving=wall, reference=barrel)
     for name, x, axis in (("near edge, x", 0, "x"), ("near edge, y", 0, "y"), ("far edge, y", LENGTH, "y")):
         model.measure(name, cover.point(x, WIDTH / 2, 0), along=axis, tolerance=0.3)
     return model

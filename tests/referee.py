@@ -100,15 +100,26 @@ def _polished(A, b, y, multipliers, slacks):
     return exact
 
 
-def gaps(pair, R, t):
-    """True gaps (point,) by paper (2) to (5), with R (part, 3, 3), t (part, 3); of round faces those of any pose."""
+def gaps(pair, R, t, deviations=None):
+    """True gaps (point,) by paper (2) to (5), with R (part, 3, 3), t (part, 3); of round faces those of any pose.
+
+    With deviations (contributor,) faces of features are displaced in their parts, and lie farther out.
+    """
+    sides = zip((pair.moving, pair.reference), pair.deviating, strict=True)
+    (R_m, t_m, h_m), (R_r, t_r, h_r) = (_face(R[part], t[part], face, deviations) for part, face in sides)
     if pair.round:
-        turn = R[pair.reference].T
-        return np.array(
-            [p.gaps(turn @ R[pair.moving], turn @ (t[pair.moving] - t[pair.reference])) for p in as_archived(pair.round)]
-        )
-    x_m = pair.P_m @ R[pair.moving].T + t[pair.moving]
-    x_r = pair.P_r @ R[pair.reference].T + t[pair.reference]
-    n = pair.n_r @ R[pair.reference].T
+        return np.array([p.gaps(R_r.T @ R_m, R_r.T @ (t_m - t_r), h_m, h_r) for p in as_archived(pair.round)])
+    n = pair.n_r @ R_r.T
     n /= np.linalg.norm(n, axis=1, keepdims=True)
-    return ((x_m - x_r) * n).sum(axis=1)
+    apart = pair.P_m @ R_m.T + t_m - pair.P_r @ R_r.T - t_r
+    return (apart * n).sum(axis=1) - h_m * pair.facing - h_r
+
+
+def _face(R, t, face, deviations):
+    """Where a face is (3, 3), (3,), and how much farther out, in a part at R, t."""
+    if face is None:
+        return R, t, 0.0
+    own = deviations[face.columns]
+    tau, rho = np.split(face.twist @ own, 2)
+    turn = Rotation.from_rotvec(rho).as_matrix()
+    return R @ turn, R @ (tau + face.centre - turn @ face.centre) + t, float(face.height @ own)

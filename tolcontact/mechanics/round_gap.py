@@ -120,7 +120,7 @@ def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) ->
         return flat[0], flat[1], flat[2], ca.SX.zeros(ENTRIES, ENTRIES)
     turning = ca.Function("turning", [X, of_both, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
     there, is_free = _nearest_tangent(point, turning, X, of_both, c - o)
-    least = max(abs(point.wall.radius - r), CLOSE * r)
+    least = ca.fmax(ca.fabs(float(point.wall.radius) - r - of_wall - of_body), CLOSE * r)
     closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
     found = _put([gap, slope, second, closing], symbols, [there, ca.cross(ca.DM(w), there), ca.SX(0)])
     return found[0], found[1], found[2], found[3]
@@ -171,7 +171,7 @@ def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Ter
     """The same of a ball beside a curved wall."""
     c, _ = _in_wall_frame(point, X)
     side = -1.0 if point.is_hollow else 1.0
-    distance, normal, around, rest = _distance(point, c)
+    distance, normal, around, rest = _distance(point, c, of_body + of_wall)
     n = ca.SX.sym("n", 3)
     along, J = ca.dot(n, c), ca.jacobian(c, X)
     slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
@@ -180,16 +180,17 @@ def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Ter
     return side * distance - float(point.radius) - of_body - of_wall, slope, bend, closing
 
 
-def _distance(point: RoundPoint, c: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
+def _distance(point: RoundPoint, c: ca.SX, grown: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
 
     Positive outside; see Form.distance. Of a hollow wall that is not whole it is that of the nearest tangent plane which the
-    wall has. The second derivative is in two parts, of which the first is positive semidefinite.
+    wall has. The second derivative is in two parts, of which the first is positive semidefinite; it depends on what freedom
+    is left once ball and wall have grown by `grown` [mm] together.
     """
     kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
     R, r, one, nothing = float(point.wall.radius), float(point.radius), ca.SX.eye(3), ca.SX.zeros(3, 3)
     p = c - ca.DM(point.wall.origin)
-    least = max(abs(R - r), CLOSE * r)
+    least = ca.fmax(ca.fabs(R - r - grown), CLOSE * r)
     if kind == "sphere":
         _, n = _direction(p + ASIDE * x)
         n, is_free = _within(point, n)
