@@ -22,9 +22,9 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 
 | stage | chapter | subject |
 |---|---|---|
-| declare | `tolcontact.declaration` | parts, faces, locators, tolerances, contact pairs, forces, measures |
+| declare | `tolcontact.declaration` | parts, faces, locators, features, tolerances, contact pairs, forces, measures |
 | discretize | `tolcontact.discretization` | meshes and STEP files, contact points, warnings |
-| draw | `tolcontact.variation` | from tolerance ranges to deviations; seeds |
+| draw | `tolcontact.variation` | from tolerances and zones to deviations; seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |
 | resolve contact | `tolcontact.contact` | linearized or exact, statuses, what a certificate covers, limits |
@@ -42,10 +42,12 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | purpose | `tc.` |
 |---|---|
 | declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
+| tolerance features | `Size`, `Position`, `Profile`, `Parallelism`, `Perpendicularity`, `Angularity`, `Flatness`, `Symmetry`, |
+| | `Coaxiality`, `CircularRunout`, `TotalRunout`; `Feature`, `Variable` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
-| run | `run`, `build`, `check`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
+| run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
 | read results | `summarize`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
 | warnings | `ContactWarning`, `UnitsWarning` |

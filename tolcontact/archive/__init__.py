@@ -34,11 +34,12 @@ Each realization is one row and carries its own certificate.
 | `second_answers` | realization | QPs that another solver had to answer |
 | `searched` | realization | 1 if contact points were projected again |
 
-`state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the locators and the drawn
-deviations, `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as JSON.
-A group is called like its part; a part with the name of a dimension gets an underscore behind it (the attribute `part` is the
-name in any case). Attributes state the format number, the versions, the seed, the solver with its options, and the method with
-all its choices; `method_from` states whether the method was the model's, the defaults, or set by options.
+`state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
+of features, variables), with source, units, tolerance and rule, and their drawn `deviation` (realization, contributor),
+`field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as JSON. A group is
+called like its part; a part with the name of a dimension gets an underscore behind it (the attribute `part` is the name in any
+case). Attributes state the format number, the versions, the seed, the solver with its options, and the method with all its
+choices; `method_from` states whether the method was the model's, the defaults, or set by options.
 
 ## Reading it
 
@@ -64,7 +65,13 @@ True
 >>> run.close()
 
 A `reference_part` of -1 is the ground, with R = I and t = 0. For a one-sided locator, subtract the `deviation` of locator
-`locator_of_point` if that is not -1.
+`locator_of_point` if that is not -1 (a locator is the contributor of the same number).
+
+Where a side of a pair is a feature (`face_of_moving`, `face_of_reference` not -1), displace its points in the part first: with
+(tau, rho) = `face_twist` @ `deviation` a point p goes to centre + tau + exp([rho]x) (p - centre), `face_centre`, and normals
+turn by exp([rho]x). Then subtract `face_height` @ `deviation` of the reference side, and that of the moving side times
+`facing`. A locator that stands against a feature (`face_of_locator`) has its deviation larger by the height there, less its
+direction times the displacement. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
 `tc.open_archive(path)` opens the file after a check of everything but the rows, and `tc.model_of` rebuilds its model.
 

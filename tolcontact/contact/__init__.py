@@ -71,11 +71,12 @@ True
 
 ## Limits
 
-- There is no friction, and parts have no form error. The pose is a local optimum, found step by step from the raw pose. On
-  1000 realizations of five models ipopt, started there too, found none lower. In a chain of bodies with degrees of freedom
-  that barely anything holds, another optimum may lie a few mm away with an objective that differs in the fifth digit; a
-  round part of flat triangles has one on each triangle. Other starts are tried only if the first answer is a conflict,
-  missing, or far.
+- There is no friction, and features have no form error: they shift, tilt and grow. Between faces that tilt and touch beside
+  their nominal overlap, and for round faces that grow beside sampled points, gaps are right to first order. The pose is a
+  local optimum, found step by step from the raw pose. On 1000 realizations of five models ipopt, started there too, found none
+  lower. In a chain of bodies with degrees of freedom that barely anything holds, another optimum may lie a few mm away with an
+  objective that differs in the fifth digit; a round part of flat triangles has one on each triangle. Other starts are tried
+  only if the first answer is a conflict, missing, or far.
 - Contact points are those of the nominal state. If rims of faces shift against each other *and* tilt, their edges may lie
   deeper than the points, by about shift times tilt; `surfaces` measures it.
 - A ball or shaft has the wall that it has nominally: where a hole or a groove ends is not looked for again as it moves along.
@@ -87,13 +88,12 @@ True
 - A degree of freedom that no active point holds is decided by the regularization alone, and its motion may be large: with
   "active points", a part in a chain that barely penetrates can tilt or slide freely, and is then often `doubtful`. The other
   objectives hold it.
-- "locator stiffness": springs softer than about 1e-4 of the stiffest act as if they were stiffer, because the
-  regularization is scaled with the sum.
+- "locator stiffness": springs softer than about 1e-4 of the stiffest act as if they were stiffer, because the regularization
+  is scaled with the sum.
 - "seating": reactions fall short by about 0.1 % times (travel / size of the contact). A part for which a force finds no rest
   within ten sizes ends as `not_converged`.
 - The number of points under load is not unique if several points of a plane share a load; neither is the share of redundant
-  pairs.
-"""
+  pairs."""
 
 from tolcontact.contact.resolver import ContactResolver
 from tolcontact.contact.state import Resolved

@@ -65,6 +65,63 @@ A locator with `one_sided=True` is a support: its part may lift off it, and may 
 have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
 "locator stiffness" alone.
 
+A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
+locators, or none. In the raw state it keeps its nominal place in the directions that they leave open; there it moves as the
+objective wants, from nowhere else: with "active points" or "all points" only as far as it must not to penetrate, with
+"seating" as its forces pull. Locators that hold the same direction twice are named, and rejected.
+
+## Features, and the tolerances of a drawing
+
+`part.feature(name, face, tolerances..., datum=...)` names a face: a plane, cylinder, cone, sphere or a general surface, or two
+opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and serves wherever a face
+does. Whatever touches it, is located by it, or is measured at `feature.point(x, y, z)` or at an end of its axis,
+`feature.axis(0)`, goes with its one deviation; also pairs and 3-2-1 schemes that choose its triangles without naming it.
+
+>>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
+>>> foot = cover.feature("foot", cover.face("-z"), datum="A")
+>>> side = cover.feature("side", cover.face("-y"), tc.Perpendicularity(0.05, "A"), datum="B")
+>>> top = cover.feature("top", cover.face("+z"), tc.Parallelism(0.05, "A"), tc.Profile(0.2, "A"))
+>>> width = cover.feature("width", cover.face("+x"), cover.face("-x"), tc.Size(60, 0.1, -0.05))
+>>> print(top)
+feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
+>>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
+
+| tolerance | of | what it controls |
+|---|---|---|
+| `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
+| `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
+| `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
+| `tc.Profile(0.2, "A", outside=0.15)` | any surface | place and tilt; without datums form alone |
+| `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
+| `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place (and tilt); axial: tilt |
+| `tc.Flatness` | plane | form, which moves nothing yet |
+
+A tolerance limits what its datums lock, and nothing else: a hole's position to a plane across it is a tolerance of its tilt.
+Datums are features of the same part; "A-B" is a common datum, "B(M)" one at maximum material, as in `tc.Position(0.2,
+"A|B(M)")`. If they deviate themselves, what refers to them follows. A part's frame is that of its shape, where datums are
+nominal. A datum shift is not drawn: the contact of the datum feature with its mate does that. Several tolerances of a feature
+are nested, form within orientation within location (a finer lower frame is a second position, to fewer datums); each draws
+what the narrower ones leave.
+
+`zone="flat", along="x"` puts an axis between planes; `projected=20` has the zone stand out of the primary datum by so much;
+`material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the
+process uses it), "accepts" (only a check does) or "none". `rule=`, `cp=` and `cpk=` are in `tolcontact.variation`. This is how
+ISO 1101, 5459 and 2692 have it; sizes do not limit form (independency, ISO 8015), where ASME's Rule #1 does.
+
+## Shared causes, correlation, measured parts
+
+All that varies is a *contributor* with a label: "part.locator", "part.feature.freedom" ("cover.width.size",
+"cover.top.offset"), or the name of a variable. `print(tc.build(model).nominal.contributors)` lists them.
+
+>>> warmth = clamp.variable("warmth", 20, drives={"cover.width.size": 0.0007, "cover.top.offset": 0.00006}, units="K")
+>>> alike = clamp.correlate(["cover.top.tilt x", "cover.top.tilt y"], 0.5)
+>>> batch = clamp.population({"cover.side.tilt z": [0.004, -0.002, 0.001]})
+
+A variable adds its factor times its own deviation to each contributor that it drives. A correlation is a matrix, or a number
+for two contributors; their distributions stay. A population is a table of measured parts (a CSV file, a DataFrame, a Dataset,
+a mapping) whose rows are drawn whole, with replacement; its columns replace the draws of the contributors that they are named
+after.
+
 ## Contact pairs
 
 `contact(name, moving=..., reference=...)` keeps points of the `moving` face outside the `reference` face. The points are 200
@@ -115,6 +172,9 @@ choices. The archive states which method was used, and whether it was the model'
 
 `tc.check(model)`, or `tolcontact check MODEL.py`, lists every fault of a model at once, each with the line of the script.
 
+>>> tc.check(clamp)
+('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)
+>>> place = clamp.locate(cover, tc.three_two_one(foot, side, cover.face("-x")), tolerance=0.1, on=plate)
 >>> tc.check(clamp)
 ()
 >>> nothing = tc.Assembly("nothing")

@@ -62,16 +62,16 @@ meet at more than 30 degrees form an edge.
 ## Round faces
 
 A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus, and where a cylinder, cone or sphere
-can be fitted to the vertices of a smooth piece of a mesh (at least five facets, none of which turns by more than 30 degrees) so
-that none is farther off than 1 um. Contact points, their feet and normals then lie on that surface, not on its triangles. So a
-prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are as
-round as their triangles.
+can be fitted to the vertices of a smooth piece of a mesh (at least five facets, none of which turns by more than 30 degrees)
+so that none is farther off than 1 um. Contact points, their feet and normals then lie on that surface, not on its triangles.
+So a prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are
+as round as their triangles.
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
 beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a hole
 (an inner cylinder) parallel to it, or along a plane. What touches is found at every pose, tilted ones too: a pin jams in its
-hole by the right angle, whatever the tessellation. Where an edge of the wall, a gap in it or another curve may touch first, the
-pair has sampled points. `tolcontact check` says which pairs are of round faces; `points=` or `spacing=` overrule it.
+hole by the right angle, whatever the tessellation. Where an edge of the wall, a gap in it or another curve may touch first,
+the pair has sampled points. `tolcontact check` says which pairs are of round faces; `points=` or `spacing=` overrule it.
 
 >>> stand = tc.Assembly("pin in a hole")
 >>> plate = stand.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=24)), fixed=True)
@@ -85,6 +85,8 @@ pair has sampled points. `tolcontact check` says which pairs are of round faces;
 program of pin in a hole: ...
   contact fit: 12 contact points, exact on round faces; triangles up to 0.043 mm inside
 ...
+
+Diameters of features vary exactly in these contacts: the radius of the ball, the shaft or the wall is the drawn one.
 
 The faces are taken to be as long as they are in the nominal assembly: a shaft that is pushed out of its hole, or a ball beyond
 the end of its wall, is not noticed at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).

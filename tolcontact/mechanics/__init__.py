@@ -14,8 +14,10 @@ A locator is a point p, a unit direction n into the part, and a deviation d. Wit
 
     (delta, theta) = J^-1 d        R = exp([theta]x)        t = c + delta - R c
 
-Of more than six locators the two-sided ones are met exactly, and the one-sided ones in the sense of least squares. A part
-that is located on another part follows its raw pose.
+Of more than six locators the two-sided ones are met exactly, and the one-sided ones in the sense of least squares. A part that
+is located on another part follows its raw pose. A locator that stands against a feature has d larger by what the feature comes
+out of its part there. Where a floating part has fewer than six, q is the least motion (rotations times the part's size) that
+meets them.
 
 ## Gaps
 
@@ -23,9 +25,12 @@ The gap of a contact point is (2) to (5)
 
     g = n . (x_m - x_r)        x_m = R_m P_m + t_m        x_r = R_r P_r + t_r        n = R_r n_r
 
-It is negative if the moving point lies inside the reference part. Between the two parts it is affine in the relative pose
-X_RM, so that all gaps of a pair are one product of 13 numbers with a constant matrix. A one-sided locator is a contact point
-against the part that it stands on, or the ground, raised by its deviation.
+It is negative if the moving point lies inside the reference part. Faces of features come first: each has a small pose of its
+own in its part, p -> p + tau + rho x (p - centre) turned properly, linear in the deviations, which is composed into the
+relative pose; so it adds no rows. What varies in size is subtracted from the gap, or added to the radius of a ball or shaft.
+Between the two parts it is affine in the relative pose X_RM, so that all gaps of a pair are one product of 13 numbers with a
+constant matrix. A one-sided locator is a contact point against the part that it stands on, or the ground, raised by its
+deviation.
 
 ## The QP
 

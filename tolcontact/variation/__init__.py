@@ -1,4 +1,4 @@
-"""Draw: tolerances become deviations of the locators. A chapter of the guide.
+"""Draw: tolerances become deviations of locators and features. A chapter of the guide.
 
 ## From a tolerance to a distribution
 
@@ -22,11 +22,56 @@ normal, range 0.6 mm
 >>> skewed.width  # six standard deviations [mm]
 0.24
 
+`tc.Tolerance(0.6, shift=0.1)` moves all of it; `cp=1.33, cpk=1.0` say how capable a normal process is, and how near its mean
+comes to a limit.
+
+## From a zone to the spread of a feature
+
+A feature has several freedoms: a plane an offset in its middle and two tilts, an axis two shifts in its middle and two tilts,
+a centre three shifts. All are displacements in mm at its extremes, a tilt at the edges or ends, so that they do not depend on
+the origin. `rule` says how they fill the zone of a tolerance:
+
+| rule | components |
+|---|---|
+| "99.73 % inside" (default) | normal, independent, with equal spreads, such that 99.73 % of the *features* lie inside |
+| "6 sigma at the extremes" | the same, with six standard deviations at the worst point equal to the width; fewer lie inside |
+| "truncated" | the latter, without the features that lie outside |
+| "uniform" | uniform in the zone |
+| "translation" | the first, without tilts |
+| "polar" | of an axis: uniform angle, normal radius with 6 sigma equal to the width; no tilts |
+
+The first is the only one that says the same for sizes, planes and axes. For a width t the spread of a component is t/6 of a
+size or an offset alone, t/9.07 of a plane's two tilts, t/11.8 of a rectangle's place and tilts, t/6.88 of an axis that only
+shifts, t/7.28 at the ends of one that also tilts. Of nested tolerances the narrower one draws its freedoms, and the wider one
+those that are left, so that 99.73 % of the sum lie inside. The share inside is integrated over directions, not drawn.
+
+>>> block = tc.Assembly("block")
+>>> part = block.part("part", tc.Box(100, 50, 10), fixed=True)
+>>> foot = part.feature("foot", part.face("-z"), datum="A")
+>>> top = part.feature("top", part.face("+z"), tc.Profile(0.3, "A"))
+>>> height = block.measure("corner", top.point(100, 50, 10), along="z")
+>>> [(each.label, round(0.3 / each.spread, 2)) for each in tc.build(block).draws.contributors.every]
+[('part.top.offset', 11.76), ('part.top.tilt x', 11.76), ('part.top.tilt y', 11.76)]
+
+`tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them back, as a
+coordinate measuring machine would: datum systems fitted to displaced points, zones of least width. It prints the share inside
+of each zone, with its 95 % interval, beside the share that the rule states. Bonuses and nested tolerances may leave more
+inside.
+
+>>> population = tc.check_population(block, samples=2000)
+>>> _, lower, upper = population.share_inside.sel(zone=0).values
+>>> bool(lower < 0.9973 < upper)
+True
+
+What is not covered: form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a
+group (give all their features one `tc.Variable`), and datum shift, which contact does.
+
 ## Draws depend on the seed and on the realization alone
 
-The deviation of a locator in realization k depends on the seed, on the locator's label ("part.locator") and on k. It does not
-depend on the number of realizations, on blocks, threads, other locators, or the order of declarations. So a longer run begins
-with the realizations of a shorter one, and two solvers or two methods can be compared draw by draw.
+The deviation of a contributor in realization k depends on the seed, on its label ("part.locator", "part.feature.freedom") and
+on k; of correlated ones on the labels of all. It does not depend on the number of realizations, on blocks, threads, other
+contributors, or the order of declarations. So a longer run begins with the realizations of a shorter one, and two solvers or
+two methods can be compared draw by draw.
 
 >>> model = tc.Assembly("model")
 >>> part = model.part("part", tc.Box(50, 30, 10))
@@ -37,16 +82,15 @@ with the realizations of a shorter one, and two solvers or two methods can be co
 >>> nominal = tc.build(model).nominal
 >>> nominal.locators.labels
 ('part.A1', 'part.A2', 'part.A3', 'part.B1', 'part.B2', 'part.C1')
->>> deviations = draw(nominal, seed=1, start=0, stop=1000)  # (realization, locator) [mm]
+>>> deviations = draw(nominal, seed=1, start=0, stop=1000)  # (realization, contributor) [mm]
 >>> bool((deviations[500:510] == draw(nominal, seed=1, start=500, stop=510)).all())
 True
 >>> float(deviations.std().round(2))  # a sixth of the range
 0.1
 
-Each locator has a stream of random numbers of its own (Philox, keyed by the seed, the label and blocks of 4096 realizations).
-Deviations are its quantiles: the same share u gives the same rank in any distribution. A distribution that yields non-finite
-deviations is rejected.
-"""
+Each contributor has a stream of random numbers of its own (Philox, keyed by the seed, the label and blocks of 4096
+realizations). Deviations are its quantiles: the same share u gives the same rank in any distribution. A distribution that
+yields non-finite deviations is rejected."""
 
 from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, draw
