@@ -15,7 +15,7 @@ from tolcontact.archive.checked import nothing_checked
 from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
-from tolcontact.declaration.document import to_document
+from tolcontact.declaration.document import plain_faces, to_document
 from tolcontact.discretization import Nominal, NominalPart, form_arrays, known_surfaces
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
@@ -315,7 +315,7 @@ def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -
 
 def declaration(program: Program) -> str:
     """The declared model as JSON."""
-    return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
+    return json.dumps(to_document(program.nominal.assembly, plain_faces(program.nominal.triangles), program.tapes))
 
 
 def versions() -> str:

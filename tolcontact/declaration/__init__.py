@@ -191,8 +191,13 @@ model "nothing" has 2 faults:
 A model script is a Python file with a function `assembly()` that returns the declared assembly. With `tc.main(assembly)`
 under a main guard it runs by itself, with the options of `tolcontact run`; the files in `models/` are such scripts.
 
-Every archive holds its model as JSON, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the assembly
-without running any code of the script. Functions of poses are kept as lists of elementary operations.
+The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
+"model.json")` writes them, by the schema `model.schema.json` in this package; what a script would leave out may be left out,
+files of shapes are named from the folder of the JSON file, and errors state the place:
+`parts[2].features[0].tolerances[1].width`.
+
+Every archive holds its model as JSON, too, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the
+assembly without running any code of the script. Functions of poses are kept as lists of elementary operations.
 
 >>> results = tc.run(clamp, samples=10, surfaces=0)
 >>> print(tc.model_of(results).pairs[0])

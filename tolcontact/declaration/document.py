@@ -7,10 +7,10 @@ from typing import Any, TypeVar
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Box
 from tolcontact.declaration.locator import ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face
+from tolcontact.declaration.part import Face, Part
 from tolcontact.declaration.point import Point
 from tolcontact.declaration.selection import Facing, Inside
 from tolcontact.declaration.tape import Tape
@@ -21,12 +21,8 @@ T = TypeVar("T")
 MOST = 2**31  # of triangles, or points
 
 
-def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> Document:
-    """The document of an assembly.
-
-    `triangles` gives the indices of a face that is more than a direction, `tapes` the steps of the users' own expressions.
-    Shapes of meshes are not in it; `from_document` (see rebuilding) wants them beside it.
-    """
+def plain_faces(triangles: Callable[[Face], list[int]]) -> Callable[[Face], Document]:
+    """How an archive has faces: `triangles` gives the indices of one that is more than a direction."""
 
     def face(face: Face) -> Document:
         boxes = [[s.lower, s.upper] for s in face.selections if isinstance(s, Inside)]
@@ -35,6 +31,26 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
         plain = isinstance(only, Facing) and isinstance(only.direction, str) and only == Facing(only.direction)
         chosen = {"direction": str(only)} if plain else {"triangles": triangles(face)}
         return {"part": face.part.name, **chosen, "inside": boxes}
+
+    return face
+
+
+def plain_geometry(part: Part) -> Document:
+    """How an archive has shapes: those of meshes are beside the document."""
+    shape = part.geometry
+    return {"box": [shape.x, shape.y, shape.z]} if isinstance(shape, Box) else {"mesh": str(shape)}
+
+
+def to_document(
+    assembly: Assembly,
+    face: Callable[[Face], Document],
+    tapes: Mapping[str, Tape],
+    geometry: Callable[[Part], Document] = plain_geometry,
+) -> Document:
+    """The document of an assembly, with faces and shapes as `face` and `geometry` have them.
+
+    `tapes` are the steps of the users' own expressions.
+    """
 
     def feature(feature: Feature) -> Document:
         return {
@@ -53,7 +69,7 @@ def to_document(assembly: Assembly, triangles: Callable[[Face], list[int]], tape
         "method": None if assembly.method is None else asdict(assembly.method),
         "parts": [
             {
-                "geometry": _geometry(part.geometry),
+                "geometry": geometry(part),
                 **_plain(part, "name", "at", "rotation", "fixed", "declared_at"),
                 "features": [feature(each) for each in part.features],
             }
@@ -115,10 +131,6 @@ def _plain(thing: Any, *words: str) -> Document:
 def _point(point: Point) -> Document:
     on = {} if point.on is None else {"on": point.on.name}
     return {"part": point.part.name, **on, **({"end": point.end} if point.position is None else {"position": point.position})}
-
-
-def _geometry(geometry: Box | Mesh) -> Document:
-    return {"box": [geometry.x, geometry.y, geometry.z]} if isinstance(geometry, Box) else {"mesh": str(geometry)}
 
 
 def _tolerance(tolerance: Tolerance | None) -> Document | None:

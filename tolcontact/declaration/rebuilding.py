@@ -8,6 +8,7 @@ import numpy as np
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.criteria import criterion_of
 from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance, Size
 from tolcontact.declaration.force import Force
@@ -31,7 +32,8 @@ FREEDOMS_OF_FEATURE = 7  # at most, with its size
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
-    """The assembly of a document; `meshes` holds a mesh (anything with vertices and faces) for each mesh part.
+    """The assembly of a document; `meshes` holds a mesh (anything with vertices and faces, or words for tc.Mesh) for
+    each mesh part.
 
     Raises ArchiveError for a document that `to_document` cannot have made. Nothing in it is run.
     """
@@ -76,6 +78,8 @@ class _Reader:
         return self.parts[said.text()]
 
     def face(self, said: Said) -> Face:
+        if "select" in said:
+            return Face(self.known(said["part"]), tuple(criterion_of(each, self.known) for each in said["select"]))
         if "direction" in said:
             chosen: Facing | Triangles = Facing(said["direction"].one_of(DIRECTIONS))
         else:
@@ -163,7 +167,11 @@ class _Reader:
         if "box" in said["geometry"]:
             geometry: Box | Mesh = Box(*said["geometry"]["box"].vector())
         elif name in self.meshes:
-            geometry = Mesh(self.meshes[name])
+            of = self.meshes[name]
+            words = (
+                {word: of[word] for word in ("source", "units", "body", "chord") if word in of} if isinstance(of, dict) else {}
+            )
+            geometry = Mesh(**words) if words else Mesh(of)
         else:
             raise said["name"].wrong("a part with a mesh, or with a box")
         place, fixed = (said["at"].vector(), said["rotation"].vector()), _optional(said["fixed"], Said.boolean)

@@ -61,6 +61,10 @@ class Said:
     def is_text(self) -> bool:
         return isinstance(self._value, str)
 
+    @property
+    def is_list(self) -> bool:
+        return isinstance(self._value, list)
+
     def text(self) -> str:
         if not isinstance(self._value, str):
             raise self.wrong("a text")

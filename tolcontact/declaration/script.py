@@ -1,4 +1,4 @@
-"""Model scripts: a Python file with a function `assembly()` that returns the declared Assembly."""
+"""Model scripts: a Python file with a function `assembly()` that returns the declared Assembly; or a model as JSON."""
 
 import contextlib
 import importlib.util
@@ -7,18 +7,21 @@ import traceback
 from pathlib import Path
 
 from tolcontact.declaration import Assembly
+from tolcontact.declaration.json_model import read_json
 from tolcontact.errors import ScriptError, TolcontactError
 
 _PACKAGE = Path(__file__).resolve().parent
 
 
 def load_model(path: Path) -> Assembly:
-    """The assembly that a script declares.
+    """The assembly that a script declares, or a JSON file.
 
     Raises ScriptError if the file is missing, fails, or has no function `assembly()` that returns an Assembly.
     """
     if not path.is_file():
         raise ScriptError(f'model script "{path}" does not exist')
+    if path.suffix.lower() == ".json":
+        return read_json(path)
     # A name of its own: a model called random.py must not be what others then import as `random`.
     spec = importlib.util.spec_from_file_location(f"model {path.stem}", path.absolute())
     if spec is None or spec.loader is None:

@@ -61,5 +61,6 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 from tolcontact.workflow.compare import compare
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
+from tolcontact.workflow.written import write_model
 
-__all__ = ["build", "check", "check_population", "compare", "run", "summarize"]
+__all__ = ["build", "check", "check_population", "compare", "run", "summarize", "write_model"]
