@@ -10,7 +10,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial.transform import Rotation
 
-from studies.certificates.judge import as_archived
+from studies.certificates.judge import as_archived, faces
 
 
 def cross(v):
@@ -105,21 +105,11 @@ def gaps(pair, R, t, deviations=None):
 
     With deviations (contributor,) faces of features are displaced in their parts, and lie farther out.
     """
-    sides = zip((pair.moving, pair.reference), pair.deviating, strict=True)
-    (R_m, t_m, h_m), (R_r, t_r, h_r) = (_face(R[part], t[part], face, deviations) for part, face in sides)
+    drawn = None if deviations is None else np.atleast_2d(deviations)
+    (R_m, t_m, h_m), (R_r, t_r, h_r) = ((each[0] for each in side) for side in faces(pair, R[None], t[None], drawn))
     if pair.round:
         return np.array([p.gaps(R_r.T @ R_m, R_r.T @ (t_m - t_r), h_m, h_r) for p in as_archived(pair.round)])
     n = pair.n_r @ R_r.T
     n /= np.linalg.norm(n, axis=1, keepdims=True)
     apart = pair.P_m @ R_m.T + t_m - pair.P_r @ R_r.T - t_r
     return (apart * n).sum(axis=1) - h_m * pair.facing - h_r
-
-
-def _face(R, t, face, deviations):
-    """Where a face is (3, 3), (3,), and how much farther out, in a part at R, t."""
-    if face is None:
-        return R, t, 0.0
-    own = deviations[face.columns]
-    tau, rho = np.split(face.twist @ own, 2)
-    turn = Rotation.from_rotvec(rho).as_matrix()
-    return R @ turn, R @ (tau + face.centre - turn @ face.centre) + t, float(face.height @ own)

@@ -1,16 +1,22 @@
 """Features: one deviation for all that uses them, closed forms of measures, contacts and locators, archives, datums."""
 
+import io
+
 import numpy as np
 import pytest
 import trimesh
+from rich.console import Console
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 
 import tolcontact as tc
+from tests import cases
 from tests.cases import Frame, toleranced
 from tests.cases.fasteners import fasteners
 from tests.cases.round_contact import BARREL
 from tolcontact.discretization import discretize
+from tolcontact.discretization.shapes import shape
+from tolcontact.report import summary_text
 from tolcontact.simulation import simulate_block
 from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
@@ -260,3 +266,38 @@ def test_extremes_of_fasteners(is_fixed, pull, distance):
     assert set(at) <= set(labels)
     block = simulate_block(program, np.array([[at.get(label, 0.0) for label in labels]]))
     assert block.measured[0, 1, 0] == pytest.approx(distance, abs=1e-9)
+
+
+@pytest.mark.parametrize("hole", [tc.Brep((19.05, 15.0, 1)), tc.Cylinder(inner=True, radius=4.05)], ids=["B-rep", "kind"])
+def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
+    """The same deviations, whether the file states the cylinder or it is fitted to triangles."""
+    cover = shape(tc.Mesh(cases.MODELS / "cover.step")).mesh
+    plain = trimesh.Trimesh(cover.vertices, cover.faces, process=False)
+    found = []
+    for geometry in (tc.Mesh(cases.MODELS / "cover.step"), tc.Mesh(plain)):
+        a = tc.Assembly("cover")
+        part = a.part("cover", geometry, fixed=True)
+        part.feature("under", part.face("-z"), datum="A")
+        part.feature("side", part.face("-y", lambda c, n: c[:, 1] < 1e-3), datum="B")
+        part.feature("end", part.face("-x", lambda c, n: c[:, 0] < 1e-3), datum="C")
+        near = tc.Inside((5, 5, -1), (25, 25, 9))
+        wall = part.face(
+            hole if isinstance(geometry.source, type(cases.MODELS)) else tc.Cylinder(inner=True, radius=4.05), near
+        )
+        own = part.feature("hole", wall, tc.Size(8.1, 0.03), tc.Position(0.2, "A|B|C"))
+        a.measure("x", own.axis(1), along="x")
+        program = tc.build(a)
+        feature = program.nominal.features[-1].geometry
+        found.append(
+            (feature.centre, feature.axis, feature.half, feature.size, [c.spread for c in program.draws.contributors.every])
+        )
+    for one, other in zip(*found, strict=True):
+        assert one == pytest.approx(other, abs=1e-6)
+
+
+def test_a_summary_says_that_a_datum_shift_is_not_drawn():
+    a = toleranced.ring_with("bore", tc.Position(0.2, "A|B(M)"))
+    console = Console(width=200, file=io.StringIO())
+    console.print(summary_text(tc.summarize(tc.run(a, samples=20))))
+    said = console.file.getvalue()
+    assert "datum shift of ring.bore: not drawn; the contact of the datum features decides it" in said

@@ -11,6 +11,7 @@ import warnings
 import igl
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from studies.certificates.scenes import scene
@@ -44,20 +45,17 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
     found["turned"] += int((np.arccos(np.clip(cosine, -1, 1)).max(axis=1)[certified] > method.near_turn + 1e-3).sum())
     # Gaps at the contact points, paper (2) to (5).
     for k, pair in enumerate(nominal.pairs):
-        x_m = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.moving], pair.P_m) + t[:, None, CORRECTED, pair.moving]
-        x_r, n = np.broadcast_to(pair.P_r, x_m.shape), np.broadcast_to(pair.n_r, x_m.shape)
-        if pair.reference is not None:
-            x_r = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.P_r) + t[:, None, CORRECTED, pair.reference]
-            n = np.einsum("nij,pj->npi", R[:, CORRECTED, pair.reference], pair.n_r)
-        gap = ((x_m - x_r) * n).sum(axis=2)
+        (R_m, t_m, h_m), (R_r, t_r, h_r) = faces(pair, R[:, CORRECTED], t[:, CORRECTED], run["deviations"])
+        x_m = np.einsum("nij,pj->npi", R_m, pair.P_m) + t_m[:, None]
+        x_r = np.einsum("nij,pj->npi", R_r, pair.P_r) + t_r[:, None]
+        n = np.einsum("nij,pj->npi", R_r, pair.n_r)
+        gap = ((x_m - x_r) * n).sum(axis=2) - h_m[:, None] * pair.facing - h_r[:, None]
         if pair.round:
-            turn = R[:, CORRECTED, pair.reference].swapaxes(1, 2)
-            apart = np.einsum("nij,nj->ni", turn, t[:, CORRECTED, pair.moving] - t[:, CORRECTED, pair.reference])
-            gap = np.stack(
-                [point.gaps(turn @ R[:, CORRECTED, pair.moving], apart) for point in as_archived(pair.round)], axis=1
-            )
+            turn = R_r.swapaxes(1, 2)
+            apart = np.einsum("nij,nj->ni", turn, t_m - t_r)
+            gap = np.stack([point.gaps(turn @ R_m, apart, h_m, h_r) for point in as_archived(pair.round)], axis=1)
         if pair.is_supports:
-            gap = gap - run["deviations"][:, pair.offsets.columns]
+            gap = gap - run["deviations"] @ heights(pair, run["deviations"].shape[1])
         here = certified & ~run["searched"].astype(bool)
         found["archived gap"] += int(
             (np.abs(gap.min(axis=1) - run["gap_min"][:, CORRECTED, k])[here] > 1e-9 * size + 1e-9).sum()
@@ -71,7 +69,8 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
         for row in rng.permutation(rows)[:LOOKED_AT]:
             for pair in nominal.pairs:
                 if pair.own is not None and pair.reference is not None:
-                    inside = depth(nominal, pair, R[row, CORRECTED], t[row, CORRECTED])
+                    sides = faces(pair, R[[row], CORRECTED], t[[row], CORRECTED], run["deviations"][[row]])
+                    inside = depth(nominal, pair, sides)
                     limit = (
                         0.01 * nominal.assembly.finest()
                         + pair.facets
@@ -81,6 +80,33 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
                         + shifted(R[row, CORRECTED], t[row, CORRECTED], pair)
                     )
                     found["penetration of surfaces"] += int(inside > limit)
+    return found
+
+
+Sides = tuple[tuple[np.ndarray, np.ndarray, np.ndarray], ...]  # R, t and height of the moving and the reference face
+
+
+def faces(pair: ContactPoints, R: np.ndarray, t: np.ndarray, deviations: np.ndarray) -> Sides:
+    """Where the two faces of a pair are (n, 3, 3), (n, 3), and how much farther out (n,), in parts at R, t (n, part, ...)."""
+    found = []
+    for part, face in zip((pair.moving, pair.reference), pair.deviating, strict=True):
+        R_p = np.broadcast_to(np.eye(3), (len(R), 3, 3)) if part is None else R[:, part]
+        t_p = np.zeros((len(R), 3)) if part is None else t[:, part]
+        height = np.zeros(len(R))
+        if face is not None:
+            own = deviations[:, face.columns]
+            moved = own @ face.twist.T
+            turn = Rotation.from_rotvec(moved[:, 3:]).as_matrix()
+            t_p = np.einsum("nij,nj->ni", R_p, moved[:, :3] + face.centre - turn @ face.centre) + t_p
+            R_p, height = R_p @ turn, own @ face.height
+        found.append((R_p, t_p, height))
+    return tuple(found)
+
+
+def heights(pair: ContactPoints, contributors: int) -> np.ndarray:
+    """What supports stand out by for deviations of 1 (contributor, point)."""
+    found = np.zeros((contributors, len(pair.P_m)))
+    found[pair.offsets.columns] = pair.offsets.matrix
     return found
 
 
@@ -98,12 +124,15 @@ def shifted(R: np.ndarray, t: np.ndarray, pair: ContactPoints) -> float:
     return float(angle * np.linalg.norm(R[r].T @ (R[m] @ centre + t[m] - t[r]) - centre))
 
 
-def depth(nominal: Nominal, pair: ContactPoints, R: np.ndarray, t: np.ndarray) -> float:
-    """How deep points of the moving face lie in the reference body, below its face [mm]."""
-    m, r = pair.moving, pair.reference
+def depth(nominal: Nominal, pair: ContactPoints, sides: Sides) -> float:
+    """How deep points of the moving face, as it has grown, lie in the reference body, below its face [mm]."""
+    r = pair.reference
+    (R_m, t_m, h_m), (R_r, t_r, h_r) = sides
     points = trimesh.sample.sample_surface(pair.own.mesh, 2000, seed=1)[0]
     points = np.vstack([points, pair.own.mesh.vertices])
-    places = (points @ R[m].T + t[m] - t[r]) @ R[r]
+    triangle, nearest = pair.own.nearest(points)
+    points = points + (h_m[0] + h_r[0]) * pair.own.normals(triangle, nearest)
+    places = (points @ R_m[0].T + t_m[0] - t_r[0]) @ R_r[0]
     body = nominal.parts[r].body
     V, F = np.array(body.vertices), np.array(body.faces, dtype=np.int64)
     distance, *_ = igl.signed_distance(np.ascontiguousarray(places), V, F)

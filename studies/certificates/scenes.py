@@ -40,6 +40,7 @@ def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
         on = parts[int(rng.integers(len(parts)))] if parts and rng.random() < 0.3 else None
         six = locators(low, high, ranges, rng, supports=objective == "seating" or rng.random() < 0.2)
         a.locate(part, six, on=on)
+        tolerance(part, kind, mesh, max(float(ranges.max()), 1e-4 * size), np.random.default_rng([seed, k]))
         if below is not None:
             sides = {"moving": part.face(lambda c, n: n[:, 2] < -0.3), "reference": below.face("+z")}
             a.contact(f"joint {k}", **sides)
@@ -55,6 +56,22 @@ def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
     a.measure("top", parts[-1].point(*high), along=turn.apply((0, 0, 1)), tolerance=max(float(ranges.max()), 1e-3 * size))
     a.measure("aside", parts[-1].point(*high), along=turn.apply((1, 0, 0)))
     return a, tc.Method(resolution=resolution, objective=objective)
+
+
+def tolerance(part: tc.Part, kind: str, mesh: trimesh.Trimesh, width: float, rng: np.random.Generator) -> None:
+    """Features of about half of the parts: top and foot of boxes tilt, and balls and cylinders vary in diameter."""
+    if rng.random() < 0.5 or kind == "wedge":
+        return
+    width *= rng.uniform(0.1, 1.0)
+    if kind == "box":
+        part.feature("side", part.face("-y"), datum="A")
+        part.feature("end", part.face("-x"), datum="B")
+        for name, face in (("top", "+z"), ("foot", "-z")):
+            part.feature(name, part.face(face), tc.Perpendicularity(width, "A|B"))
+    else:
+        round_face = part.face(tc.Cylinder()) if kind == "cylinder" else part.face()
+        diameter = float(mesh.bounds[1][2] - mesh.bounds[0][2])
+        part.feature("skin", round_face, tc.Size(diameter, width, -width))
 
 
 def solid(kind: str, scale: float, rng: np.random.Generator) -> trimesh.Trimesh:

@@ -43,7 +43,7 @@ def or_(names: Iterable[str]) -> str:
     return ", ".join(f'"{name}"' if " " in name else name for name in names)
 
 
-Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly().")]
+Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a model as JSON.")]
 StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]

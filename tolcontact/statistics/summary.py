@@ -88,6 +88,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
             "realizations": total,
             "samples": _begun_for(results, total),
             **{word: results.attrs[word] for word in ("resolution", "objective", "active_set")},
+            "datum_shifts": ", ".join(_datum_shifts(results)),
             "smallest_range": _smallest_range(results, rows),
         },
     )
@@ -144,12 +145,25 @@ def _iterations(rows: xr.Dataset) -> list[float]:
 
 
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
-    """The smallest tolerance range above 0 of any locator or measure [mm]; infinite if there is none."""
-    locators = results["sample"].to_dataset()[words.TOLERANCE_RANGE.name].values
+    """The smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
+    sample = results["sample"].to_dataset()
+    contributors = sample[words.TOLERANCE_RANGE.name].values
+    if words.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have locators alone
+        contributors = contributors[sample[words.CONTRIBUTOR_UNITS.name].values == "mm"]
     ranges = np.concatenate(
-        [locators, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
+        [contributors, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
     )
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
+
+
+def _datum_shifts(results: xr.DataTree) -> list[str]:
+    """Features with a datum at maximum or least material, as part.feature."""
+    sample = results["sample"].to_dataset()
+    if words.DISTRIBUTION.name not in sample or words.CONTRIBUTOR not in sample[words.DISTRIBUTION.name].dims:
+        return []
+    labels = zip(sample[words.CONTRIBUTOR].values, sample[words.DISTRIBUTION.name].values, strict=True)
+    shifted = [str(label).rpartition(".")[0] for label, said in labels if "(M)" in str(said) or "(L)" in str(said)]
+    return list(dict.fromkeys(shifted))
 
 
 def _begun_for(results: xr.DataTree, done: int) -> int:

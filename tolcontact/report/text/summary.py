@@ -111,6 +111,8 @@ def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
+    if shifted := summary.attrs["datum_shifts"]:
+        yield f"datum shift of {shifted}: not drawn; the contact of the datum features decides it"
     yield f"largest penetration at contact points: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
