@@ -18,6 +18,7 @@ from tolcontact.discretization.surface import Surface
 
 ALONG = 1e-6  # what a direction differs from an axis of the part by that is named after it
 NOTICED = 1e-3  # of a displacement: how much of it a general surface must notice along its normals
+EXTREMES = 4096  # displacements by which extremes of a general surface are found
 OPPOSED = 1e-3  # rad: how far two planes may be from parallel
 AXES = np.eye(3)
 NONE = np.zeros(3)
@@ -227,8 +228,11 @@ def _general(face: Surface) -> FeatureGeometry:
     metric = every.T @ every
     values = np.linalg.solve(scaled.T @ metric @ scaled, scaled.T @ metric) @ np.linalg.inv(to_twist)
     names = tuple(f"freedom {k + 1}" for k in range(len(kept)))
+    # Of many points those that stand out farthest for some displacement.
+    ways = np.random.default_rng(0).normal(size=(len(kept), EXTREMES))
+    outer = np.unique(np.abs(every @ scaled @ ways).argmax(axis=0))
     return FeatureGeometry(
-        "general", centre, names, to_twist @ scaled, values, points, normals[:, None], first, 0.0, np.nan, (), False
+        "general", centre, names, to_twist @ scaled, values, points[outer], normals[outer, None], first, 0.0, np.nan, (), False
     )
 
 

@@ -1,7 +1,5 @@
 """The zone of a tolerance as rows: a feature is inside if none of their lengths, at its coordinates, exceeds half the width."""
 
-import itertools
-
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance
@@ -55,9 +53,18 @@ def _need(tolerance: GeometricTolerance, feature: FeatureGeometry, has_it: bool,
 
 
 def _halved_differences(feature: FeatureGeometry) -> np.ndarray:
-    """Of a plane: half of what one of its extremes stands higher than another."""
+    """Of a plane: half of what one of its extremes stands higher than another; of those two that can be farthest apart.
+
+    These are opposite corners of its outline, in a direction between two of those across its edges.
+    """
     rows = feature.extremes[:, 0]
-    pairs = np.array(list(itertools.combinations(range(len(rows)), 2)))
+    tilts = rows[:, 1:]  # the offset is the same everywhere
+    around = tilts[np.argsort(np.arctan2(*(tilts - tilts.mean(axis=0)).T))]
+    edges = np.roll(around, -1, axis=0) - around
+    across = np.sort(np.arctan2(edges[:, 0], -edges[:, 1]) % np.pi)  # opposite edges look the same way
+    between = (across + np.roll(across, -1) + np.pi * (np.arange(len(across)) == len(across) - 1)) / 2
+    heights = np.column_stack([np.cos(between), np.sin(between)]) @ tilts.T
+    pairs = np.unique(np.column_stack([heights.argmax(axis=1), heights.argmin(axis=1)]), axis=0)
     return np.asarray((rows[pairs[:, 0]] - rows[pairs[:, 1]])[:, None] / 2)
 
 

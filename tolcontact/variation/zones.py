@@ -15,6 +15,7 @@ from scipy.stats import chi, qmc
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 DIRECTIONS = 14  # powers of two
+TOGETHER = 1024  # of them at once
 NEVER = 1e-9  # of the width: a smaller spread is none
 
 
@@ -23,8 +24,7 @@ def share_inside(rows: np.ndarray, sds: np.ndarray, width: float) -> float:
     varying = np.flatnonzero(sds > 0)
     if not varying.size or not rows.size:
         return 1.0
-    u = _directions(len(varying)) * sds[varying]
-    longest = np.sqrt((np.einsum("pec,nc->npe", rows[..., varying], u) ** 2).sum(axis=2)).max(axis=1)
+    longest = _longest(rows[..., varying], _directions(len(varying)) * sds[varying])
     return float(chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varying)).mean())
 
 
@@ -56,14 +56,23 @@ def extreme_spread(rows: np.ndarray, known: np.ndarray, count: int, width: float
 
 def is_inside(rows: np.ndarray, components: np.ndarray, width: float | np.ndarray) -> np.ndarray:
     """Whether features (n,) with components (n, component) lie inside."""
-    lengths = np.sqrt((np.einsum("pec,nc->npe", rows, components) ** 2).sum(axis=2))
-    return np.asarray(lengths.max(axis=1, initial=0.0) <= np.asarray(width) / 2)
+    return np.asarray(_longest(rows, components) <= np.asarray(width) / 2)
+
+
+def _longest(rows: np.ndarray, components: np.ndarray) -> np.ndarray:
+    """The longest (n,) of the rows (point, entry, component) at components (n, component)."""
+    found = np.zeros(len(components))
+    for first in range(0, len(components), TOGETHER):
+        some = slice(first, first + TOGETHER)
+        squares = (np.einsum("pec,nc->npe", rows, components[some]) ** 2).sum(axis=2)
+        found[some] = np.sqrt(squares.max(axis=1, initial=0.0))
+    return found
 
 
 def reach(rows: np.ndarray, width: float) -> np.ndarray:
     """How far (component,) components of features inside may be from 0, each by itself; a little more than that."""
     u = _directions(rows.shape[-1])
-    longest = np.sqrt((np.einsum("pec,nc->npe", rows, u) ** 2).sum(axis=2)).max(axis=1)
+    longest = _longest(rows, u)
     return np.asarray(1.05 * np.abs(u / longest[:, None] * width / 2).max(axis=0))
 
 
