@@ -136,12 +136,15 @@ def test_a_clutch_jams_at_the_angle_of_its_formula(solver):
 
 
 def test_lids_at_maximum_material_fit():
-    program, run = simulate(cases.model("lid"), samples=500, solver="daqp", method=cases.model("lid").method)
+    program, run = simulate(cases.model("lid"), samples=150, solver="daqp", method=cases.model("lid").method)
     assert np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
     assert (run["status"] == Status.RESOLVED).mean() > 0.2
     R, t = R_t(run["poses"])
     for pair in program.nominal.pairs:
-        assert min(referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED], run["deviations"][k]).min() for k in range(500)) > -1e-8
+        assert (
+            min(referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED], run["deviations"][k]).min() for k in range(0, 150, 5))
+            > -1e-8
+        )
 
 
 @pytest.mark.parametrize(("name", "samples"), [("hinge", 60), ("spindle", 100)])

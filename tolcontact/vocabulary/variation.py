@@ -47,12 +47,14 @@ FACE_TWIST = Variable(
     (FEATURE_FACE, FREEDOM, CONTRIBUTOR),
     "f8",
     "displacement tau [mm], rho [rad] of a feature's face, nominal frame, for deviations of 1",
+    "1",
 )
 FACE_HEIGHT = Variable(
     "face_height",
     (FEATURE_FACE, CONTRIBUTOR),
     "f8",
     "how much farther out of the material a feature's face lies everywhere, for deviations of 1",
+    "1",
 )
 FACE_OF_MOVING = Variable(
     "face_of_moving", (PAIR,), "i4", "number of the feature's face that the moving side of a pair is, counted from 0; -1: none"
