@@ -5,6 +5,7 @@ import pytest
 import trimesh
 
 import tolcontact as tc
+from tests.cases import toleranced
 from tests.cases.round_contact import BARREL
 
 BORE = tc.Cylinder(inner=True)
@@ -32,10 +33,6 @@ CASES = {
     "no datums": (lambda p: p.feature("f", p.face(BORE), tc.Position(0.1)), 'needs datums; give them as in tc.Position(0.1'),
     "what datums do not lock": (
         lambda p: p.feature("f", p.face("+z"), tc.Perpendicularity(0.1, "A")), None  # it is parallel: its tilts are locked
-    ),
-    "nothing locked": (
-        lambda p: p.feature("f", p.face(BORE), tc.CircularRunout(0.1, "A")),
-        "the datum system A does not lock any of what is toleranced",
     ),
     "twice the same": (
         lambda p: p.feature("f", p.face("+z"), tc.Profile(0.2, "A"), tc.Position(0.3, "A")), "controls nothing that others do"
@@ -89,6 +86,20 @@ CASES = {
     ),
     "capable of nothing": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", cp=1, cpk=2)), "cpk is 2"),
     "outside of its zone": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A", outside=0.2)), "outside is 0.2"),
+    "a narrower one that fills it": (
+        lambda p: p.feature("f", p.face(BORE), tc.Position(0.2, "A|B", projected=40), tc.Perpendicularity(0.1, "A")),
+        "leave 17 % of the features outside already",
+    ),
+    "outside of a cylinder": (
+        lambda p: p.feature("f", p.face(BORE), tc.Profile(0.2, "A|B", outside=0.1)), "how much of it is outside"
+    ),
+    "a flat zone of a plane": (
+        lambda p: p.feature("f", p.face("+z"), tc.Position(0.1, "A", zone="flat", along="x")), "are for axes; leave them out"
+    ),
+    "a middle that stands still": (
+        lambda p: p.feature("f", p.face("+z"), p.face("-z"), tc.Size(30, 0.1, moves="first"), tc.Symmetry(0.1, "B")),
+        "has no middle that could have a place",
+    ),
     "bonus alone, accepted only": (
         lambda p: p.feature("f", p.face(BORE), tc.Size(10, 0.1), tc.Position(0, "A|B", material="M", bonus="accepts")),
         "a zone of width 0 is its bonus alone",
@@ -105,6 +116,16 @@ def test_it_has_one_message(name):
     else:
         (fault,) = faults
         assert said in fault and 'part "ring"' in fault
+
+
+def test_a_datum_that_locks_nothing_is_named():
+    a = toleranced.ball_with()
+    part = a.parts[0]
+    part.feature("centre", part.face(lambda c, n: np.linalg.norm(c - (3, 2, 20), axis=1) < 7), datum="S")
+    del part._features[-2]  # the ball without a letter
+    part.feature("over", part.face("+x", lambda c, n: abs(c[:, 0] - 20) < 1e-9), tc.Parallelism(0.1, "S"))
+    (fault,) = [each for each in tc.check(a) if "lock" in each]
+    assert "parallelism: the datum system S does not lock any of what is toleranced; add the datum that does" in fault
 
 
 def test_datums_that_refer_to_each_other_are_named():

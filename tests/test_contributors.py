@@ -140,3 +140,26 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
         a.population(tmp_path / "none.csv")
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):
         a.population({"one": [1, 2], "two": [1, 2]}, {"top.A1": "width"})
+
+
+def test_measured_places_have_used_their_bonus():
+    a = toleranced.ring_with("bore", tc.Size(10, 0.1, 0), tc.Position(0.2, "A|B", material="M"))
+    a.population({"ring.bore.shift x": [0.05, -0.05], "ring.bore.size": [0.1, 0.1]})
+    assert sorted(set(draws_of(a)["ring.bore.shift x"])) == [-0.05, 0.05]
+
+
+def test_a_bonus_is_of_the_size_that_shared_causes_leave():
+    said = {"material": "M", "rule": "translation"}
+    a = toleranced.ring_with("bore", tc.Size(10, 0.1, 0, distribution="uniform"), tc.Position(0.1, "A|B", **said))
+    a.variable("wear", tc.Tolerance(0.02, shift=-0.05), drives={"ring.bore.size": 1.0})
+    drawn = draws_of(a)
+    off, room = np.hypot(drawn["ring.bore.shift x"], drawn["ring.bore.shift y"]), 0.1 + np.maximum(drawn["ring.bore.size"], 0)
+    low, high = stats.binom.interval(0.9999, SAMPLES, 0.9973)
+    assert low <= (off <= room / 2).sum() <= high
+
+
+def test_what_is_drawn_together_is_not_correlated():
+    a = toleranced.ring_with("bore", tc.Position(0.2, "A|B", rule="uniform"))
+    a.correlate(["ring.bore.shift x", "ring.bore.shift y"], np.float32(0.5))
+    (fault,) = tc.check(a)
+    assert 'is drawn with others by the rule "uniform"; choose a rule of normal components' in fault

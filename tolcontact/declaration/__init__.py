@@ -93,7 +93,7 @@ feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
 | `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
 | `tc.Profile(0.2, "A", outside=0.15)` | any surface | place and tilt; without datums form alone |
 | `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
-| `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place (and tilt); axial: tilt |
+| `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
 | `tc.Flatness` | plane | form, which moves nothing yet |
 
 A tolerance limits what its datums lock, and nothing else: a hole's position to a plane across it is a tolerance of its tilt.

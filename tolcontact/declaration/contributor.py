@@ -142,7 +142,7 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
 
 def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:
     """A Correlation; `matrix` may be an array, or one coefficient for two contributors."""
-    if isinstance(matrix, int | float):
+    if is_length(matrix):
         matrix = [[1.0, matrix], [matrix, 1.0]]
     try:
         rows = tuple(tuple(float(number) for number in row) for row in matrix)

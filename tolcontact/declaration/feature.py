@@ -67,6 +67,14 @@ class Feature(Readable):
                 yield f"{each.word}: a bonus (material {each.material!r}) needs the tolerance of a size; add tc.Size(...)"
         if self.size and self.size.moves != "both" and len(self.faces) == 1:
             yield f"size: moves is {self.size.moves!r}, but the feature has one face; leave it out"
+        elif self.size and self.size.moves != "both" and any(each.kind != "flatness" for each in self.geometric):
+            yield (
+                f"size: moves is {self.size.moves!r}, so the feature has no middle that could have a place; give its other "
+                'tolerances to a feature of the face alone, in place of the size, or let "both" move'
+            )
+        yield from self._form_faults()
+
+    def _form_faults(self) -> Iterator[str]:
         forms = [each for each in self.geometric if each.kind == "flatness"]
         for form in forms:
             for other in self.geometric:

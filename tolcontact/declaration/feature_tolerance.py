@@ -236,7 +236,10 @@ class Angularity(GeometricTolerance):
 
 
 class CircularRunout(GeometricTolerance):
-    """Radial of a cylinder, in each section, or axial of a plane, to the axis of its datums (ISO 1101, 17.15)."""
+    """Radial of a cylinder, in each section, or axial of a plane, to the axis of its datums (ISO 1101, 17.15).
+
+    Without form it is the same as total run-out: no section may be farther off.
+    """
 
     kind = "circular run-out"
 

@@ -12,7 +12,7 @@ import numpy as np
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.discretization.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
 from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.faces import Meshes, kept_triangles, patch
+from tolcontact.discretization.faces import Meshes, patch
 from tolcontact.discretization.fault import GeometryFault, where
 from tolcontact.discretization.features import Features
 from tolcontact.discretization.nominal import ContactPoints, NominalPart
@@ -98,7 +98,7 @@ def _deviating(face: Face, part: NominalPart, meshes: Meshes, features: Features
     """What a face deviates by, if it is of a feature."""
     if not part.part.features:
         return None
-    number = features.face_at(part.part, kept_triangles(face, meshes), part.placement)
+    number = features.face_at(face, meshes, part.placement)
     return None if number is None else features.faces[number]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.discretization.feature_geometry import FeatureGeometry
 
-NOTICED = 1e-9  # smallest singular value, beside the largest, of a displacement that a datum notices
+NOTICED = 1e-4  # smallest singular value, beside the largest, of a displacement that a datum notices
 
 
 class Datum(NamedTuple):

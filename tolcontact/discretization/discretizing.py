@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.doubtful_sizes import warn_of_units
-from tolcontact.discretization.faces import Meshes, kept_triangles
+from tolcontact.discretization.faces import Meshes
 from tolcontact.discretization.fault import GeometryFault, where
 from tolcontact.discretization.features import Features, in_order
 from tolcontact.discretization.locators import Locators
@@ -97,23 +97,16 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
     standing: list[int | None] = []
     if isinstance(location, ThreeTwoOne):
         found = [
-            _attempt(
-                faults, where("part", part.part), features.face_at, part.part, kept_triangles(face, meshes), part.placement
-            )
+            _attempt(faults, where("part", part.part), features.face_at, face, meshes, part.placement)
             for face in location.faces
         ]
         standing = [found[k] for k in (0, 0, 0, 1, 1, 2)]
     else:
         for locator in location:
             own = features.of(locator.on) if locator.on and any(f.feature is locator.on for f in features.found) else None
-            standing.append(None if own is None else features.face(own, _only(own.triangles), part.placement))
+            standing.append(None if own is None else features.face_with(own, np.array(locator.point), part.placement))
     faces = tuple(None if number is None else features.faces[number] for number in standing)
     return replace(part, locators=replace(part.locators, faces=faces))
-
-
-def _only(faces: Sequence[Any]) -> int | None:
-    """The number of the only face; None, which stands for their middle, of two."""
-    return 0 if len(faces) == 1 else None
 
 
 def _strange_contributors(assembly: Assembly, labels: Sequence[str]) -> Iterator[str]:

@@ -89,6 +89,18 @@ def kept_triangles(face: Face, meshes: Meshes) -> np.ndarray:
     return np.asarray(chosen[kept])
 
 
+def shared_area(one: Face, other: Face, meshes: Meshes) -> float:
+    """The area [mm^2] of what two faces of a part have in common."""
+    common = np.intersect1d(kept_triangles(one, meshes), kept_triangles(other, meshes))
+    boxes = [each for face in (one, other) for each in face.selections if isinstance(each, Inside)]
+    if not common.size:
+        return 0.0
+    try:
+        return float(patch(Face(one.part, (Triangles(tuple(common.tolist())), *boxes)), meshes).mesh.area)
+    except GeometryFault:  # nothing of it lies in all boxes
+        return 0.0
+
+
 def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.ndarray:
     indices = np.asarray(selection.indices, dtype=int)
     if indices.size and not (0 <= indices.min() and indices.max() < len(mesh.faces)):

@@ -16,9 +16,11 @@ from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.surface import Surface
 
+ALIKE = 1e-3  # of an area: rectangles of sizes nearer than that are alike
 ALONG = 1e-6  # what a direction differs from an axis of the part by that is named after it
 NOTICED = 1e-3  # of a displacement: how much of it a general surface must notice along its normals
 EXTREMES = 4096  # displacements by which extremes of a general surface are found
+ROUND = 32  # points around the end of a cone
 OPPOSED = 1e-3  # rad: how far two planes may be from parallel
 AXES = np.eye(3)
 NONE = np.zeros(3)
@@ -40,6 +42,7 @@ class FeatureGeometry:
     size     [mm] diameter or distance that it has nominally; else NaN
     normals  outward normals (3,) of its faces, if they are planes
     is_inner  whether its size is that of a gap in the material: a hole, a slot
+    walls    places and directions along the normals of a cone's surface, by which its profile is measured
     """
 
     kind: str
@@ -54,12 +57,17 @@ class FeatureGeometry:
     size: float
     normals: tuple[np.ndarray, ...]
     is_inner: bool
+    walls: tuple[np.ndarray, np.ndarray] | None = None
 
     @property
     def extremes(self) -> np.ndarray:
         """What is measured at its extremes, for coordinates of 1 mm: rows (point, entry, coordinate)."""
-        moved = self.twists[:3].T + np.cross(self.twists[3:].T, (self.places - self.centre)[:, None])
-        return np.asarray(np.einsum("pqk,pek->peq", moved, self.directions))
+        return self.rows(self.places, self.directions)
+
+    def rows(self, places: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """The same along `directions` (point, entry, 3) at `places` (point, 3)."""
+        moved = self.twists[:3].T + np.cross(self.twists[3:].T, (places - self.centre)[:, None])
+        return np.asarray(np.einsum("pqk,pek->peq", moved, directions))
 
     @property
     def reach(self) -> float:
@@ -136,9 +144,13 @@ def _plane(
     size: float,
     is_inner: bool,
 ) -> FeatureGeometry:
-    """Of a plane with normal n, as large as `points` (point, 3) on it."""
+    """Of a plane with normal n, as large as `points` (point, 3) on it: tilts are at the edges of the least rectangle around."""
     u, v, names = _frame(n)
     corners = _hull(np.column_stack([points @ u, points @ v]))
+    turn = _least_rectangle(corners)
+    if turn:
+        u, v = np.cos(turn) * u + np.sin(turn) * v, np.cos(turn) * v - np.sin(turn) * u
+        names, corners = ("u", "v"), _turned(corners, turn)
     low, high = corners.min(axis=0), corners.max(axis=0)
     half, middle = (high - low) / 2, (high + low) / 2
     centre = middle[0] * u + middle[1] * v + float(place @ n) * n
@@ -150,6 +162,20 @@ def _plane(
     directions = np.tile(n, (len(places), 1, 1))
     coordinates = ("offset", f"tilt {names[0]}", f"tilt {names[1]}")
     return FeatureGeometry(kind, centre, coordinates, T, B, places, directions, n, 0.0, size, normals, is_inner)
+
+
+def _least_rectangle(corners: np.ndarray) -> float:
+    """By which angle [rad] the least rectangle around an outline (corner, 2) is turned; 0 if that along axes is as small."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    turns = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (np.pi / 2), 9))
+    areas = np.array([np.ptp(_turned(corners, turn), axis=0).prod() for turn in (0.0, *turns)])
+    return 0.0 if areas[0] < areas.min() * (1 + ALIKE) else float(turns[areas[1:].argmin()])
+
+
+def _turned(corners: np.ndarray, turn: float) -> np.ndarray:
+    """Coordinates (corner, 2) along axes that are turned by an angle."""
+    cos, sin = np.cos(turn), np.sin(turn)
+    return np.asarray(corners @ np.array([[cos, -sin], [sin, cos]]))
 
 
 def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGeometry:
@@ -171,8 +197,7 @@ def _axis(face: Surface, form: Form) -> FeatureGeometry:
     """Of a cylinder or a cone."""
     a = form.axis
     u, v, names = _frame(a)
-    if form.kind == "cylinder":
-        a = a * np.sign(a[np.abs(a).argmax()])  # whichever way the file has it
+    a = a * np.sign(a[np.abs(a).argmax()])  # whichever way the file has it
     points = np.asarray(face.mesh.vertices)
     along = points @ a
     half, middle = float(np.ptp(along)) / 2, float(along.max() + along.min()) / 2
@@ -190,7 +215,15 @@ def _axis(face: Surface, form: Form) -> FeatureGeometry:
     ends = centre + half * np.array([[-1.0], [1.0]]) * a
     directions = np.array([[u, v]] * 2)
     is_inner = face.pieces[0].is_hollow
-    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, ends, directions, a, half, size, (), is_inner)
+    walls = None
+    if form.kind == "cone":
+        around = np.arange(ROUND) * 2 * np.pi / ROUND
+        out = np.cos(around)[:, None] * u + np.sin(around)[:, None] * v
+        reach = np.abs((ends - form.origin) @ form.axis)[:, None, None] * np.tan(form.angle)
+        places = (ends[:, None] + reach * out).reshape(-1, 3)
+        normals = np.cos(form.angle) * np.tile(out, (2, 1)) - np.sin(form.angle) * form.axis
+        walls = (places, normals[:, None])
+    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, ends, directions, a, half, size, (), is_inner, walls)
 
 
 def axis_rows(places: np.ndarray, coordinates: int, across: np.ndarray | None = None) -> np.ndarray:

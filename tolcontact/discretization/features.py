@@ -1,20 +1,23 @@
 """Features with numbers: which freedoms their tolerances control, and how their faces deviate with what varies."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from tolcontact.declaration import Feature, GeometricTolerance, Part
+from tolcontact.declaration import Face, Feature, GeometricTolerance, Part
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.discretization.datum_system import Datum, DatumFrame, datum_frame
 from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.faces import Meshes, kept_triangles, patch
+from tolcontact.discretization.faces import Meshes, patch, shared_area
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.feature_geometry import FeatureGeometry, feature_geometry
+from tolcontact.discretization.surface import Surface
 from tolcontact.discretization.zone_rows import zone_rows
 
-SAME = 1e-9  # smallest singular value of what is another direction
+SAME = 1e-4  # smallest singular value of what is another direction: shapes of single precision are no better
+SLIGHT = 1e-6  # of a face's area: less of it is none
+ON = 1e-4  # of a face's size: how near a point on it is
 SIZES = 1e-6  # of a size: what a shape's may differ from the one stated
 
 
@@ -41,7 +44,7 @@ class NominalFeature:
 
     labels       "part.feature.freedom" of its contributors
     coordinates  (coordinate, column): of the feature, for deviations of 1 of the columns of all features before, and its own
-    triangles    of each of its faces
+    surfaces     its faces, in the part's own frame
     """
 
     feature: Feature
@@ -51,7 +54,7 @@ class NominalFeature:
     first: int
     labels: tuple[str, ...]
     coordinates: np.ndarray
-    triangles: tuple[np.ndarray, ...]
+    surfaces: tuple[Surface, ...]
 
     @property
     def label(self) -> str:
@@ -78,9 +81,8 @@ class Features:
 
     def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
         """The next feature, whose datums have been added before. Raises GeometryFault."""
-        surfaces = [patch(face, meshes) for face in feature.faces]
-        chosen = tuple(kept_triangles(face, meshes) for face in feature.faces)
-        self._check_shared(feature, chosen)
+        surfaces = tuple(patch(face, meshes) for face in feature.faces)
+        self._check_shared(feature, meshes)
         geometry = feature_geometry(surfaces)
         first = self.first + len(self.labels)
         layers = _layers(feature, geometry, {own.feature.datum: own for own in self.found if own.part == part}, first)
@@ -96,37 +98,45 @@ class Features:
             Q[:, :first] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
             column += new
         labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.found.append(NominalFeature(feature, part, geometry, layers, first, labels, Q, chosen))
+        self.found.append(NominalFeature(feature, part, geometry, layers, first, labels, Q, surfaces))
 
-    def _check_shared(self, feature: Feature, chosen: Sequence[np.ndarray]) -> None:
-        for other in self.found:
-            if other.feature.part is feature.part:
-                for face, own in zip(_moving(feature, chosen), chosen, strict=True):
-                    for taken, theirs in zip(_moving(other.feature, other.triangles), other.triangles, strict=True):
-                        if face and taken and np.intersect1d(own, theirs).size:
-                            raise GeometryFault(
-                                f'it shares a face with feature "{other.feature.name}", so that would deviate twice; give all '
-                                "tolerances of a face to one feature"
-                            )
+    def _check_shared(self, feature: Feature, meshes: Meshes) -> None:
+        for other in (each.feature for each in self.found if each.feature.part is feature.part):
+            for own, moves in zip(feature.faces, _moving(feature), strict=True):
+                for theirs, moved in zip(other.faces, _moving(other), strict=True):
+                    if moves and moved and shared_area(own, theirs, meshes) > SLIGHT * patch(own, meshes).mesh.area:
+                        raise GeometryFault(
+                            f'it shares a face with feature "{other.name}", so that would deviate twice; give all tolerances '
+                            "of a face to one feature"
+                        )
 
-    def face_at(self, part: Part, chosen: np.ndarray, placement: tuple[np.ndarray, np.ndarray]) -> int | None:
-        """The number of the face that deviates with a feature and has all of the `chosen` triangles; None if none has any.
+    def face_at(self, face: Face, meshes: Meshes, placement: tuple[np.ndarray, np.ndarray]) -> int | None:
+        """The number of the face that deviates with a feature and has all of a `face`; None if none has any of it.
 
-        Raises GeometryFault if one has only some of them.
+        Raises GeometryFault if one has only some of it.
         """
         for own in self.found:
-            if own.feature.part is not part or not own.labels:
+            if own.feature.part is not face.part or not own.labels:
                 continue
-            for number, theirs in enumerate(own.triangles):
-                shared = np.isin(chosen, theirs)
-                if shared.all() and _moving(own.feature, own.triangles)[number]:
+            for number, theirs in enumerate(own.feature.faces):
+                share = shared_area(face, theirs, meshes) / patch(face, meshes).mesh.area
+                if share > 1 - SLIGHT and _moving(own.feature)[number]:
                     return self.face(own, number, placement)
-                if shared.any() and not shared.all():
+                if SLIGHT < share <= 1 - SLIGHT:
                     raise GeometryFault(
-                        f'its face on part "{part.name}" is partly that of feature "{own.feature.name}", which deviates by '
-                        "itself; declare one pair (or scheme) for the feature, and another one for the rest"
+                        f'its face on part "{face.part.name}" is partly that of feature "{own.feature.name}", which deviates '
+                        "by itself; declare one pair (or scheme) for the feature, and another one for the rest"
                     )
         return None
+
+    def face_with(self, own: NominalFeature, position: np.ndarray, placement: tuple[np.ndarray, np.ndarray]) -> int:
+        """The number of the face of a feature that a point (3,) [mm], in its part's frame, is on; of the middle of two else."""
+        if len(own.surfaces) == 1:
+            return self.face(own, 0, placement)
+        close = ON * max(surface.mesh.scale for surface in own.surfaces)
+        away = [float(np.linalg.norm(surface.nearest(position[None])[1][0] - position)) for surface in own.surfaces]
+        nearest = int(np.argmin(away))
+        return self.face(own, nearest if away[nearest] <= close else None, placement)
 
     def of(self, feature: Feature) -> NominalFeature:
         """The numbers of a declared feature."""
@@ -141,10 +151,10 @@ class Features:
         return self._face_of[key]
 
 
-def _moving(feature: Feature, faces: Sequence[np.ndarray]) -> list[bool]:
+def _moving(feature: Feature) -> list[bool]:
     """Which faces of a feature deviate with it: one that only its partner's distance is measured from does not."""
     if feature.size is None or feature.size.moves == "both":
-        return [True] * len(faces)
+        return [True] * len(feature.faces)
     return [feature.size.moves == "first", feature.size.moves == "second"]
 
 
@@ -259,7 +269,7 @@ def _face_deviation(own: NominalFeature, number: int | None, placement: tuple[np
     if size is not None and number is not None:
         sign = -1.0 if geometry.is_inner else 1.0
         if geometry.kind == "planes":
-            share = 0.5 if size.moves == "both" else float(_moving(own.feature, own.triangles)[number])
+            share = 0.5 if size.moves == "both" else float(_moving(own.feature)[number])
             twist[:3, own.size_column] += sign * share * geometry.normals[number]
         else:
             height[own.size_column] = sign / 2

@@ -10,7 +10,7 @@ from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point
 from tolcontact.discretization.curvature import chord_height
 from tolcontact.discretization.face_deviation import FaceDeviation
 from tolcontact.discretization.face_pair import FacePair, side
-from tolcontact.discretization.faces import patch, triangles
+from tolcontact.discretization.faces import triangles
 from tolcontact.discretization.features import Features, NominalFeature
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.offsets import Offsets
@@ -172,19 +172,22 @@ class Nominal:
         return self.parts[self.part_index(point.part)].placed(np.array(own))
 
     def face_at(self, point: Point) -> FaceDeviation | None:
-        """What a declared point moves with beside its part; of a feature with two faces their middle."""
+        """What a declared point moves with beside its part: the face of its feature that it is on, or the middle of two."""
         if point.on is None:
             return None
         own = self._features.of(point.on)
-        middle = point.end is not None or len(own.triangles) > 1
-        number = self._features.face(own, None if middle else 0, self.parts[own.part].placement)
+        placement = self.parts[own.part].placement
+        if point.position is None:
+            number = self._features.face(own, None, placement)
+        else:
+            number = self._features.face_with(own, np.array(point.position), placement)
         return self.faces[number]
 
     def outward(self, point: Point) -> np.ndarray:
         """Outward normal (3,), in the nominal assembly frame, of the face at a point on a feature."""
         part = self.parts[self.part_index(point.part)]
-        surface = patch(point.on.faces[0], {each.part: each.mesh for each in self.parts}) if point.on else None
-        if surface is None or point.position is None:
+        if point.on is None or point.position is None:
             return np.zeros(3)
+        surface = self._features.of(point.on).surfaces[0]  # what grows in height has one face
         triangle, foot = surface.nearest(np.array([point.position]))
         return np.asarray(part.placement[0] @ surface.normals(triangle, foot)[0])

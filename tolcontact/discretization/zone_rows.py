@@ -20,19 +20,21 @@ def zone_rows(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: 
     _check_kind(tolerance, feature)
     if kind == "flatness":
         return np.zeros((0, 1, count))
+    if kind == "profile" and feature.walls is not None:
+        return feature.rows(*feature.walls)
     if kind == "profile" or not (feature.is_axis or kind in ORIENTATIONS or kind in RUNOUTS):
         return feature.extremes
     if feature.is_plane:
         return _halved_differences(feature)
     if kind in ORIENTATIONS:
         return _at(tolerance, feature, np.array([1.0]), tilt_only=True)
-    if kind == "circular run-out":
-        return axis_rows(np.array([0.0]), count)
     return _at(tolerance, feature, _places(tolerance, feature, primary))
 
 
 def _check_kind(tolerance: GeometricTolerance, feature: FeatureGeometry) -> None:
     kind = tolerance.kind
+    if not feature.is_axis and (tolerance.zone or tolerance.along is not None or tolerance.projected is not None):
+        raise GeometryFault(f"{kind}: zone, along and projected are for axes; leave them out")
     if kind == "flatness":
         _need(tolerance, feature, feature.is_plane, "planes")
     elif kind in ORIENTATIONS or kind in RUNOUTS:
@@ -42,6 +44,8 @@ def _check_kind(tolerance: GeometricTolerance, feature: FeatureGeometry) -> None
     elif kind == "symmetry":
         between = feature.kind == "planes" or (feature.is_axis and tolerance.zone == "flat")
         _need(tolerance, feature, between, 'two opposed planes, or axes with zone="flat"')
+    elif kind == "profile" and tolerance.outside is not None:
+        _need(tolerance, feature, feature.kind == "plane", "planes, if it says how much of it is outside")
     elif kind == "position" and feature.kind == "general":
         raise GeometryFault("position needs a plane, cylinder, cone or sphere, and its face is none of these; use tc.Profile")
 

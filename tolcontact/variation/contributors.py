@@ -1,6 +1,6 @@
 """Contributors: everything that varies, and how. Each is a column of the deviations."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ from tolcontact.errors import ModelError
 from tolcontact.variation import zones
 from tolcontact.variation.quantiles import quantile
 
+ROOM = 1e-3  # what share of features tolerances within another one may leave outside of it, beyond 0.27 %
 JOINT = ("truncated", "uniform", "polar")  # rules by which components are drawn together
 LOCATOR, FEATURE, VARIABLE = "locator", "feature", "variable"  # sources
 
@@ -64,12 +65,18 @@ class Contributor(NamedTuple):
 class Together:
     """Components of a feature that are drawn together.
 
+    rule      by which
     columns   of the deviations
     draw      made of uniform numbers: attempt -> (n, component), anew for each attempt
     """
 
+    rule: str
     columns: np.ndarray
     draw: Callable[[Callable[[int], np.ndarray]], np.ndarray]
+
+    def rules(self, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
+        """The labels of its columns, with the rule."""
+        return ((labels[column], self.rule) for column in self.columns)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,10 +121,11 @@ class Contributors:
             width = float(tolerance.width) or self._unit(own, tolerance, first=not len(known))
             spread = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
             s = spread(rows, known, count, width)
-            known = np.concatenate([known, np.full(count, s)])
+            self._check_room(own, layer, rows[..., : len(known)], known, width)
+            known = np.concatenate([known, np.full(count, s / tolerance.cp)])
             mean = _mean(own, layer, s)
             if tolerance.rule in JOINT:
-                self.together.append(Together(columns, _joint(tolerance.rule, rows, s, width)))
+                self.together.append(Together(tolerance.rule, columns, _joint(tolerance.rule, rows, s, width)))
             if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
                 self.bonuses.append(Bonus(columns, own.size_column, _growth(own, tolerance, width)))
             for k in range(count):
@@ -135,6 +143,14 @@ class Contributors:
             )  # fmt: skip
         if rule == "polar" and not (own.geometry.is_axis and layer.rows.shape[1] == layer.added.shape[1] == 2):
             self._refuse(own, f'{layer.tolerance.word}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
+
+    def _check_room(self, own: NominalFeature, layer: Layer, rows: np.ndarray, known: np.ndarray, width: float) -> None:
+        share = zones.share_inside(rows, known, width)
+        if share < zones.SHARE - ROOM:
+            self._refuse(
+                own, f"{layer.tolerance.word} {layer.tolerance.width:g}: the narrower tolerances within it leave "
+                f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
+            )  # fmt: skip
 
     def _unit(self, own: NominalFeature, tolerance: GeometricTolerance, *, first: bool) -> float:
         """The width for which a zone is scaled that has none but its bonus: 1 mm."""

@@ -4,9 +4,12 @@ The draw of a contributor in realization k depends on the seed, the contributor'
 labels of the others, too): not on blocks, or on the order of declarations.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.special import ndtr, ndtri
 
+from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.variation.contributors import Contributors
@@ -23,6 +26,18 @@ class Draws:
         self.contributors = Contributors(nominal)
         self._assembly = nominal.assembly
         self._column = {each.label: k for k, each in enumerate(self.contributors.every)}
+        populations = self._assembly.populations
+        self._measured = [self._column[label] for population in populations for label in population.columns]
+        together = {label: rule for own in self.contributors.together for label, rule in own.rules(list(self._column))}
+        faults = []
+        for each in self._assembly.correlations:
+            if joint := [label for label in each.labels if label in together]:
+                faults.append(
+                    f'correlation "{each.name}" ({each.declared_at}): "{joint[0]}" is drawn with others by the rule '
+                    f'"{together[joint[0]]}"; choose a rule of normal components, such as "{INSIDE}"'
+                )
+        if faults:
+            raise ModelError(self._assembly.name, faults)
         self._factors = [np.linalg.cholesky(np.array(each.matrix)) for each in self._assembly.correlations]
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
@@ -48,13 +63,21 @@ class Draws:
             rows = uniform(seed, f"population {number + 1}: {', '.join(population.columns)}", start, stop)
             drawn = population.values[(rows * len(population.values)).astype(int)]
             deviations[:, [self._column[label] for label in population.columns]] = drawn
+        sizes = {bonus.size for bonus in self.contributors.bonuses}
+        self._drive(deviations, lambda column: column in sizes)
         for bonus in self.contributors.bonuses:
-            deviations[:, bonus.columns] *= bonus.factor(deviations[:, bonus.size])[:, None]
-        for variable in self._assembly.variables:
-            for label, factor in variable.drives.items():
-                deviations[:, self._column[label]] += factor * deviations[:, self._column[variable.name]]
+            drawn_here = np.setdiff1d(bonus.columns, self._measured)  # measured parts have used their bonus
+            deviations[:, drawn_here] *= bonus.factor(deviations[:, bonus.size])[:, None]
+        self._drive(deviations, lambda column: column not in sizes)
         self._check(deviations)
         return deviations
+
+    def _drive(self, deviations: np.ndarray, drives: Callable[[int], bool]) -> None:
+        """Add what shared causes make of some columns."""
+        for variable in self._assembly.variables:
+            for label, factor in variable.drives.items():
+                if drives(self._column[label]):
+                    deviations[:, self._column[label]] += factor * deviations[:, self._column[variable.name]]
 
     def _correlated(self, seed: int, start: int, stop: int) -> dict[int, np.ndarray]:
         """Uniform numbers (realization,) of correlated contributors by their column: a Gaussian copula."""

@@ -15,7 +15,7 @@ from tolcontact.discretization import Nominal, NominalFeature
 from tolcontact.variation.contributors import bonus
 from tolcontact.variation.draws import Draws
 
-NOTICED = 1e-9  # of the largest: a smaller singular value is a freedom that datums do not notice
+NOTICED = 1e-4  # of the largest: a smaller singular value is a freedom that datums do not notice
 STATED = 0.9973
 ROUNDING = 1e-9  # of a width
 
@@ -65,12 +65,13 @@ def _zone(own: NominalFeature, said: str, stated: float, needed: np.ndarray, all
     return MeasuredZone(own.label, said, stated, int(inside.sum()), len(needed), float(np.quantile(needed, STATED)))
 
 
-def _probed(own: NominalFeature, places: np.ndarray, deviations: np.ndarray, centre: np.ndarray) -> _Probed:
-    """The feature at `places` (point, 3), along its directions."""
+def _probed(
+    own: NominalFeature, places: np.ndarray, directions: np.ndarray, deviations: np.ndarray, centre: np.ndarray
+) -> _Probed:
+    """The feature at `places` (point, 3), along `directions` (point, entry, 3)."""
     geometry = own.geometry
     moved = deviations[:, : own.coordinates.shape[1]] @ (geometry.twists @ own.coordinates).T
     displaced = moved[:, None, :3] + np.cross(moved[:, None, 3:], places - geometry.centre)
-    directions = geometry.directions
     arms = np.broadcast_to((places - centre)[:, None], directions.shape)
     rows = np.concatenate([directions, np.cross(arms, directions)], axis=2).reshape(-1, 6)
     return _Probed(rows, np.einsum("npk,pek->npe", displaced, directions).reshape(len(deviations), -1))
@@ -84,23 +85,26 @@ def _measured(
     to_motion = np.diag([1.0] * 3 + [1 / own.geometry.reach] * 3)
     motion, free = np.zeros((len(deviations), 6)), to_motion
     for place in system:
-        probed = [_probed(datum, datum.geometry.places, deviations, centre) for datum in place]
+        probed = [_probed(datum, datum.geometry.places, datum.geometry.directions, deviations, centre) for datum in place]
         rows, values = np.vstack([each.rows for each in probed]), np.hstack([each.values for each in probed])
         _, S, Vt = np.linalg.svd(rows @ free)
         most = S.max(initial=0.0)
         rank = int((S > NOTICED * max(most, 1.0)).sum())
         taken, free = free @ Vt[:rank].T, free @ Vt[rank:].T
         motion = motion + (taken @ np.linalg.lstsq(rows @ taken, (values - motion @ rows.T).T, rcond=None)[0]).T
-    probe = _probed(own, _places(own, tolerance, system[0][0]), deviations, centre)
+    places, directions = _places(own, tolerance, system[0][0]), own.geometry.directions
+    if tolerance.kind == "profile" and own.geometry.walls is not None:
+        places, directions = own.geometry.walls
+    probe = _probed(own, places, directions, deviations, centre)
     left = probe.values - motion @ probe.rows.T
     U, S, _ = np.linalg.svd(probe.rows @ free, full_matrices=False)
     open_ = U[:, NOTICED < S]
     left = left - left @ open_ @ open_.T  # the zone follows what the datums leave open
-    needed = _needed(own, tolerance, left.reshape(len(left), *own.geometry.directions.shape[:2]))
+    needed = _needed(own, tolerance, left.reshape(len(left), *directions.shape[:2]))
     allowed = np.full(len(left), float(tolerance.width))
     if tolerance.bonus != "none" and own.size_column is not None:
         allowed += bonus(own, tolerance, deviations[:, own.size_column])
-    plain = tolerance.rule == INSIDE and tolerance.cp == 1 and tolerance.cpk is None
+    plain = all(each.rule == INSIDE and each.cp == 1 and each.cpk is None for each in own.feature.geometric)
     plain = plain and not (tolerance.material and (tolerance.bonus == "accepts" or len(own.layers) > 1))
     sure = tolerance.rule in ("truncated", "uniform")
     return _zone(own, f"{tolerance}; {tolerance.rule}", STATED if plain else 1.0 if sure else np.nan, needed, allowed)
@@ -122,8 +126,6 @@ def _needed(own: NominalFeature, tolerance: GeometricTolerance, left: np.ndarray
         if own.geometry.is_plane:
             return np.asarray(np.ptp(left[..., 0], axis=1))
         return _length(own, tolerance, left[:, 1] - left[:, 0])
-    if tolerance.kind == "circular run-out":
-        return 2 * _length(own, tolerance, left.mean(axis=1))
     if tolerance.outside is not None:
         left = left - (tolerance.outside - tolerance.width / 2)
     return np.asarray(2 * np.max([_length(own, tolerance, left[:, k]) for k in range(left.shape[1])], axis=0))
