@@ -77,7 +77,7 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
                         + chord_height(pair.own)
                         + chord_height(pair.surface)
                         + 1e-6 * size
-                        + shifted(R[row, CORRECTED], t[row, CORRECTED], pair)
+                        + shifted(sides, pair)
                     )
                     found["penetration of surfaces"] += int(inside > limit)
     return found
@@ -116,12 +116,12 @@ def as_archived(points: RoundPoints) -> list[ArchivedPoint]:
     return [ArchivedPoint(*({name: values[k] for name, values in of.items()} for of in both)) for k in range(len(points))]
 
 
-def shifted(R: np.ndarray, t: np.ndarray, pair: ContactPoints) -> float:
+def shifted(sides: Sides, pair: ContactPoints) -> float:
     """How much deeper than contact points, which are where faces overlapped nominally, rims may lie: shift times turn [mm]."""
-    m, r = pair.moving, pair.reference
-    turn, centre = R[r].T @ R[m], pair.P_m.mean(axis=0)
+    (R_m, t_m, _), (R_r, t_r, _) = ((each[0] for each in side) for side in sides)
+    turn, centre = R_r.T @ R_m, pair.P_m.mean(axis=0)
     angle = np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))
-    return float(angle * np.linalg.norm(R[r].T @ (R[m] @ centre + t[m] - t[r]) - centre))
+    return float(angle * np.linalg.norm(R_r.T @ (R_m @ centre + t_m - t_r) - centre))
 
 
 def depth(nominal: Nominal, pair: ContactPoints, sides: Sides) -> float:
