@@ -9,6 +9,7 @@ from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.contributor import correlation as _correlation
 from tolcontact.declaration.contributor import population as _population
 from tolcontact.declaration.feature import Feature
+from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
@@ -217,8 +218,8 @@ class Assembly(Readable):
             own = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
             said += [tolerance or location.tolerance for tolerance in own]
         widths = [tolerance.width for tolerance in said if tolerance is not None]
-        widths += [feature.size.tolerance.width for feature in self.features if feature.size]
-        widths += [float(each.width) for feature in self.features for each in feature.geometric]
+        sound = [each for feature in self.features for each in feature.tolerances if not any(each.faults())]
+        widths += [each.tolerance.width if isinstance(each, Size) else float(each.width) for each in sound]
         widths += [float(m.tolerance) for m in self._measures if m.tolerance is not None and m.units == "mm"]
         return min((width for width in widths if width > CONSTANT * max(widths)), default=math.inf)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.point import Point
-from tolcontact.declaration.vectors import vector
+from tolcontact.declaration.vectors import is_length, vector
 from tolcontact.readable import Readable
 
 if TYPE_CHECKING:
@@ -75,9 +75,9 @@ class Feature(Readable):
         yield from self._form_faults()
 
     def _form_faults(self) -> Iterator[str]:
-        forms = [each for each in self.geometric if each.kind == "flatness"]
-        for form in forms:
-            for other in self.geometric:
+        sound = [each for each in self.geometric if is_length(each.width)]
+        for form in (each for each in sound if each.kind == "flatness"):
+            for other in sound:
                 if other.kind != "flatness" and other.width < form.width:
                     yield (
                         f"{form.word} {form.width:g} is wider than {other.word} {other.width:g}, which contains it; "

@@ -25,8 +25,8 @@ COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?")
 class Size(Readable):
     """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
 
-    `tc.Size(8.1, +0.05, -0.02)` has limits 8.05 + ... unevenly about the nominal one, `tc.Size(8.1, 0.05)` evenly. Sizes fill
-    the limits as `distribution` has it (see tc.Tolerance), about their middle. Of two planes `moves` says which take part:
+    `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` 8.05 and 8.15. Between them sizes are
+    distributed as `distribution` says (see tc.Tolerance), about their middle. Of two planes `moves` says which take part:
     "both" by a half each, or the "first" or "second" alone.
     """
 
@@ -52,7 +52,7 @@ class Size(Readable):
         cpk: float | None = None,
         moves: str = "both",
     ) -> None:
-        lower = -upper if lower is None else lower
+        lower = -upper if lower is None and is_length(upper) else lower
         for name, value in (
             ("nominal", nominal), ("upper", upper), ("lower", lower), ("distribution", distribution), ("cp", cp), ("cpk", cpk),
             ("moves", moves),
@@ -61,17 +61,17 @@ class Size(Readable):
 
     @property
     def tolerance(self) -> Tolerance:
-        """How the size deviates from the nominal one [mm]."""
+        """How the size deviates from the nominal one [mm]; the limits have to be numbers."""
         if not isinstance(self.distribution, str):
             return Tolerance(distribution=self.distribution)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
         return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
 
     def faults(self) -> Iterator[str]:
-        for word, value in (("nominal", self.nominal), ("upper", self.upper), ("lower", self.lower)):
-            if not is_length(value):
-                yield f"{word} is {value!r}; expected a number in mm"
-                return
+        wrong = [word for word in ("nominal", "upper", "lower") if not is_length(getattr(self, word))]
+        if wrong:
+            yield f"{wrong[0]} is {getattr(self, wrong[0])!r}; expected a number in mm"
+            return
         if not self.nominal > 0:
             yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
         if not self.lower < self.upper:
@@ -131,13 +131,8 @@ class GeometricTolerance(Readable):
         return tuple(tuple(each.group(1).split("-")) for each in found if each)
 
     @property
-    def has_datum_shift(self) -> bool:
-        """Whether a datum has a modifier."""
-        return any(each and each.group(2) for each in map(COMPARTMENT.fullmatch, self._places))
-
-    @property
     def _places(self) -> list[str]:
-        return [place.strip() for place in self.datums.split("|")] if self.datums else []
+        return [place.strip() for place in self.datums.split("|")] if self.datums and isinstance(self.datums, str) else []
 
     @property
     def across(self) -> Vector | None:
@@ -174,7 +169,9 @@ class GeometricTolerance(Readable):
             yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
         if self.projected is not None and not (is_length(self.projected) and self.projected > 0):
             yield f"projected is {self.projected!r}; expected a length in mm above 0"
-        if self.outside is not None and not (is_length(self.outside) and 0 <= self.outside <= self.width):
+        if self.outside is not None and not (
+            is_length(self.outside) and is_length(self.width) and 0 <= self.outside <= self.width
+        ):
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
 
     def _process_faults(self) -> Iterator[str]:

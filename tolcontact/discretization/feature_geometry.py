@@ -195,9 +195,8 @@ def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGe
 
 def _axis(face: Surface, form: Form) -> FeatureGeometry:
     """Of a cylinder or a cone."""
-    a = form.axis
+    a = form.axis * np.sign(form.axis[np.abs(form.axis).argmax()])  # whichever way the file has it
     u, v, names = _frame(a)
-    a = a * np.sign(a[np.abs(a).argmax()])  # whichever way the file has it
     points = np.asarray(face.mesh.vertices)
     along = points @ a
     half, middle = float(np.ptp(along)) / 2, float(along.max() + along.min()) / 2
