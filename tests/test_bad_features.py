@@ -23,6 +23,9 @@ def ring(declare):
 
 CASES = {
     "no width": (lambda p: p.feature("f", p.face("+z"), tc.Profile(0, "A")), "width is 0; expected the full width of the zone"),
+    "a text for a width": (lambda p: p.feature("f", p.face("+z"), tc.Profile("1", "A"), tc.Flatness(0.1)), "width is '1'"),
+    "a number for datums": (lambda p: p.feature("f", p.face("+z"), tc.Profile(1, 2)), "datums is 2"),
+    "no number for a limit": (lambda p: p.feature("f", p.face(BORE), tc.Size(10, None)), "upper is None; expected a number"),
     "negative width": (lambda p: p.feature("f", p.face("+z"), tc.Profile(-1, "A")), "width is -1"),
     "bonus without a size": (
         lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B", material="M")), "needs the tolerance of a size"

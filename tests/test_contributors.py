@@ -138,6 +138,8 @@ def test_tables_that_cannot_be_read_are_named(tmp_path):
     a = cases.ra1()
     with pytest.raises(ValueError, match=r'population "none.csv" cannot be read as CSV'):
         a.population(tmp_path / "none.csv")
+    with pytest.raises(ValueError, match="a population is a int that is no table"):
+        a.population(3)
     with pytest.raises(ValueError, match=r"has no column 'width'; its columns are: one, two"):
         a.population({"one": [1, 2], "two": [1, 2]}, {"top.A1": "width"})
 

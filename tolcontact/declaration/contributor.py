@@ -127,7 +127,13 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
         except (OSError, ValueError) as error:
             raise ValueError(f'population "{said}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
     else:
-        table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
+        try:
+            table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
+        except (TypeError, ValueError) as error:
+            raise ValueError(
+                f"a population is a {type(source).__name__} that is no table ({error}); expected a CSV file, a DataFrame, a "
+                "Dataset, or columns of equal length by name"
+            ) from error
         said = f"of {len(table)} rows"
     wanted = dict(columns) if columns is not None else {str(name): name for name in table.columns}
     missing = [name for name in wanted.values() if name not in table.columns]
