@@ -3,40 +3,64 @@
 import gc
 import threading
 
+import pytest
 import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tolcontact.archive import ArchiveWriter, Run
+from tolcontact.statistics import DisplacementFields
 from tolcontact.testing import assert_gaps_recompute
 
 
-def test_files_may_be_closed_by_any_thread_while_an_archive_is_written(tmp_path):
+class Results:
+    """A circle, as results are: only the collector finds it."""
+
+    def __init__(self, path, collected_by):
+        self.own, self.collected_by, self.tree = self, collected_by, xr.open_datatree(path, engine="netcdf4")
+        self.tree["measured"].load()
+
+    def __del__(self):
+        self.collected_by.add(threading.current_thread())
+
+
+@pytest.fixture
+def left(tmp_path):
+    """Results in a list; another thread collects those that are taken out of it, at once."""
     tc.run(cases.stack(), samples=100, seed=3, solver="daqp", out=tmp_path / "left.nc", surfaces=0).close()
-    closed_by, done = set(), threading.Event()
-
-    class Results:
-        """A circle, as results are: only the collector finds it."""
-
-        def __init__(self):
-            self.own, self.tree = self, xr.open_datatree(tmp_path / "left.nc", engine="netcdf4")
-            self.tree["measured"].load()
-
-        def __del__(self):
-            self.tree.close()
-            closed_by.add(threading.current_thread())
+    collected_by, done = set(), threading.Event()
 
     def collect():
-        while not done.wait(0.1):
+        while not done.wait(0.01):
             gc.collect()
 
+    # xarray itself does not bear that one thread closes a file while another one opens one: all are opened before.
+    gc.freeze()  # collecting takes no time that the run needs
+    files = [Results(tmp_path / "left.nc", collected_by) for _ in range(40)]
     collector = threading.Thread(target=collect)
     collector.start()
-    try:
-        tc.run(
-            cases.ra1(), samples=30_000, solver="daqp", out=tmp_path / "ra1.nc", surfaces=0, progress=lambda _: Results()
-        ).close()
-    finally:
-        done.set()
-        collector.join()
-    assert collector in closed_by
+    yield files
+    done.set()
+    collector.join()
+    gc.unfreeze()
+    assert not files
+    assert collector in collected_by
+
+
+def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left):
+    def drop(rows):
+        del left[:20]
+
+    run = tc.run(cases.ra1(), samples=30_000, solver="daqp", out=tmp_path / "ra1.nc", surfaces=256, progress=drop)
+    run.close()
     assert_gaps_recompute(tmp_path / "ra1.nc")
+
+
+def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(tmp_path, left):
+    program = tc.build(cases.stack(), solver="daqp")
+    sizes = DisplacementFields(program.nominal, "none").sizes
+    with ArchiveWriter(tmp_path / "stack.nc", program, Run(1, 1000, "all", 8, "none"), sizes) as writer:
+        rows = writer.chosen(1)
+        for _ in range(150):
+            del left[:1]
+            assert (writer.chosen(1) == rows).all()

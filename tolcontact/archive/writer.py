@@ -16,6 +16,7 @@ from typing import Any, Literal
 
 import netCDF4
 import numpy as np
+from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import archived_poses, choose, nothing_checked
@@ -32,6 +33,7 @@ from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 
+_XARRAYS_LOCK = combine_locks([NETCDFC_LOCK, HDF5_LOCK])  # its engine "netcdf4" holds it while it reads and closes
 CHECKPOINTS_EVERY = 2.0  # s, at least: with their fields they take some 50 ms for a part with 100 000 vertices
 
 
@@ -204,7 +206,9 @@ def _group_of(variable: words.Variable) -> str:
     return "sample" if variable is words.DEVIATION else ""
 
 
-def _opened(path: Path, mode: Literal["w", "r+", "r"]) -> netCDF4.Dataset:
-    file = netCDF4.Dataset(path, mode, format="NETCDF4")
-    file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
-    return file
+@contextlib.contextmanager
+def _opened(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
+    """A file for the netCDF library, which does not bear that another thread, in which garbage is collected, closes a file."""
+    with _XARRAYS_LOCK, netCDF4.Dataset(path, mode, format="NETCDF4") as file:
+        file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
+        yield file
