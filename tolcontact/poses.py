@@ -47,16 +47,6 @@ def relative(X_WM: np.ndarray, X_WR: np.ndarray) -> np.ndarray:
     return compose(inverse(X_WR), X_WM)
 
 
-def exp(theta: np.ndarray) -> np.ndarray:
-    """exp([theta]x) (..., 3, 3) of rotation vectors (..., 3) [rad]."""
-    angle = np.sqrt((theta**2).sum(axis=-1) + 1e-300)[..., None, None]
-    x, y, z = theta[..., 0], theta[..., 1], theta[..., 2]
-    none = np.zeros_like(x)
-    K = np.stack([none, -z, y, z, none, -x, -y, x, none], axis=-1).reshape(*theta.shape[:-1], 3, 3)
-    half = np.sin(angle / 2) / (angle / 2)
-    return np.asarray(np.eye(3) + np.sin(angle) / angle * K + half**2 / 2 * (K @ K))
-
-
 def turn(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """The angle (...) [rad], from 0 to pi, between the rotations of two poses."""
     apart = ((X[..., :9] - Y[..., :9]) ** 2).sum(axis=-1)  # |R - S|^2 = 8 sin^2(angle / 2)

@@ -44,8 +44,15 @@ def assembly():
     a.locate(block, six)
     a.contact("interface", moving=block.face("-z"), reference=base.face("+z"), points=8)
     a.force("weight", at=block.point(25, 1, 3), vector=(0, 0, -1))
-    post = a.part("post", bar(20, 2), at=(0, 10, 0), fixed=True)
+    post = a.part("post", bar(20, 2), at=(0, 10, 0))
     post.feature("foot", post.face("-z"), datum="A")
+    side = post.feature("side", post.face("-y"), tc.Perpendicularity(0.1, "A"))
+    held = [("z1", (1, 1, 0), "z"), ("z2", (19, 1, 0), "z"), ("z3", (10, 2, 0), "z"), ("x", (0, 1, 1), "x")]
+    a.locate(
+        post,
+        [*(tc.Locator(*one) for one in held), *(tc.Locator(f"y{x}", (x, 0, 1), "y", on=side) for x in (1, 19))],
+        tolerance=0.2,
+    )
     top = post.feature("top", post.face("+z"), tc.Profile(0.2, "A"))
     a.variable("warmth", 6, drives={"post.top.offset": 0.01}, units="K")
     a.measure("post", top.point(10, 1, 2), along="z")

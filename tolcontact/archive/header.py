@@ -304,6 +304,7 @@ def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -
     write(group, words.CONTRIBUTOR_UNITS, [each.units for each in every])
     write(group, words.TOLERANCE_RANGE, [each.range for each in every])
     write(group, words.DISTRIBUTION, [each.said for each in every])
+    write(group, words.MEAN_SHIFT, [each.mean_shift for each in every])
     locators = nominal.locators
     write(group, words.LOCATOR_LABEL, locators.labels)
     write(group, words.STIFFNESS, locators.stiffness)

@@ -45,7 +45,7 @@ ONCE = {  # by group
                 words.LOCATOR_OF_POINT, *words.ROUND, *words.FEATURE_FACES),
     "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
                words.LOCATOR_DIRECTION, words.CONTRIBUTOR_LABEL, words.CONTRIBUTOR_SOURCE, words.CONTRIBUTOR_UNITS,
-               words.FACE_OF_LOCATOR),
+               words.MEAN_SHIFT, words.FACE_OF_LOCATOR),
     "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
     "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS,
               words.MAGNITUDE_REALIZATIONS, words.FIELD_SUMS,

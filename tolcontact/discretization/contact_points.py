@@ -98,8 +98,7 @@ def _deviating(face: Face, part: NominalPart, meshes: Meshes, features: Features
     """What a face deviates by, if it is of a feature."""
     if not part.part.features:
         return None
-    number = features.face_at(face, meshes, part.placement)
-    return None if number is None else features.faces[number]
+    return features.face_at(face, meshes, part.placement)
 
 
 def _heights(deviating: tuple[FaceDeviation | None, FaceDeviation | None], facing: np.ndarray) -> Offsets:

@@ -94,18 +94,13 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
     location = part.scheme
     if location is None or not part.part.features:
         return part
-    standing: list[int | None] = []
     if isinstance(location, ThreeTwoOne):
         found = [
-            _attempt(faults, where("part", part.part), features.face_at, face, meshes, part.placement)
-            for face in location.faces
+            _attempt(faults, where("part", part.part), features.face_at, f, meshes, part.placement) for f in location.faces
         ]
-        standing = [found[k] for k in (0, 0, 0, 1, 1, 2)]
+        faces = tuple(found[k] for k in (0, 0, 0, 1, 1, 2))
     else:
-        for locator in location:
-            own = features.of(locator.on) if locator.on and any(f.feature is locator.on for f in features.found) else None
-            standing.append(None if own is None else features.face_with(own, np.array(locator.point), part.placement))
-    faces = tuple(None if number is None else features.faces[number] for number in standing)
+        faces = tuple(own.on and features.held_at(own.on, np.array(own.point), part.placement) for own in location)
     return replace(part, locators=replace(part.locators, faces=faces))
 
 

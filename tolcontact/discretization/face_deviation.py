@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact import poses as pose
-
 
 @dataclass(frozen=True, eq=False)
 class FaceDeviation:
@@ -35,14 +33,6 @@ class FaceDeviation:
         for column, factor in zip(self.columns, self.height, strict=True):
             found += factor * deviations[:, column]
         return found
-
-    def poses(self, deviations: np.ndarray) -> np.ndarray:
-        """Its poses (row, 12), by which points of the nominal face come to where they are, for deviations (row, column)."""
-        q = np.zeros((len(deviations), 6))
-        for column, factors in zip(self.columns, self.twist.T, strict=True):
-            q += deviations[:, column, None] * factors
-        R = pose.exp(q[:, 3:])
-        return pose.pose(R, q[:, :3] + self.centre - R @ self.centre)
 
     def outward(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """How far `points` (point, 3) of it go along `normals` (point, 3), to first order, for deviations of 1: (point, k)."""

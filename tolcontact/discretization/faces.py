@@ -77,30 +77,6 @@ def triangles(face: Face, meshes: Meshes) -> np.ndarray:
     return np.flatnonzero(chosen)
 
 
-def kept_triangles(face: Face, meshes: Meshes) -> np.ndarray:
-    """Indices (triangle,) of the triangles that are left of a face, whole or cut, once its boxes have cut it."""
-    mesh = meshes[face.part]
-    chosen = triangles(face, meshes)
-    corners = np.asarray(mesh.triangles)[chosen]
-    low, high = corners.min(axis=1), corners.max(axis=1)
-    kept = np.ones(len(chosen), dtype=bool)
-    for box in (each for each in face.selections if isinstance(each, Inside)):
-        kept &= ((high >= np.array(box.lower)) & (low <= np.array(box.upper))).all(axis=1)
-    return np.asarray(chosen[kept])
-
-
-def shared_area(one: Face, other: Face, meshes: Meshes) -> float:
-    """The area [mm^2] of what two faces of a part have in common."""
-    common = np.intersect1d(kept_triangles(one, meshes), kept_triangles(other, meshes))
-    boxes = [each for face in (one, other) for each in face.selections if isinstance(each, Inside)]
-    if not common.size:
-        return 0.0
-    try:
-        return float(patch(Face(one.part, (Triangles(tuple(common.tolist())), *boxes)), meshes).mesh.area)
-    except GeometryFault:  # nothing of it lies in all boxes
-        return 0.0
-
-
 def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.ndarray:
     indices = np.asarray(selection.indices, dtype=int)
     if indices.size and not (0 <= indices.min() and indices.max() < len(mesh.faces)):
@@ -203,11 +179,7 @@ def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _cut(own: Surface, box: Inside, margin: float) -> Surface:
-    vertices, faces = np.asarray(own.mesh.vertices), np.asarray(own.mesh.faces)
-    for corner, inward in ((box.lower, 1.0), (box.upper, -1.0)):
-        for axis in np.eye(3):
-            origin = np.array(corner) - inward * margin * axis
-            vertices, faces, _ = trimesh.intersections.slice_faces_plane(vertices, faces, inward * axis, origin)
+    vertices, faces = sliced(np.asarray(own.mesh.vertices), np.asarray(own.mesh.faces), box, margin)
     cut = trimesh.Trimesh(vertices, faces, process=False)
     cut.merge_vertices()
     cut.update_faces(cut.area_faces > 0)
@@ -218,6 +190,15 @@ def _cut(own: Surface, box: Inside, margin: float) -> Surface:
     origin, _ = own.nearest(cut.triangles_center)
     normals = np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
     return Surface(cut, normals, own.forms, own.form_of[origin])
+
+
+def sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """What of triangles, vertices (vertex, 3) [mm] and faces (face, 3), lies in a box that is larger by `margin` [mm]."""
+    for corner, inward in ((box.lower, 1.0), (box.upper, -1.0)):
+        for axis in np.eye(3):
+            origin = np.array(corner) - inward * margin * axis
+            vertices, faces, _ = trimesh.intersections.slice_faces_plane(vertices, faces, inward * axis, origin)
+    return vertices, faces
 
 
 def _double(own: trimesh.Trimesh) -> int:

@@ -1,6 +1,6 @@
 """Features with numbers: which freedoms their tolerances control, and how their faces deviate with what varies."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,12 +9,14 @@ from tolcontact.declaration import Face, Feature, GeometricTolerance, Part
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.discretization.datum_system import Datum, DatumFrame, datum_frame
 from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.faces import Meshes, patch, shared_area
+from tolcontact.discretization.faces import Meshes, patch
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.feature_geometry import FeatureGeometry, feature_geometry
+from tolcontact.discretization.regions import Region, region, share
 from tolcontact.discretization.surface import Surface
 from tolcontact.discretization.zone_rows import zone_rows
 
+Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
 SAME = 1e-4  # smallest singular value of what is another direction: shapes of single precision are no better
 SLIGHT = 1e-6  # of a face's area: less of it is none
 ON = 1e-4  # of a face's size: how near a point on it is
@@ -44,7 +46,8 @@ class NominalFeature:
 
     labels       "part.feature.freedom" of its contributors
     coordinates  (coordinate, column): of the feature, for deviations of 1 of the columns of all features before, and its own
-    surfaces     its faces, in the part's own frame
+    surfaces     its faces, in the part's own frame, and
+    regions      where they are on its mesh
     """
 
     feature: Feature
@@ -55,6 +58,7 @@ class NominalFeature:
     labels: tuple[str, ...]
     coordinates: np.ndarray
     surfaces: tuple[Surface, ...]
+    regions: tuple[Region, ...]
 
     @property
     def label(self) -> str:
@@ -65,6 +69,31 @@ class NominalFeature:
         """The column of its size, if that is toleranced."""
         return self.first + len(self.labels) - 1 if self.feature.size else None
 
+    def face_with(self, position: np.ndarray) -> int | None:
+        """The number of the face that a point (3,) [mm] is on; None, which is the middle, if it is on neither of two."""
+        if len(self.surfaces) == 1:
+            return 0
+        close = ON * max(surface.mesh.scale for surface in self.surfaces)
+        away = [float(np.linalg.norm(surface.nearest(position[None])[1][0] - position)) for surface in self.surfaces]
+        nearest = int(np.argmin(away))
+        return nearest if away[nearest] <= close else None
+
+    def deviation(self, number: int | None, placement: Placement) -> FaceDeviation:
+        """How a face deviates in a part that is placed there; the middle, whose size does not count, if `number` is None."""
+        geometry, size = self.geometry, self.feature.size
+        twist, height = geometry.twists @ self.coordinates, np.zeros(self.coordinates.shape[1])
+        if size is not None and number is not None:
+            sign = -1.0 if geometry.is_inner else 1.0
+            if geometry.kind == "planes":
+                moves = _moving(self.feature)
+                twist[:3, self.size_column] += sign * moves[number] / sum(moves) * geometry.normals[number]
+            else:
+                height[self.size_column] = sign / 2
+        columns = np.flatnonzero(twist.any(axis=0) | (height != 0))
+        R, t = placement
+        turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
+        return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns])
+
 
 @dataclass(eq=False)
 class Features:
@@ -72,8 +101,12 @@ class Features:
 
     first: int
     found: list[NominalFeature] = field(default_factory=list)
-    faces: list[FaceDeviation] = field(default_factory=list)
-    _face_of: dict[tuple[Feature, int | None], int] = field(default_factory=dict)
+    _used_faces: dict[tuple[Feature, int | None], FaceDeviation] = field(default_factory=dict)
+
+    @property
+    def faces(self) -> tuple[FaceDeviation, ...]:
+        """Those that pairs and locators are of."""
+        return tuple(self._used_faces.values())
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -82,7 +115,8 @@ class Features:
     def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
         """The next feature, whose datums have been added before. Raises GeometryFault."""
         surfaces = tuple(patch(face, meshes) for face in feature.faces)
-        self._check_shared(feature, meshes)
+        regions = tuple(region(face, meshes) for face in feature.faces)
+        self._check_shared(feature, regions, meshes)
         geometry = feature_geometry(surfaces)
         first = self.first + len(self.labels)
         layers = _layers(feature, geometry, {own.feature.datum: own for own in self.found if own.part == part}, first)
@@ -98,57 +132,52 @@ class Features:
             Q[:, :first] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
             column += new
         labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.found.append(NominalFeature(feature, part, geometry, layers, first, labels, Q, surfaces))
+        self.found.append(NominalFeature(feature, part, geometry, layers, first, labels, Q, surfaces, regions))
 
-    def _check_shared(self, feature: Feature, meshes: Meshes) -> None:
-        for other in (each.feature for each in self.found if each.feature.part is feature.part):
-            for own, moves in zip(feature.faces, _moving(feature), strict=True):
-                for theirs, moved in zip(other.faces, _moving(other), strict=True):
-                    if moves and moved and shared_area(own, theirs, meshes) > SLIGHT * patch(own, meshes).mesh.area:
+    def _check_shared(self, feature: Feature, regions: Sequence[Region], meshes: Meshes) -> None:
+        for other in (each for each in self.found if each.feature.part is feature.part):
+            for own, moves in zip(regions, _moving(feature), strict=True):
+                for theirs, moved in zip(other.regions, _moving(other.feature), strict=True):
+                    if moves and moved and share(own, theirs, meshes[feature.part]) > SLIGHT:
                         raise GeometryFault(
-                            f'it shares a face with feature "{other.name}", so that would deviate twice; give all tolerances '
-                            "of a face to one feature"
+                            f'it shares a face with feature "{other.feature.name}", so that would deviate twice; give all '
+                            "tolerances of a face to one feature"
                         )
 
-    def face_at(self, face: Face, meshes: Meshes, placement: tuple[np.ndarray, np.ndarray]) -> int | None:
-        """The number of the face that deviates with a feature and has all of a `face`; None if none has any of it.
+    def face_at(self, face: Face, meshes: Meshes, placement: Placement) -> FaceDeviation | None:
+        """How a face deviates that all belongs to a feature; None if none of it does.
 
-        Raises GeometryFault if one has only some of it.
+        Raises GeometryFault if some of it does.
         """
-        for own in self.found:
-            if own.feature.part is not face.part or not own.labels:
-                continue
-            for number, theirs in enumerate(own.feature.faces):
-                share = shared_area(face, theirs, meshes) / patch(face, meshes).mesh.area
-                if share > 1 - SLIGHT and _moving(own.feature)[number]:
-                    return self.face(own, number, placement)
-                if SLIGHT < share <= 1 - SLIGHT:
+        deviating = [own for own in self.found if own.feature.part is face.part and own.labels]
+        here = region(face, meshes) if deviating else None
+        for own in deviating:
+            for number, theirs in enumerate(own.regions):
+                common = share(here, theirs, meshes[face.part]) if here else 0.0
+                if common > 1 - SLIGHT and _moving(own.feature)[number]:
+                    return self._used(own, number, placement)
+                if SLIGHT < common <= 1 - SLIGHT:
                     raise GeometryFault(
                         f'its face on part "{face.part.name}" is partly that of feature "{own.feature.name}", which deviates '
                         "by itself; declare one pair (or scheme) for the feature, and another one for the rest"
                     )
         return None
 
-    def face_with(self, own: NominalFeature, position: np.ndarray, placement: tuple[np.ndarray, np.ndarray]) -> int:
-        """The number of the face of a feature that a point (3,) [mm], in its part's frame, is on; of the middle of two else."""
-        if len(own.surfaces) == 1:
-            return self.face(own, 0, placement)
-        close = ON * max(surface.mesh.scale for surface in own.surfaces)
-        away = [float(np.linalg.norm(surface.nearest(position[None])[1][0] - position)) for surface in own.surfaces]
-        nearest = int(np.argmin(away))
-        return self.face(own, nearest if away[nearest] <= close else None, placement)
+    def held_at(self, feature: Feature, position: np.ndarray, placement: Placement) -> FaceDeviation | None:
+        """How a feature deviates where a locator at a point (3,) [mm] of its part stands; None if it could not be made."""
+        own = next((each for each in self.found if each.feature is feature), None)
+        return None if own is None else self._used(own, own.face_with(position), placement)
+
+    def _used(self, own: NominalFeature, number: int | None, placement: Placement) -> FaceDeviation:
+        """The deviation of a face: the same object for all that it is of."""
+        key = (own.feature, number)
+        if key not in self._used_faces:
+            self._used_faces[key] = own.deviation(number, placement)
+        return self._used_faces[key]
 
     def of(self, feature: Feature) -> NominalFeature:
         """The numbers of a declared feature."""
         return next(own for own in self.found if own.feature is feature)
-
-    def face(self, own: NominalFeature, number: int | None, placement: tuple[np.ndarray, np.ndarray]) -> int:
-        """The number of a face of a feature among those that deviate; of its middle, whose size does not count, if None."""
-        key = (own.feature, number)
-        if key not in self._face_of:
-            self._face_of[key] = len(self.faces)
-            self.faces.append(_face_deviation(own, number, placement))
-        return self._face_of[key]
 
 
 def _moving(feature: Feature) -> list[bool]:
@@ -261,22 +290,6 @@ def _padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
     found = np.zeros((len(coordinates), columns))
     found[:, : coordinates.shape[1]] = coordinates
     return found
-
-
-def _face_deviation(own: NominalFeature, number: int | None, placement: tuple[np.ndarray, np.ndarray]) -> FaceDeviation:
-    geometry, size = own.geometry, own.feature.size
-    twist, height = geometry.twists @ own.coordinates, np.zeros(own.coordinates.shape[1])
-    if size is not None and number is not None:
-        sign = -1.0 if geometry.is_inner else 1.0
-        if geometry.kind == "planes":
-            share = 0.5 if size.moves == "both" else float(_moving(own.feature)[number])
-            twist[:3, own.size_column] += sign * share * geometry.normals[number]
-        else:
-            height[own.size_column] = sign / 2
-    columns = np.flatnonzero(twist.any(axis=0) | (height != 0))
-    R, t = placement
-    turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
-    return FaceDeviation(own.label, columns, R @ geometry.centre + t, turned, height[columns])
 
 
 def in_order(part: Part) -> tuple[list[Feature], list[Feature]]:

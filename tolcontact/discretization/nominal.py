@@ -146,8 +146,8 @@ class Nominal:
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
-        """The faces that deviate with features, and are used."""
-        return tuple(self._features.faces)
+        """The faces of features that pairs and locators are of."""
+        return self._features.faces
 
     @cached_property
     def contributors(self) -> tuple[str, ...]:
@@ -176,12 +176,8 @@ class Nominal:
         if point.on is None:
             return None
         own = self._features.of(point.on)
-        placement = self.parts[own.part].placement
-        if point.position is None:
-            number = self._features.face(own, None, placement)
-        else:
-            number = self._features.face_with(own, np.array(point.position), placement)
-        return self.faces[number]
+        number = None if point.position is None else own.face_with(np.array(point.position))
+        return own.deviation(number, self.parts[own.part].placement)
 
     def outward(self, point: Point) -> np.ndarray:
         """Outward normal (3,), in the nominal assembly frame, of the face at a point on a feature."""

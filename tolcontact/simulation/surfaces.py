@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact import poses as pose
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.vocabulary import CORRECTED
@@ -28,15 +28,12 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
     """Look at the faces of every pair at corrected poses (row, part, 12), for deviations (row, contributor)."""
     nominal, fixed = program.nominal, not program.method.is_iterated
     found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
+    relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None:
             continue
-        sides = [
-            part if face is None else pose.compose(part, face.poses(deviations))
-            for part, face in zip((poses[:, pair.moving], poses[:, pair.reference]), pair.deviating, strict=True)
-        ]
-        X_RM, heights = pose.relative(*sides), pair.heights(deviations)
+        X_RM, heights = relative[:, k], pair.heights(deviations)
         found.penetration[:, k] = faces.depth(X_RM, heights)
         if fixed and not pair.round:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
@@ -50,8 +47,3 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
 def simulated_poses(program: Program, deviations: Float[Array, "n contributor"]) -> Float[Array, "n part 12"]:
     """Corrected poses (row, part, 12) of some realizations, simulated once more."""
     return simulate_block(program, deviations).poses[:, CORRECTED]
-
-
-def drawn_again(program: Program, rows: Int[Array, " n"], seed: int) -> Float[Array, "n contributor"]:
-    """Deviations (row, contributor) of some realizations."""
-    return np.concatenate([program.draws(seed=seed, start=int(row), stop=int(row) + 1) for row in rows])

@@ -45,6 +45,14 @@ class Contributor(NamedTuple):
         return np.nan if self.tolerance is None or self.tolerance.range is None else float(self.tolerance.range)
 
     @property
+    def mean_shift(self) -> float:
+        """Mean of its own distribution; NaN if that has none."""
+        if self.tolerance is None:
+            return self.mean
+        own = self.tolerance.distribution
+        return self.tolerance.mean_shift + (0.0 if isinstance(own, str) else float(own.mean()))
+
+    @property
     def said(self) -> str:
         """Its distribution in words: a name, and the rule from the zone to the spread."""
         if self.layer is not None:

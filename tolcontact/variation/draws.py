@@ -13,7 +13,7 @@ from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.variation.contributors import Contributors
-from tolcontact.variation.uniforms import uniform
+from tolcontact.variation.uniforms import STREAM, uniform
 
 SURELY = 1e-16  # the least distance of a number from 0 and 1
 
@@ -71,6 +71,15 @@ class Draws:
         self._drive(deviations, lambda column: column not in sizes)
         self._check(deviations)
         return deviations
+
+    def of(self, rows: np.ndarray, *, seed: int) -> np.ndarray:
+        """Deviations (row, contributor) of some realizations, by their numbers (row,)."""
+        found = np.empty((len(rows), len(self.contributors.every)))
+        for stream in np.unique(rows // STREAM):
+            here = np.flatnonzero(rows // STREAM == stream)
+            first = int(rows[here].min())
+            found[here] = self(seed=seed, start=first, stop=int(rows[here].max()) + 1)[rows[here] - first]
+        return found
 
     def _drive(self, deviations: np.ndarray, drives: Callable[[int], bool]) -> None:
         """Add what shared causes make of some columns."""

@@ -29,6 +29,13 @@ DISTRIBUTION = Variable(
     str,
     "distribution of the deviation; of a feature its tolerance, and the rule from zone to spread",
 )
+MEAN_SHIFT = Variable(
+    "mean_shift",
+    (CONTRIBUTOR,),
+    "f8",
+    "mean of the contributor's own distribution, without what shared variables add to it",
+    "mm",
+)
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
 STIFFNESS = Variable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")

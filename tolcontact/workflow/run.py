@@ -17,7 +17,7 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import Block, map_blocks
-from tolcontact.simulation.surfaces import check_surfaces, drawn_again, simulated_poses
+from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import BlockSums, DisplacementFields
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT
@@ -172,7 +172,7 @@ def _simulate(
     chosen_rows = writer.chosen(seed)
     if chosen_rows.size:
         kept = writer.poses(chosen_rows)
-        deviations = drawn_again(program, chosen_rows, seed)
+        deviations = program.draws.of(chosen_rows, seed=seed)
         poses = simulated_poses(program, deviations) if kept is None else kept
         writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
 
