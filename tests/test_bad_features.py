@@ -121,6 +121,19 @@ def test_it_has_one_message(name):
         assert said in fault and 'part "ring"' in fault
 
 
+@pytest.mark.parametrize("tolerance", [tc.Size(10, 0.1), tc.Position(0.1, "A"), tc.Coaxiality(0.1, "A")])
+def test_how_far_a_face_is_off_the_nearest_simple_one_is_said(tolerance):
+    shape = trimesh.creation.annulus(5, 9, 20, sections=180)
+    shape.vertices[:, 0] *= 1.01  # an oval hole: 5.05 by 5
+    a = tc.Assembly("oval")
+    part = a.part("ring", tc.Mesh(shape), fixed=True)
+    part.feature("under", part.face("-z"), datum="A")
+    part.feature("hole", part.face(lambda c, n: np.linalg.norm(c[:, :2], axis=1) < 6), tolerance)
+    a.measure("height", part.point(0, 0, 20), along="z")
+    (fault,) = tc.check(a)
+    assert "a general surface (the nearest cylinder is off by up to 0.025 mm, more than 0.001)" in fault
+
+
 def test_a_datum_that_locks_nothing_is_named():
     a = toleranced.ball_with()
     part = a.parts[0]

@@ -14,6 +14,7 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
     Holes at least material: supports 11.5 and position 1.0 of fixed fasteners, else 11 in plate and supports, and 1.0 in both.
     """
     a = tc.Assembly("fasteners", method=SEATED)
+    axes: dict[str, tuple[tc.Point, tc.Point]] = {}
     hole = 11.5 if is_fixed else 11.0
     of_plate = trimesh.creation.box(extents=(3 * LENGTH, 40, 4)).apply_translation((0, 0, -20))
     bolts = [
@@ -41,6 +42,7 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
         bore = support.feature(
             "hole", support.face(tc.Cylinder(radius=hole / 2, inner=True)), tc.Position(1.0, "A|B|C", rule="translation")
         )
+        axes[name] = on_plate.axis(0), bore.axis(0)
         held = [*flat_feet(0.0), tc.Locator("Y", (0, 0, 0), "y", 0), tc.Locator("turn", (15, 0, 0), "y", 0)]
         a.locate(support, held, floating=True)
         a.force(f"pull {name}", at=support.point(0, 0, 4), vector=(side * pull, 0, 0))
@@ -53,7 +55,15 @@ def fasteners(is_fixed: bool, pull: float) -> tc.Assembly:
         a.contact(f"{name} bolt in plate", moving=bolt.face(tc.Cylinder()), reference=on_plate)
         a.contact(f"{name} fit", moving=bore, reference=bolt.face(tc.Cylinder()))
     left, right = (part for part in a.parts if part.name in ("left", "right"))
-    a.measure("distance", left.point(ARM, 0, 20), to=right.point(-ARM, 0, 20), along="x")
+    faces = left.point(ARM, 0, 20), right.point(-ARM, 0, 20)
+    a.measure("distance", faces[0], to=faces[1], along="x")
+
+    def centred(poses):
+        """The distance, were every hole of a support about the same axis as that of the plate."""
+        off = {name: poses.position(bore) - poses.position(hole) for name, (hole, bore) in axes.items()}
+        return (poses.position(faces[1]) - off["right"] - (poses.position(faces[0]) - off["left"]))[0]
+
+    a.measure("distance without float", centred)
     return a
 
 

@@ -35,11 +35,11 @@ Each realization is one row and carries its own certificate.
 | `searched` | realization | 1 if contact points were projected again |
 
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
-of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization, contributor),
-`field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as JSON. A group is
-called like its part; a part with the name of a dimension gets an underscore behind it (the attribute `part` is the name in any
-case). Attributes state the format number, the versions, the seed, the solver with its options, and the method with all its
-choices; `method_from` states whether the method was the model's, the defaults, or set by options.
+of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
+contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as
+JSON. A group is called like its part; a part with the name of a dimension gets an underscore behind it (the attribute `part` is
+the name in any case). Attributes state the format number, the versions, the seed, the solver with its options, and the method
+with all its choices; `method_from` states whether the method was the model's, the defaults, or set by options.
 
 ## Reading it
 

@@ -1,6 +1,7 @@
 """The command line: `tolcontact`, or `python -m tolcontact`. A chapter of the guide.
 
     tolcontact check MODEL.py                            list every fault of a model; run nothing
+    tolcontact check MODEL.py --population 1000          draw features, and print how many are inside their zones
     tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
     tolcontact run MODEL.py --out FILE.nc                simulate into an archive
     tolcontact summary FILE.nc                           print the summary of an archive

@@ -11,9 +11,11 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.discretization.analytic import Form
+from tolcontact.discretization.brep_face import FIT
 from tolcontact.discretization.curvature import is_flat
 from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fault import GeometryFault
+from tolcontact.discretization.fitting import nearest
 from tolcontact.discretization.surface import Surface
 
 ALIKE = 1e-3  # of an area: rectangles of sizes nearer than that are alike
@@ -43,6 +45,7 @@ class FeatureGeometry:
     normals  outward normals (3,) of its faces, if they are planes
     is_inner  whether its size is that of a gap in the material: a hole, a slot
     walls    places and directions along the normals of a cone's surface, by which its profile is measured
+    nearest  of a general surface: the simple one that its vertices are least far off
     """
 
     kind: str
@@ -58,6 +61,7 @@ class FeatureGeometry:
     normals: tuple[np.ndarray, ...]
     is_inner: bool
     walls: tuple[np.ndarray, np.ndarray] | None = None
+    nearest: Form | None = None
 
     @property
     def extremes(self) -> np.ndarray:
@@ -68,6 +72,14 @@ class FeatureGeometry:
         """The same along `directions` (point, entry, 3) at `places` (point, 3)."""
         moved = self.twists[:3].T + np.cross(self.twists[3:].T, (places - self.centre)[:, None])
         return np.asarray(np.einsum("pqk,pek->peq", moved, directions))
+
+    @property
+    def said(self) -> str:
+        """What it is, in words."""
+        if self.nearest is not None:
+            off = f"the nearest {self.nearest.kind} is off by up to {self.nearest.residual:.2g} mm, more than {FIT:g}"
+            return f"a general surface ({off})"
+        return "a pair of planes" if self.kind == "planes" else f"a {self.kind}"
 
     @property
     def reach(self) -> float:
@@ -264,8 +276,9 @@ def _general(face: Surface) -> FeatureGeometry:
     ways = np.random.default_rng(0).normal(size=(len(kept), EXTREMES))
     outer = np.unique(np.abs(every @ scaled @ ways).argmax(axis=0))
     return FeatureGeometry(
-        "general", centre, names, to_twist @ scaled, values, points[outer], normals[outer, None], first, 0.0, np.nan, (), False
-    )
+        "general", centre, names, to_twist @ scaled, values, points[outer], normals[outer, None], first, 0.0, np.nan, (), False,
+        nearest=nearest(np.asarray(mesh.triangles)),
+    )  # fmt: skip
 
 
 def _frame(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:

@@ -190,7 +190,7 @@ def _moving(feature: Feature) -> list[bool]:
 def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
     size = feature.size
     if size is None or not np.isfinite(geometry.size):
-        raise GeometryFault(f"a size is for cylinders, spheres and two opposed planes, and it is a {geometry.kind} face")
+        raise GeometryFault(f"a size is for cylinders, spheres and two opposed planes, and it is {geometry.said}")
     if abs(geometry.size - size.nominal) > SIZES * geometry.size:
         raise GeometryFault(
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "

@@ -36,6 +36,14 @@ def fitted(triangles: np.ndarray, within: float) -> Form | None:
     return None
 
 
+def nearest(triangles: np.ndarray) -> Form:
+    """The plane, cylinder, cone or sphere that `triangles` (face, 3, 3) [mm] are least far off."""
+    vertices = np.unique(triangles.reshape(-1, 3), axis=0)
+    everywhere = np.vstack([vertices, triangles.mean(axis=1)])  # two rings of vertices alone lie on a sphere, too
+    forms = [attempt(vertices, triangles) for attempt in (_plane, _cylinder, _cone, _sphere)]
+    return min((form for form in forms if form is not None), key=lambda form: np.abs(form.distance(everywhere)[0]).max())
+
+
 def _spread(triangles: np.ndarray) -> np.ndarray:
     """Some of them, by which most faces that are none of these surfaces are told at once."""
     return np.asarray(triangles[np.linspace(0, len(triangles) - 1, SOME).astype(int)])

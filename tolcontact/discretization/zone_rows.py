@@ -47,13 +47,12 @@ def _check_kind(tolerance: GeometricTolerance, feature: FeatureGeometry) -> None
     elif kind == "profile" and tolerance.outside is not None:
         _need(tolerance, feature, feature.kind == "plane", "planes, if it says how much of it is outside")
     elif kind == "position" and feature.kind == "general":
-        raise GeometryFault("position needs a plane, cylinder, cone or sphere, and its face is none of these; use tc.Profile")
+        raise GeometryFault(f"position needs a plane, cylinder, cone or sphere, and it is {feature.said}; use tc.Profile")
 
 
 def _need(tolerance: GeometricTolerance, feature: FeatureGeometry, has_it: bool, wanted: str) -> None:
     if not has_it:
-        what = {"planes": "a pair of planes", "general": "a general surface"}.get(feature.kind, f"a {feature.kind}")
-        raise GeometryFault(f"{tolerance.kind} is for {wanted}, and it is {what}")
+        raise GeometryFault(f"{tolerance.kind} is for {wanted}, and it is {feature.said}")
 
 
 def _halved_differences(feature: FeatureGeometry) -> np.ndarray:

@@ -1,7 +1,8 @@
 """Report: summaries and comparisons as tables for a terminal. A chapter of the guide.
 
-`summary_text` and `comparison_text` turn the datasets of `tc.summarize` and `tc.compare` into something that rich prints. A
-table fits into 80 columns, and output to a file or a pipe is never cut.
+`summary_text`, `comparison_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare` and
+`tc.check_population` into something that rich prints. A table fits into 80 columns, and output to a file or a pipe is never
+cut.
 
 >>> import tolcontact as tc
 >>> from rich.console import Console
