@@ -44,9 +44,9 @@ points and between surfaces, and the number of steps: see `tc.summarize`, or `pr
 
 The displacement u = (R - I) v + t (14) is taken at surface points v of every part, in both states. It is that of the part as a
 whole: what its features deviate by is not in it (points of features have measures for that). Kept are its mean and 6 sigma in
-x, y, z and magnitude. Components follow exactly from the mean and covariance of the poses of all realizations, also if poses are
-not kept. The magnitude is summed up realization by realization, over the first 16 384 of them, or fewer (1024 at least) for a
-part with more than 2048 vertices (`fields=`, `--fields`: "some", a number, "all" or "none"); its 6 sigma has an interval at
+x, y, z and magnitude. Components follow exactly from the mean and covariance of the poses of all realizations, also if poses
+are not kept. The magnitude is summed up realization by realization, over the first 16 384 of them, or fewer (1024 at least) for
+a part with more than 2048 vertices (`fields=`, `--fields`: "some", a number, "all" or "none"); its 6 sigma has an interval at
 each point.
 
 >>> field = results["field/block"]
