@@ -45,10 +45,10 @@ def test_outside_tolerance_is_counted_around_the_nominal_value(run):
     """Nominally 20 mm, 1 mm wide: from 19.5 to 20.5, the limits included."""
     raw, corrected = [19.4, 19.5, 20.0, 20.5, 20.6, 20.7, 0.1, -0.2], [20.0] * 7 + [20.51]
     found = summary_of(run, measured=measured(run, "thickness", raw, corrected))["statistic_value"]
-    shares = found.sel(measure="thickness", statistic="outside tolerance", interval="estimate")
+    shares = found.sel(measure="thickness", statistic="outside limits", interval="estimate")
     assert shares.values.tolist() == [5 / 8, 1 / 8]
-    assert found.sel(measure="top", statistic="outside tolerance", interval="estimate").values.tolist() == [0, 0]
-    assert np.isnan(found.sel(measure="free", statistic="outside tolerance").values).all()
+    assert found.sel(measure="top", statistic="outside limits", interval="estimate").values.tolist() == [0, 0]
+    assert np.isnan(found.sel(measure="free", statistic="outside limits").values).all()
 
 
 def test_statistics_are_those_of_the_rows(run):

@@ -147,7 +147,12 @@ def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     if set(units) != {"mm"}:
         file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
     write(file, words.MEASURE_NOMINAL, program.nominal_measures)
-    write(file, words.MEASURE_TOLERANCE, [np.nan if m.tolerance is None else m.tolerance for m in measures])
+    write(file, words.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
+    bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
+    bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
+    write(file, words.LOWER_LIMIT, bounds[:, 0])
+    write(file, words.UPPER_LIMIT, bounds[:, 1])
+    write(file, words.QUANTITY, [measure.quantity for measure in measures])
     write(file, words.MEASURE_UNITS, units)
 
 

@@ -38,7 +38,7 @@ OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (words.MESH_VERTICES, words.MESH_FACES)
 ONCE = {  # by group
-    "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS,
+    "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS, *words.LIMITS,
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
     "model": (words.DECLARATION,),
     "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,

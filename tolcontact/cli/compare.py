@@ -1,7 +1,6 @@
 """tolcontact compare."""
 
 import contextlib
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +9,7 @@ import typer
 
 from tolcontact.archive import taken
 from tolcontact.cli.app import Model, Samples, Seed, app, chosen, or_
-from tolcontact.cli.output import console
+from tolcontact.cli.output import console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text
@@ -42,9 +41,7 @@ def compare(
             texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
             found.to_netcdf(path, engine="netcdf4", encoding=texts)
     if as_json:
-        # JSON has no NaN: if no realization can be compared, a difference is null.
-        readable = found.astype(object).where(found.notnull(), None)
-        typer.echo(json.dumps(readable.to_dict(), allow_nan=False, default=float))
+        print_data(found)
     else:
         console().print(comparison_text(found))
 

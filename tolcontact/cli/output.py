@@ -1,7 +1,9 @@
 """Results on standard output."""
 
+import json
 import sys
 
+import numpy as np
 import typer
 import xarray as xr
 from rich.console import Console
@@ -17,6 +19,18 @@ UNBOUNDED = 10_000  # columns of what is not a terminal
 def console() -> Console:
     """Standard output; what is not a terminal is never cut."""
     return Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else UNBOUNDED)
+
+
+def print_data(found: xr.Dataset) -> None:
+    """Print a dataset as JSON, which has no NaN and no infinity: what is not a number is null."""
+    data = found.reset_coords()
+    finite = {name: of.astype(object).where(np.isfinite(of), None) for name, of in data.items() if of.dtype.kind == "f"}
+    typer.echo(json.dumps(data.assign(finite).to_dict(), allow_nan=False, default=_plain))
+
+
+def _plain(value: object) -> object:
+    """What JSON has of a number of NumPy."""
+    return value.item() if isinstance(value, np.generic) else str(value)
 
 
 def print_summary(results: xr.DataTree) -> None:

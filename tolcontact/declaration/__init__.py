@@ -153,11 +153,12 @@ force weight: (0, 0, -100) N at plate (30, 20, 4)
 ## Measures
 
 A measure is the displacement of a point along a direction, the distance of two points along a direction (`to=`), or a
-function of the symbolic poses that returns a CasADi expression. `tolerance` is the full width of the allowed zone around the
-nominal value.
+function of the symbolic poses that returns a CasADi expression. `absolute=True` makes it the coordinate of the point,
+`absolute=False` how far the distance is from the nominal one. `limits=(lower, upper)` are the allowed values of this number,
+None for an open side; `tolerance` is short for limits half of it below and above the nominal value.
 
 >>> height = clamp.measure("height", plate.point(0, 0, 8), along="z", tolerance=0.5)
->>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z")
+>>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z", limits=(None, 0.2))
 >>> def tilt(poses):
 ...     return poses.rotation(plate)[2, 0]
 >>> slope = clamp.measure("slope", tilt, units="rad")

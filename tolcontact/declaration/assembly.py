@@ -181,11 +181,14 @@ class Assembly(Readable):
         to: Point | None = None,
         along: Any = None,
         tolerance: float | None = None,
+        limits: Sequence[float | None] | None = None,
+        absolute: bool | None = None,
         units: str = "mm",
     ) -> Measure:
         """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
         axis = None if along is None else direction(along)
-        self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line()))
+        allowed = tuple(limits) if isinstance(limits, list | tuple) else limits
+        self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line(), allowed, absolute))  # type: ignore[arg-type]
         return self._measures[-1]
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
@@ -220,7 +223,7 @@ class Assembly(Readable):
         widths = [tolerance.width for tolerance in said if tolerance is not None]
         sound = [each for feature in self.features for each in feature.tolerances if not any(each.faults())]
         widths += [each.tolerance.width if isinstance(each, Size) else float(each.width) for each in sound]
-        widths += [float(m.tolerance) for m in self._measures if m.tolerance is not None and m.units == "mm"]
+        widths += [float(m.width) for m in self._measures if m.width is not None and m.units == "mm"]
         return min((width for width in widths if width > CONSTANT * max(widths)), default=math.inf)
 
     def faults(self) -> Iterator[str]:

@@ -62,7 +62,10 @@ def to_document(
     def measure(measure: Measure) -> Document:
         points = {"of": _point(measure.of)} if isinstance(measure.of, Point) else {"tape": tapes[measure.name]}
         to = {} if measure.to is None else {"to": _point(measure.to)}
-        return {"name": measure.name, **points, **to, **_plain(measure, "along", "tolerance", "units", "declared_at")}
+        said: Document = {} if measure.absolute is None else {"absolute": measure.absolute}
+        if measure.limits is not None:
+            said["limits"] = [None if limit is None else float(limit) for limit in measure.limits]
+        return {"name": measure.name, **points, **to, **_plain(measure, "along", "tolerance", "units", "declared_at"), **said}
 
     return {
         "name": assembly.name,

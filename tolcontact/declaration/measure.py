@@ -7,7 +7,7 @@ from typing import Any
 
 from tolcontact.declaration.names import is_line
 from tolcontact.declaration.point import Point
-from tolcontact.declaration.vectors import Vector, is_finite
+from tolcontact.declaration.vectors import Vector, is_finite, is_length
 from tolcontact.readable import Readable
 
 
@@ -15,11 +15,13 @@ from tolcontact.readable import Readable
 class Measure(Readable):
     """A number taken from the poses of the parts.
 
-        of one Point                how far it moved from its nominal place, along `along` [mm]
-        of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush)
+        of one Point                how far it moved from its nominal place, along `along` [mm]; its coordinate, if `absolute`
+        of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush); how far that is
+                                    from the nominal one, if `absolute` is False
         of a function               the CasADi expression that the function returns for the symbolic poses
 
-    `tolerance` is the full width of the allowed zone, centred on the nominal value.
+    `limits` are the least and the largest allowed value of this number; None leaves a side open. `tolerance` is short for
+    limits that lie half of it below and above the nominal value.
     """
 
     name: str
@@ -29,11 +31,38 @@ class Measure(Readable):
     tolerance: float | None
     units: str
     declared_at: str
+    limits: tuple[float | None, float | None] | None = None
+    absolute: bool | None = None
 
     @property
     def points(self) -> tuple[Point, ...]:
         """The declared points; none for an expression."""
         return tuple(point for point in (self.of, self.to) if isinstance(point, Point))
+
+    @property
+    def quantity(self) -> str:
+        """What it is a value of."""
+        if not isinstance(self.of, Point):
+            return "expression"
+        if self.to is None:
+            return "coordinate" if self.absolute else "displacement"
+        return "deviation of distance" if self.absolute is False else "distance"
+
+    @property
+    def width(self) -> float | None:
+        """Of the allowed zone; None if a side is open."""
+        if self.limits is None:
+            return self.tolerance
+        lower, upper = self.limits
+        return None if lower is None or upper is None else float(upper - lower)
+
+    def bounds(self, nominal: float) -> tuple[float, float]:
+        """Least and largest allowed value, given the nominal one; infinite on an open side."""
+        if self.limits is not None:
+            lower, upper = self.limits
+            return -math.inf if lower is None else lower, math.inf if upper is None else upper
+        half = math.inf if self.tolerance is None else self.tolerance / 2
+        return nominal - half, nominal + half
 
     def faults(self) -> Iterator[str]:
         for point in self.points:
@@ -58,6 +87,23 @@ class Measure(Readable):
             isinstance(self.tolerance, int | float) and math.isfinite(self.tolerance) and self.tolerance > 0
         ):
             yield f"tolerance is {self.tolerance!r}; expected the full width of the allowed zone, above 0"
+        if self.limits is not None:
+            yield from self._limits_faults()
+        if not isinstance(self.absolute, bool | None):
+            yield f"absolute is {self.absolute!r}; expected True or False"
+        elif self.absolute is not None and not isinstance(self.of, Point):
+            yield "absolute is for measures of points; a function of the poses has its own value, so leave it out"
+
+    def _limits_faults(self) -> Iterator[str]:
+        if self.tolerance is not None:
+            yield "it has both a tolerance and limits; give one of them"
+        said = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
+        if not (isinstance(self.limits, tuple) and len(self.limits) == 2):
+            yield said
+            return
+        given = [limit for limit in self.limits if limit is not None]
+        if not given or not all(map(is_length, given)) or (len(given) == 2 and not given[0] < given[1]):
+            yield said
 
     def __str__(self) -> str:
         along = "" if self.along is None else " along ({:g}, {:g}, {:g})".format(*self.along)
@@ -65,5 +111,15 @@ class Measure(Readable):
             what = f"distance {self.of} to {self.to}{along}"
         else:
             what = f"{self.of}{along}" if isinstance(self.of, Point) else "expression of the poses"
-        limits = "" if self.tolerance is None else f", tolerance {self.tolerance:g} {self.units}"
-        return f"measure {self.name}: {what}{limits}"
+        if isinstance(self.of, Point) and self.absolute is not None:
+            what = f"{self.quantity}, {what}"
+        return f"measure {self.name}: {what}{self._limited}"
+
+    @property
+    def _limited(self) -> str:
+        if self.limits is None:
+            return "" if self.tolerance is None else f", tolerance {self.tolerance:g} {self.units}"
+        lower, upper = self.limits
+        if lower is None or upper is None:
+            return f", at most {upper:g} {self.units}" if lower is None else f", at least {lower:g} {self.units}"
+        return f", limits {lower:g} to {upper:g} {self.units}"

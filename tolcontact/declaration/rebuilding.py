@@ -157,7 +157,12 @@ class _Reader:
         of = self.point(said["of"]) if "of" in said else tape_of(said["tape"], ENTRIES * len(self.parts) + self.contributors)
         to = self.point(said["to"]) if "to" in said else None
         along, tolerance = _optional(said["along"], Said.vector), _optional(said["tolerance"], Said.number)
-        return Measure(said["name"].text(), of, to, along, tolerance, said["units"].text(), said["declared_at"].text())
+        lower, upper = (_optional(each, Said.number) for each in said["limits"].items(2)) if "limits" in said else (None, None)
+        absolute = said["absolute"].boolean() if "absolute" in said else None
+        return Measure(
+            said["name"].text(), of, to, along, tolerance, said["units"].text(), said["declared_at"].text(),
+            (lower, upper) if "limits" in said else None, absolute,
+        )  # fmt: skip
 
     def force(self, said: Said) -> Force:
         return Force(said["name"].text(), self.point(said["at"]), said["vector"].vector(), said["declared_at"].text())

@@ -70,9 +70,14 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
 def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
     seen = SymbolicPoses(nominal, poses, deviations)
     if isinstance(measure.of, Point):
-        start = ca.DM(nominal.position(measure.of)) if measure.to is None else seen.position(measure.of)
-        end = seen.position(measure.to or measure.of)
-        return ca.dot(ca.DM(np.array(measure.along)), end - start)
+        of, to = measure.of, measure.to
+        if to is not None:
+            off = nominal.position(to) - nominal.position(of) if measure.quantity == "deviation of distance" else np.zeros(3)
+            moved = seen.position(to) - seen.position(of) - ca.DM(off)
+        else:
+            off = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
+            moved = seen.position(of) - ca.DM(off)
+        return ca.dot(ca.DM(np.array(measure.along)), moved)
     value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(seen)
     expression = ca.SX(value)
     if expression.shape != (1, 1):

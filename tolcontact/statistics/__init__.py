@@ -26,11 +26,14 @@ distribution, because contact cuts distributions off.
 | mean | Student's t |
 | standard deviation, 6 sigma, variance | Bonett's, from the fourth moment |
 | percentiles 0.135, 5, 50, 95, 99.865 | order statistics; a bound is infinite if the sample is too small to have one |
-| share outside the tolerance, of realizations touched by contact, not assemblable | Clopper-Pearson |
+| share below, above and outside the limits, touched by contact, not assemblable | Clopper-Pearson |
+| Pp, Ppk by percentiles (ISO 22514-2) | places of three percentiles together, from the multinomial distribution |
+| skewness, kurtosis, Pp and Ppk as of a normal distribution | influence functions (delta method) |
 | change: shift of the mean | Student's t on the differences of the same draws |
 | change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
 
-A share outside the tolerance is given only for measures with a tolerance. A measure that evaluates to NaN does not stop the
+Shares outside and capability are given only for measures with limits. Skewness and kurtosis need many realizations: with
+10 000 of a skewed distribution their intervals cover some 90 of 100, not 95. A measure that evaluates to NaN does not stop the
 run; its statistics are NaN, and the table shows "-". Statistics always cover all finished realizations, whatever their status.
 
 >>> change = summary.change.sel(measure="height", change_of="ratio of 6 sigma")

@@ -95,7 +95,7 @@ def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> E
     """Variance of `after` over variance of `before`, from the same realizations (paired, on the log scale)."""
     after, before = Sample.of(after), Sample.of(before)
     ours, theirs = after.moments[0], before.moments[0]
-    if _is_constant(after) or _is_constant(before):
+    if is_constant(after) or is_constant(before):
         return NOTHING
     # What each realization adds to the logarithm of the ratio; the sum of all is zero.
     pairs = zip(after.pieces(), before.pieces(), strict=True)
@@ -118,9 +118,9 @@ def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.nda
     return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
 
 
-def _is_constant(x: Sample) -> bool:
+def is_constant(x: Sample) -> bool:
     """Whether what spread there is may be rounding."""
-    return bool(x.moments[0] <= (8 * np.finfo(float).eps * x.mean) ** 2)
+    return not x.moments[0] > (8 * np.finfo(float).eps * x.mean) ** 2
 
 
 def _unbiased(x: Sample) -> float:

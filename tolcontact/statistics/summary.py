@@ -8,9 +8,10 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import intervals
+from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.shape import kurtosis, skewness
 
 LEAST = 2
 
@@ -18,7 +19,7 @@ LEAST = 2
 def summarize(results: xr.DataTree) -> xr.Dataset:
     """Statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
 
-    statistic_value (measure, state, statistic, interval) in the measure's units; "outside tolerance" is a share
+    statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1
     change          (measure, change_of, interval)         corrected against raw, from the same realizations
     touched         (interval)                           share of realizations that contact touched
     by_status       (status_meaning)                     number of realizations
@@ -72,7 +73,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
         coords={
             words.MEASURE: rows[words.MEASURE].values,
             words.STATE: list(words.STATES),
-            words.STATISTIC: [*words.STATISTICS, words.OUTSIDE],
+            words.STATISTIC: list(words.EVERY_STATISTIC),
             words.INTERVAL: list(words.ESTIMATE),
             words.CHANGE_OF: list(words.CHANGES),
             words.STATUS_MEANING: list(words.STATUS_MEANINGS),
@@ -81,7 +82,11 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
             words.OF_ITERATIONS: list(words.MIDDLES),
             words.EXTREME: list(words.EXTREMES),
             "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),
-            "measure_tolerance": (words.MEASURE, rows[words.MEASURE_TOLERANCE.name].values),
+            **{
+                f"measure_{side}": (words.MEASURE, limits)
+                for side, limits in zip(("lower", "upper"), _limits(rows).T, strict=True)
+            },
+            "measure_quantity": (words.MEASURE, _quantities(rows)),
         },
         attrs={
             "title": results.attrs.get("title", ""),
@@ -174,14 +179,38 @@ def _begun_for(results: xr.DataTree, done: int) -> int:
 
 
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
-    tolerance = float(rows[words.MEASURE_TOLERANCE.name][measure])
-    nominal = float(rows[words.MEASURE_NOMINAL.name][measure])
-    outside = intervals.NOTHING
-    if np.isfinite(tolerance) and np.isfinite(x.mean):
-        outside = intervals.share(Sample(lambda: (np.abs(piece - nominal) > tolerance / 2 for piece in x.pieces())))
     variance = intervals.variance(x)
     spreads = [intervals.root(variance), intervals.root(variance, times=6), variance]
-    return [intervals.mean(x), *spreads, *intervals.percentiles(x, words.PERCENTILES), outside]
+    shape = [skewness(x), kurtosis(x)]
+    return [
+        intervals.mean(x),
+        *spreads,
+        *intervals.percentiles(x, words.PERCENTILES),
+        *shape,
+        *_within(x, *_limits(rows)[measure]),
+    ]
+
+
+def _within(x: Sample, lower: float, upper: float) -> list[Estimate]:
+    """How a sample stays within limits; nothing if it is not of numbers."""
+    if not np.isfinite(x.mean):
+        return [intervals.NOTHING] * len((*words.SHARES, *words.CAPABILITY))
+    shares = [capability.below(x, lower), capability.above(x, upper), capability.outside(x, lower, upper)]
+    return [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
+
+
+def _limits(rows: xr.Dataset) -> np.ndarray:
+    """Lower and upper limit of each measure (measure, 2); NaN where a side is open."""
+    if words.LOWER_LIMIT.name in rows:
+        return np.column_stack([rows[words.LOWER_LIMIT.name].values, rows[words.UPPER_LIMIT.name].values])
+    nominal, half = rows[words.MEASURE_NOMINAL.name].values, rows[words.MEASURE_TOLERANCE.name].values / 2
+    return np.column_stack([nominal - half, nominal + half])
+
+
+def _quantities(rows: xr.Dataset) -> np.ndarray:
+    """What each measure is a value of; archives before format 4 do not say it."""
+    known = words.QUANTITY.name in rows
+    return np.asarray(rows[words.QUANTITY.name].values if known else [""] * rows.sizes[words.MEASURE], dtype=object)
 
 
 def _change(raw: Sample, corrected: Sample) -> list[Estimate]:

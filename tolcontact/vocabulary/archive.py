@@ -132,8 +132,19 @@ MEASURE_TOLERANCE = Variable(
     "measure_tolerance",
     (MEASURE,),
     "f8",
-    "full width of the allowed zone around the nominal value; NaN if none is set",
+    "full width of the allowed zone; NaN if it is open",
 )
+LOWER_LIMIT = Variable("measure_lower_limit", (MEASURE,), "f8", "least allowed value of the measure; NaN if that side is open")
+UPPER_LIMIT = Variable(
+    "measure_upper_limit", (MEASURE,), "f8", "largest allowed value of the measure; NaN if that side is open"
+)
+QUANTITY = Variable(
+    "measure_quantity",
+    (MEASURE,),
+    str,
+    "what a measure is the value of: displacement, coordinate, distance, deviation of distance, or expression of the poses",
+)
+LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # that archives before format 4 do not have
 MEASURE_UNITS = Variable("measure_units", (MEASURE,), str, "units of the measure")
 
 DECLARATION = Variable("declaration", (), str, "the declared model as JSON, enough to rebuild it")

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
+import numpy as np
 import xarray as xr
 from rich import box
 from rich.console import Group
@@ -10,16 +11,32 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact.vocabulary import OUTSIDE, SHIFT, SPREAD_RATIO, STATES, VARIANCE_RATIO
+from tolcontact.vocabulary import (
+    ABOVE,
+    BELOW,
+    CAPABILITY,
+    OUTSIDE,
+    PP,
+    PP_NORMAL,
+    PPK,
+    PPK_NORMAL,
+    SHARES,
+    SHIFT,
+    SPREAD_RATIO,
+    STATES,
+    VARIANCE_RATIO,
+)
 
 RAW, CORRECTED = STATES
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
-_SHORT = {"standard deviation": "std. dev.", OUTSIDE: "outside"}
+_SHORT = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
+_BY_PERCENTILES = {PP_NORMAL: PP, PPK_NORMAL: PPK}
 MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
 NAME_WIDTH = 12  # of names and labels; longer ones may be wrapped
 ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
 WIDTH = 80
+RARE = 10_000  # ppm: from 1 % on shares are in percent
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -32,7 +49,8 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
-    yield Text("Estimates with their 95 % confidence intervals; changes are from the same draws.")
+    yield Text("Estimates with their 95 % confidence intervals; changes are from the same draws.\n")
+    yield _overview(summary)
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
     magnitudes = int(summary["magnitude_realizations"])
@@ -65,23 +83,57 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     return table
 
 
-def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
-    units, tolerance = str(of["measure_units"].values), float(of["measure_tolerance"].values)
-    limits = f", tolerance range {tolerance:g} {units}" if math.isfinite(tolerance) else ""
-    yield Text(f"\n{name} ({units}){limits}", style="bold")
+def _overview(summary: xr.Dataset) -> Table:
+    """Of each measure what a decision is made by."""
     rows = []
+    for measure in summary["measure"].values:
+        rows.append([str(measure), "", "", "", ""])
+        for state in (RAW, CORRECTED):
+            of = summary["statistic_value"].sel(measure=measure, state=state)
+            mean, spread, ppk, outside = (of.sel(statistic=word).values for word in ("mean", "6 sigma", PPK, OUTSIDE))
+            rows.append([f"  {state}", number(mean), number(spread), number(ppk), share(outside)])
+    return _table(["", "mean", "6 sigma", PPK, "outside"], rows)
+
+
+def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
+    units, quantity = str(of["measure_units"].values), str(of["measure_quantity"].values)
+    said = ", ".join(each for each in (quantity, limits_text(of)) if each)
+    yield Text(f"\n{name} ({units}){': ' if said else ''}{said}", style="bold")
+    rows, marked = [], False
     for statistic in of["statistic"].values:
         values = [of["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
-        if statistic == OUTSIDE:
-            if math.isfinite(tolerance):
-                rows.append([_SHORT[OUTSIDE], *map(percent, values), ""])
+        if statistic in (*SHARES, *CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
             continue
+        if statistic in SHARES:
+            rows.append([_SHORT[statistic], *map(share, values), ""])
+            continue
+        label, figures = _SHORT.get(statistic, statistic), [number(value) for value in values]
+        if statistic in _BY_PERCENTILES:
+            beside = of["statistic_value"].sel(statistic=_BY_PERCENTILES[statistic])
+            for k, state in enumerate((RAW, CORRECTED)):
+                if _are_apart(values[k], beside.sel(state=state).values):
+                    figures[k], marked = f"* {figures[k]}", True
         change = ""
         if statistic in _CHANGE_BESIDE:
             changed = of["change"].sel(change_of=_CHANGE_BESIDE[statistic]).values
             change = number(changed, sign=True) if statistic == "mean" else percent(changed - 1, sign=True)
-        rows.append([_SHORT.get(statistic, statistic), *map(number, values), change])
+        rows.append([label, *figures, change])
     yield _table(["", RAW, CORRECTED, "change"], rows)
+    if marked:
+        yield Text("* apart from that by percentiles: as of a normal distribution it is wrong")
+
+
+def limits_text(of: xr.Dataset) -> str:
+    """The limits of a measure in words; empty if it has none."""
+    lower, upper = float(of["measure_lower"].values), float(of["measure_upper"].values)
+    if math.isfinite(lower) and math.isfinite(upper):
+        return f"limits {lower:g} to {upper:g}"
+    return f"at least {lower:g}" if math.isfinite(lower) else f"at most {upper:g}" if math.isfinite(upper) else ""
+
+
+def _are_apart(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two intervals have nothing in common."""
+    return bool(one[1] > other[2] or other[1] > one[2])
 
 
 def _field_table(summary: xr.Dataset) -> Table:
@@ -171,6 +223,14 @@ def percent(values: object, *, sign: bool = False) -> str:
     estimate, lower, upper = (100 * float(v) for v in values)  # type: ignore[attr-defined]
     text = number((estimate, lower, upper), sign=sign, most=MAX_DECIMALS_PERCENT)
     return text if text == "-" else text.replace(" [", " % [")
+
+
+def share(values: object) -> str:
+    """`number` of shares, in percent; of rare events in ppm."""
+    estimate, lower, upper = (1e6 * float(v) for v in values)  # type: ignore[attr-defined]
+    if not math.isfinite(estimate) or estimate >= RARE:
+        return percent(values)
+    return f"{grouped(round(estimate))} ppm [{grouped(round(lower))}, {grouped(round(upper))}]"
 
 
 def _bound(value: float, decimals: int) -> str:

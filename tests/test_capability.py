@@ -1,0 +1,216 @@
+"""Limits of measures, shares beyond them, and capability: closed forms, and what their intervals cover."""
+
+import csv
+import json
+
+import numpy as np
+import pytest
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import run, simulate
+from tolcontact.simulation import simulate_blocks
+from tolcontact.statistics import capability, shape
+from tolcontact.statistics.sample import Sample
+
+PERCENTS = (0.00135, 0.5, 0.99865)
+DISTRIBUTIONS = {
+    "normal": (stats.norm(0, 1), -3.0, 4.0),
+    "skewed": (stats.gamma(4), 0.5, 14.0),
+    "off-centre": (stats.weibull_min(1.5), -1.0, 3.0),
+    "one side": (stats.gamma(4), -np.inf, 11.0),
+    "bounded": (stats.beta(2, 5), 0.02, np.inf),
+}
+
+
+def truth(distribution, lower, upper):
+    """Shares and capability of a distribution, by name; NaN for what there is not."""
+    low, middle, high = distribution.ppf(PERCENTS)
+    m, s = distribution.mean(), distribution.std()
+    both = np.isfinite(lower) and np.isfinite(upper)
+    return {
+        "below": distribution.cdf(lower) if np.isfinite(lower) else np.nan,
+        "above": distribution.sf(upper) if np.isfinite(upper) else np.nan,
+        "outside": distribution.cdf(lower) + distribution.sf(upper),
+        "Pp": (upper - lower) / (high - low) if both else np.nan,
+        "Ppk": min((upper - middle) / (high - middle), (middle - lower) / (middle - low)),
+        "Pp as normal": (upper - lower) / (6 * s) if both else np.nan,
+        "Ppk as normal": min(upper - m, m - lower) / (3 * s),
+    }
+
+
+def estimates(values, lower, upper):
+    x = Sample.of(values)
+    shares = [capability.below(x, lower), capability.above(x, upper), capability.outside(x, lower, upper)]
+    found = [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
+    return dict(zip(("below", "above", "outside", "Pp", "Ppk", "Pp as normal", "Ppk as normal"), found, strict=True))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DISTRIBUTIONS)
+def test_intervals_cover_the_truth_in_95_of_100(name):
+    distribution, lower, upper = DISTRIBUTIONS[name]
+    expected, rng = truth(distribution, lower, upper), np.random.default_rng(8)
+    covered = dict.fromkeys(expected, 0)
+    for _ in range(500):
+        for word, (value, low, high) in estimates(distribution.ppf(rng.random(8000)), lower, upper).items():
+            assert np.isnan(value) == np.isnan(expected[word]) and (np.isnan(value) or low <= value <= high)
+            covered[word] += bool(low <= expected[word] <= high)
+    for word, count in covered.items():
+        # 3.3 standard errors of the coverage itself around 94 to 96 of 100; exact intervals of rare events cover more.
+        exact = word in ("below", "above", "outside")
+        assert np.isnan(expected[word]) or 0.94 - 0.035 < count / 500 < (1.001 if exact else 0.96 + 0.03), (word, count)
+
+
+@pytest.mark.slow
+def test_intervals_cover_the_truth_where_contact_cuts_a_distribution_off():
+    """A block over a table, which holds it up: max(z, 0) of a normal z, with half of the realizations at 0."""
+    a = tc.Assembly("cut")
+    table, block = a.part("table", tc.Box(40, 40, 10), fixed=True), a.part("block", tc.Box(10, 20, 10), at=(10, 10, 10))
+    a.locate(block, cases.translating(tc.Tolerance(distribution=stats.norm(0, 0.1))))
+    a.contact("under", moving=block.face("-z"), reference=table.face("+z"), points=8)
+    a.measure("height", block.point(5, 10, 0), along="z", limits=(None, 0.25))
+    program, upper, z = tc.build(a, solver="daqp"), 0.25, stats.norm(0, 0.1)
+    expected = {"outside": z.sf(upper), "Ppk": upper / z.ppf(0.99865)}
+    mean = 0.1 / np.sqrt(2 * np.pi)
+    expected["Ppk as normal"] = (upper - mean) / (3 * np.sqrt(0.1**2 / 2 - mean**2))
+    covered = dict.fromkeys(expected, 0)
+    for seed in range(500):
+        (block_of,) = simulate_blocks(program, samples=4000, seed=seed, block=4000)
+        found = estimates(block_of.measured[:, 1, 0], -np.inf, upper)
+        for word, value in expected.items():
+            covered[word] += bool(found[word].lower <= value <= found[word].upper)
+    assert all(0.94 - 0.035 < count / 500 < 0.96 + 0.03 for count in covered.values()), covered
+
+
+def test_places_of_percentiles_are_those_of_order_statistics():
+    """The bounds of one percentile alone are those that the binomial distribution says."""
+    n = 5000
+    for ranks, p in zip(capability._ranks(n), PERCENTS, strict=True):
+        low, high = np.quantile(ranks, [0.025, 0.975])
+        assert stats.binom.ppf([0.025, 0.975], n, p) == pytest.approx([low - 0.5, high - 0.5], abs=1.0)
+
+
+def test_a_small_sample_bounds_no_tail():
+    pp, ppk = capability.by_percentiles(Sample.of(np.arange(20.0)), -5.0, 30.0)
+    assert pp.lower == ppk.lower == 0 and ppk.value > 1
+
+
+def test_constant_measures_have_shares_and_no_capability():
+    found = estimates(np.full(100, 0.3), 0.0, 0.2)
+    assert found["above"].value == 1 and np.isnan(found["Ppk"].value) and np.isnan(found["Ppk as normal"].value)
+
+
+@pytest.mark.parametrize(
+    ("distribution", "skew", "kurt"), [(stats.norm(), 0, 3), (stats.expon(), 2, 9), (stats.uniform(), 0, 1.8)]
+)
+def test_skewness_and_kurtosis_are_those_of_the_distribution(distribution, skew, kurt):
+    x = Sample.of(distribution.ppf(np.random.default_rng(2).random(400_000)))
+    for (value, low, high), expected in ((shape.skewness(x), skew), (shape.kurtosis(x), kurt)):
+        assert abs(value - expected) < 2 * (high - low)
+        assert low < value < high and high - low < 0.6
+
+
+def stand(**limited):
+    """A block of which one height varies, without contact."""
+    a = tc.Assembly("stand")
+    block = a.part("block", tc.Box(10, 20, 10), at=(0, 0, 5))
+    ground = a.part("ground", tc.Box(1, 1, 1), fixed=True)
+    a.locate(block, cases.translating(0.6))
+    a.measure("height", block.point(5, 5, 10), along="z", **limited)
+    a.measure("apart", ground.point(0, 0, 1), to=block.point(0, 0, 0), along="z", **limited)
+    return a
+
+
+@pytest.mark.parametrize(
+    ("absolute", "nominal", "quantities"),
+    [
+        (None, (0, 4), ("displacement", "distance")),
+        (True, (15, 4), ("coordinate", "distance")),
+        (False, (0, 0), ("displacement", "deviation of distance")),
+    ],
+)
+def test_measures_are_absolute_or_relative(absolute, nominal, quantities):
+    program, found = simulate(stand(absolute=absolute, tolerance=0.4), samples=50, solver="daqp")
+    assert program.nominal_measures == pytest.approx(nominal, abs=1e-12)
+    assert found["measured"][:, 0] - program.nominal_measures == pytest.approx(
+        np.column_stack([found["deviations"][:, 0]] * 2), abs=1e-12
+    )
+    summary = tc.summarize(tc.run(program, samples=50))
+    assert summary["measure_quantity"].values.tolist() == list(quantities)
+    assert summary["measure_lower"].values == pytest.approx(np.array(nominal) - 0.2)
+    assert summary["measure_upper"].values == pytest.approx(np.array(nominal) + 0.2)
+
+
+@pytest.mark.parametrize("absolute", [False, True])
+@pytest.mark.parametrize("sides", [(-0.25, 0.1), (None, 0.1), (-0.25, None)])
+def test_limits_are_compared_with_the_measure_as_it_is_said(absolute, sides):
+    off = 15.0 if absolute else 0.0
+    limits = tuple(None if side is None else side + off for side in sides)
+    a = stand()
+    a.measure("limited", a.parts[0].point(5, 5, 10), along="z", limits=limits, absolute=absolute)
+    summary = tc.summarize(tc.run(a, samples=40_000, seed=3, solver="daqp", surfaces=0, fields="none"))
+    of = summary["statistic_value"].sel(measure="limited", state="raw")
+    expected = truth(stats.norm(0, 0.1), *(side or far for side, far in zip(sides, (-np.inf, np.inf), strict=True)))
+    for word, name in {"below": "below limit", "above": "above limit", "outside": "outside limits", "Ppk": "Ppk"}.items():
+        value, low, high = of.sel(statistic=name).values
+        assert np.isnan(value) == np.isnan(expected[word])
+        assert np.isnan(value) or abs(value - expected[word]) <= 2.2 * (high - low)
+    assert np.isnan(of.sel(statistic="Pp", interval="estimate")) == (None in sides)
+
+
+@pytest.mark.parametrize(
+    ("limited", "said"),
+    [
+        ({"limits": (1, 0)}, "limits are (1, 0); expected (lower, upper)"),
+        ({"limits": (None, None)}, "expected (lower, upper)"),
+        ({"limits": 0.3}, "limits are 0.3; expected"),
+        ({"limits": (0, float("nan"))}, "expected (lower, upper)"),
+        ({"limits": ("a", 2)}, "expected (lower, upper)"),
+        ({"limits": (0, 1), "tolerance": 1}, "both a tolerance and limits"),
+        ({"absolute": 1}, "absolute is 1; expected True or False"),
+    ],
+)
+def test_wrong_limits_are_named(limited, said):
+    faults = tc.check(stand(**limited))
+    assert len(faults) == 2 and all(said in fault and 'measure "' in fault for fault in faults)
+
+
+def test_a_function_has_its_own_value():
+    a = stand()
+    a.measure("own", lambda poses: poses.translation(a.parts[0])[2], absolute=True)
+    (fault,) = tc.check(a)
+    assert "absolute is for measures of points" in fault
+
+
+@pytest.mark.parametrize("limits", [(None, 0.5), (-0.25, 0.5), (-1, None)])
+def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
+    a = stand(limits=limits, absolute=False)
+    tc.write_model(a, tmp_path / "stand.json")
+    tc.run(a, samples=10, out=tmp_path / "stand.nc").close()
+    with tc.open_archive(tmp_path / "stand.nc") as results:
+        again = [tc.archive.model_of(results), tc.build(tmp_path / "stand.json").nominal.assembly]
+    for model in again:
+        assert [(m.limits, m.absolute) for m in model.measures] == [(limits, False)] * 2
+        assert [str(m) for m in model.measures] == [str(m) for m in a.measures]
+
+
+def test_summaries_are_printed_as_json_and_csv(tmp_path):
+    path = tmp_path / "stand.nc"
+    tc.run(stand(limits=(None, 0.1)), samples=100, seed=2, out=path).close()
+    expected = tc.summarize(path)["statistic_value"].sel(measure="height", state="raw", statistic="6 sigma").values
+    done = run(["tolcontact", "summary", path, "--json"])
+    found = json.loads(done.stdout)
+    assert done.returncode == 0 and found["attrs"]["realizations"] == 100
+    of = found["coords"]["statistic"]["data"].index("6 sigma")
+    assert found["data_vars"]["statistic_value"]["data"][0][0][of] == expected.tolist()
+    lower = found["coords"]["statistic"]["data"].index("below limit")
+    assert found["data_vars"]["statistic_value"]["data"][0][0][lower] == [None] * 3
+    done = run(["tolcontact", "summary", path, "--csv"])
+    rows = list(csv.reader(done.stdout.splitlines()))
+    assert rows[0] == ["measure", "state", "statistic", "estimate", "lower", "upper"]
+    (row,) = [row for row in rows if row[:3] == ["height", "raw", "6 sigma"]]
+    assert [float(cell) for cell in row[3:]] == expected.tolist()
+    done = run(["tolcontact", "summary", path, "--csv", "--json"])
+    assert (done.returncode, done.stdout) == (2, "") and "choose one" in done.stderr
