@@ -12,6 +12,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 ROOMS = {
     "casadi": ("mechanics/", "compilation/"),
     "matplotlib": ("report/",),
+    "jinja2": ("report/html/",),
     "plotly": ("report/",),
     "pyvista": ("report/",),
     "numba": ("compiled.py",),

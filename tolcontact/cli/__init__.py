@@ -4,7 +4,8 @@
     tolcontact check MODEL.py --population 1000          draw features, and print how many are inside their zones
     tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
     tolcontact run MODEL.py --out FILE.nc                simulate into an archive
-    tolcontact summary FILE.nc                           print the summary of an archive
+    tolcontact summary FILE.nc [--json | --csv]          print the summary of an archive
+    tolcontact report FILE.nc [--out FILE.html]          write it as one page, with the assembly to turn, and charts
     tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
     tolcontact compare MODEL.py --resolution linearized,exact
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
@@ -23,6 +24,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 | `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
 | `--keep measures`, `poses` or `all` | what is archived of each realization |
 | `--fields` | how many realizations the magnitudes of displacement fields cover: a number, `some`, `all` or `none` |
+| `--report FILE.html` | also write the page that `report` writes |
 | `--surfaces` | how many realizations are checked between contact points, 64 by default |
 
 | exit code | meaning |
@@ -39,7 +41,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 (True, 0)
 """
 
-from tolcontact.cli import bodies, check, compare, faces, run, summary
+from tolcontact.cli import bodies, check, compare, faces, report, run, summary
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "run", "summary"]
+__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "report", "run", "summary"]

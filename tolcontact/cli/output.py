@@ -2,15 +2,16 @@
 
 import json
 import sys
+from pathlib import Path
 
 import numpy as np
 import typer
 import xarray as xr
 from rich.console import Console
 
+from tolcontact.errors import OptionError
 from tolcontact.report import summary_text
 from tolcontact.vocabulary import UNRESOLVED
-from tolcontact.workflow.run import summarize
 
 FAILED_SHARE = 0.001
 UNBOUNDED = 10_000  # columns of what is not a terminal
@@ -33,9 +34,16 @@ def _plain(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else str(value)
 
 
-def print_summary(results: xr.DataTree) -> None:
+def check_page(path: Path) -> None:
+    """Raise OptionError unless a report may be written there; what is no page is never replaced."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise OptionError(f'report "{path}" is not the name of a page; expected one that ends in .html')
+    if not path.parent.is_dir():
+        raise OptionError(f'report "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+
+
+def print_summary(found: xr.Dataset) -> None:
     """Print the summary of a run. Ends with exit code 1 if too many realizations were not resolved."""
-    found = summarize(results)
     console().print(summary_text(found))
     failed = sum(int(found["by_status"][status]) for status in UNRESOLVED)
     if failed > FAILED_SHARE * found.attrs["realizations"]:

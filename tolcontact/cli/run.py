@@ -7,12 +7,13 @@ from typing import Annotated
 import typer
 
 from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, chosen, or_
-from tolcontact.cli.output import print_summary
+from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import log_shown, progress_bar, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
+from tolcontact.report import write_page
 from tolcontact.vocabulary import KEPT
-from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES
+from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
 
 
@@ -35,6 +36,7 @@ def run(
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
@@ -42,6 +44,8 @@ def run(
     """
     if out is None and (overwrite or resume):
         raise OptionError("--overwrite and --resume need an archive, and none is named; name one: --out FILE.nc")
+    if report is not None:
+        check_page(report)
     method = chosen(resolution=resolution, objective=objective)
     with stopped(out, done := [0, samples]), progress_bar() as bar:  # who stops it gets the cursor back first
         task = bar.add_task(shown(model.stem), total=samples)
@@ -57,6 +61,9 @@ def run(
                 fields=int(fields) if fields.isdigit() else fields, progress=show,
             )  # fmt: skip
     with results:
-        print_summary(results)
+        found = summarize(results)
+        if report is not None:
+            write_page(results, found, report)
+        print_summary(found)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")

@@ -27,4 +27,4 @@ def summary(
         elif as_json:
             print_data(summarize(results))
         else:
-            print_summary(results)
+            print_summary(summarize(results))

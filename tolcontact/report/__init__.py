@@ -30,6 +30,8 @@ How to read it:
 Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line states it.
 """
 
-from tolcontact.report.text import comparison_text, grouped, population_text, summary_text
+from tolcontact.report.figures import grouped
+from tolcontact.report.html import write_page
+from tolcontact.report.text import comparison_text, population_text, summary_text
 
-__all__ = ["comparison_text", "grouped", "population_text", "summary_text"]
+__all__ = ["comparison_text", "grouped", "population_text", "summary_text", "write_page"]

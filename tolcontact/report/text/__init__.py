@@ -2,6 +2,6 @@
 
 from tolcontact.report.text.comparison import comparison_text
 from tolcontact.report.text.population import population_text
-from tolcontact.report.text.summary import grouped, summary_text
+from tolcontact.report.text.summary import summary_text
 
-__all__ = ["comparison_text", "grouped", "population_text", "summary_text"]
+__all__ = ["comparison_text", "population_text", "summary_text"]

@@ -11,6 +11,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from tolcontact.report.figures import grouped, limits_text, number, percent, share
 from tolcontact.vocabulary import (
     ABOVE,
     BELOW,
@@ -31,12 +32,10 @@ RAW, CORRECTED = STATES
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
 _BY_PERCENTILES = {PP_NORMAL: PP, PPK_NORMAL: PPK}
-MAX_DECIMALS = 6
-MAX_DECIMALS_PERCENT = 2
 NAME_WIDTH = 12  # of names and labels; longer ones may be wrapped
 ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
 WIDTH = 80
-RARE = 10_000  # ppm: from 1 % on shares are in percent
+APART = "* apart from that by percentiles: as of a normal distribution it is wrong"
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -60,13 +59,8 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
     if magnitudes:
         yield _field_table(summary)
     yield Text("\ncontact", style="bold")
-    for line in _contact_lines(summary, count):
+    for line in contact_lines(summary, count):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
-
-
-def grouped(count: int) -> str:
-    """A count with its thousands apart: 57 344."""
-    return f"{count:,}".replace(",", " ")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -99,6 +93,14 @@ def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
     units, quantity = str(of["measure_units"].values), str(of["measure_quantity"].values)
     said = ", ".join(each for each in (quantity, limits_text(of)) if each)
     yield Text(f"\n{name} ({units}){': ' if said else ''}{said}", style="bold")
+    rows, marked = measure_rows(of)
+    yield _table(["", RAW, CORRECTED, "change"], rows)
+    if marked:
+        yield Text(APART)
+
+
+def measure_rows(of: xr.Dataset) -> tuple[list[list[str]], bool]:
+    """All estimates of a measure: rows of label, raw, corrected and change; and whether one is marked by * (see APART)."""
     rows, marked = [], False
     for statistic in of["statistic"].values:
         values = [of["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
@@ -118,17 +120,7 @@ def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
             changed = of["change"].sel(change_of=_CHANGE_BESIDE[statistic]).values
             change = number(changed, sign=True) if statistic == "mean" else percent(changed - 1, sign=True)
         rows.append([label, *figures, change])
-    yield _table(["", RAW, CORRECTED, "change"], rows)
-    if marked:
-        yield Text("* apart from that by percentiles: as of a normal distribution it is wrong")
-
-
-def limits_text(of: xr.Dataset) -> str:
-    """The limits of a measure in words; empty if it has none."""
-    lower, upper = float(of["measure_lower"].values), float(of["measure_upper"].values)
-    if math.isfinite(lower) and math.isfinite(upper):
-        return f"limits {lower:g} to {upper:g}"
-    return f"at least {lower:g}" if math.isfinite(lower) else f"at most {upper:g}" if math.isfinite(upper) else ""
+    return rows, marked
 
 
 def _are_apart(one: np.ndarray, other: np.ndarray) -> bool:
@@ -146,7 +138,8 @@ def _field_table(summary: xr.Dataset) -> Table:
     return _table(["part", "state", "least", "largest"], rows)
 
 
-def _contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
+def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
+    """What a run of `count` realizations shows about contact, line by line."""
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
     by_status = _by_status(summary)
     yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
@@ -195,48 +188,3 @@ def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
 
 def _by_status(summary: xr.Dataset) -> dict[str, int]:
     return {str(m): int(n) for m, n in zip(summary["status_meaning"].values, summary["by_status"].values, strict=True)}
-
-
-def number(values: object, *, sign: bool = False, most: int = MAX_DECIMALS) -> str:
-    """`estimate [lower, upper]`, with as many decimals (`most` at most) as its width deserves; "-" if there is none."""
-    estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
-    if not math.isfinite(estimate):
-        return "-"
-    finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
-    width = max(finite, default=0.0)
-    decimals = (
-        min(max(_digits(width) - math.floor(math.log10(width)), 0), most)
-        if width > 0
-        else (0 if estimate == 0 else min(4, most))
-    )
-    plus = "+" if sign else ""
-    return f"{_rounded(estimate, decimals):{plus}.{decimals}f} [{_bound(lower, decimals)}, {_bound(upper, decimals)}]"
-
-
-def _digits(width: float) -> int:
-    """One more digit if the first one of the half width is 1 or 2, so that rounding stays below a fifth of it."""
-    return 1 if width / 10 ** math.floor(math.log10(width)) < 3 else 0
-
-
-def percent(values: object, *, sign: bool = False) -> str:
-    """`number` of shares, in percent."""
-    estimate, lower, upper = (100 * float(v) for v in values)  # type: ignore[attr-defined]
-    text = number((estimate, lower, upper), sign=sign, most=MAX_DECIMALS_PERCENT)
-    return text if text == "-" else text.replace(" [", " % [")
-
-
-def share(values: object) -> str:
-    """`number` of shares, in percent; of rare events in ppm."""
-    estimate, lower, upper = (1e6 * float(v) for v in values)  # type: ignore[attr-defined]
-    if not math.isfinite(estimate) or estimate >= RARE:
-        return percent(values)
-    return f"{grouped(round(estimate))} ppm [{grouped(round(lower))}, {grouped(round(upper))}]"
-
-
-def _bound(value: float, decimals: int) -> str:
-    return f"{_rounded(value, decimals):.{decimals}f}" if math.isfinite(value) else ("-inf" if value < 0 else "inf")
-
-
-def _rounded(value: float, decimals: int) -> float:
-    """Rounded, and never -0."""
-    return round(value, decimals) + 0.0

@@ -1,0 +1,221 @@
+"""The report: what its page says, what it leaves out, and how it is used in a browser."""
+
+import gzip
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+import trimesh
+from playwright.sync_api import sync_playwright
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import run
+from tests.test_formats import STORED
+from tolcontact.report import write_page
+
+CHROMIUM = shutil.which("chromium")
+ODD = "0<img src=x onerror=alert(1)> <script>alert(2)"
+
+
+def page_of(archive, path):
+    with tc.open_archive(archive) as results:
+        write_page(results, tc.summarize(results), path)
+    return path.read_text(encoding="utf-8")
+
+
+def data_of(page):
+    return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "ra1.nc"
+    tc.run(cases.ra1(), samples=500, seed=1, solver="daqp", out=path, surfaces=8).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def page(archive):
+    path = archive.with_suffix(".html")
+    page_of(archive, path)
+    return path
+
+
+def test_the_command_writes_a_page_that_says_what_the_summary_says(archive, tmp_path):
+    done = run(["tolcontact", "report", archive, "--out", tmp_path / "page.html"])
+    assert (done.returncode, done.stdout) == (0, f"report: {tmp_path / 'page.html'}\n"), done.stderr
+    page = (tmp_path / "page.html").read_text(encoding="utf-8")
+    printed = run(["tolcontact", "summary", archive]).stdout
+    for figures in re.findall(r"\[[-\d., inf]+\]", printed)[:40]:
+        assert figures in page
+    assert 1_800_000 < len(page) < 8_000_000
+    assert [*tmp_path.iterdir()] == [tmp_path / "page.html"]
+
+
+def test_counts_of_a_histogram_are_all_realizations(archive, page):
+    (chart,) = data_of(page.read_text())["charts"]
+    measured = tc.open_archive(archive)["measured"].values
+    for state in (0, 1):
+        counts, _ = np.histogram(measured[:, state, 0], chart["edges"])
+        assert counts.tolist() == chart["states"][state]["counts"] and counts.sum() == 500
+    assert chart["limits"] == [-0.5, 0.5]
+
+
+def test_extreme_realizations_are_shown_first(archive, page):
+    shown = data_of(page.read_text())["scene"]["realizations"]
+    order = np.argsort(tc.open_archive(archive)["measured"].values[:, 1, 0])
+    assert shown["rows"][:10] == [*order[:5].tolist(), *order[::-1][:5].tolist()]
+    assert shown["why"][0].startswith("smallest") and shown["why"][5].startswith("largest") and len(shown["rows"]) == 300
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"keep": "measures"}, "has no poses"),
+        ({"fields": "none", "keep": "poses"}, None),
+        ({"keep": "measures", "fields": "none"}, "has no poses"),
+    ],
+)
+def test_what_an_archive_does_not_have_is_said(settings, said, tmp_path):
+    tc.run(cases.stack(), samples=20, out=tmp_path / "little.nc", solver="daqp", **settings).close()
+    page = page_of(tmp_path / "little.nc", tmp_path / "little.html")
+    found = data_of(page)
+    assert ("motions" in found["scene"]["realizations"]) == (settings.get("keep") != "measures")
+    assert said is None or said in page
+
+
+def test_one_part_without_contact_is_a_page_too(tmp_path):
+    a = tc.Assembly("alone")
+    block = a.part("block", tc.Box(10, 20, 10))
+    a.locate(block, cases.translating(0.1))
+    a.measure("height", block.point(5, 5, 10), along="z", limits=(None, 0.2))
+    tc.run(a, samples=10, out=tmp_path / "alone.nc").close()
+    found = data_of(page_of(tmp_path / "alone.nc", tmp_path / "alone.html"))
+    assert found["scene"]["contacts"] == [] and found["charts"][0]["limits"] == [None, 0.2]
+
+
+def test_a_measure_that_is_no_number_leaves_its_chart_out(tmp_path):
+    a = cases.ra1()
+    a.measure("nothing", lambda poses: 0 * poses.translation(a.parts[0])[0] / 0)
+    tc.run(a, samples=10, out=tmp_path / "nan.nc", solver="daqp").close()
+    found = data_of(page_of(tmp_path / "nan.nc", tmp_path / "nan.html"))
+    assert found["charts"][1]["edges"] == [] and found["charts"][0]["edges"]
+
+
+@pytest.mark.parametrize(("name", "said"), [("page.nc", "not the name of a page"), ("nowhere/page.html", "no folder")])
+def test_where_no_page_can_be_is_said_before_anything_is_done(name, said, archive, tmp_path):
+    for command in (["report", archive, "--out", tmp_path / name], ["run", "x.py", "--report", tmp_path / name]):
+        done = run(["tolcontact", *command])
+        assert (done.returncode, done.stdout) == (2, "") and said in done.stderr
+    assert not [*tmp_path.iterdir()]
+
+
+def test_formats_of_before_have_a_page(tmp_path):
+    for number, stored in STORED.items():
+        path = tmp_path / f"format_{number}.nc"
+        path.write_bytes(gzip.decompress(stored.read_bytes()))
+        assert data_of(page_of(path, tmp_path / f"format_{number}.html"))["charts"][0]["edges"]
+
+
+needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")
+
+
+@pytest.fixture
+def browser():
+    with sync_playwright() as driver:
+        options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+        options += ["--disable-background-networking", "--disable-component-update", "--disable-sync", "--no-first-run"]
+        opened = driver.chromium.launch(executable_path=CHROMIUM, args=options)
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def open_page(browser):
+    """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
+    wrong = []
+
+    def open_(path, width=1280):
+        opened = browser.new_page(viewport={"width": width, "height": 900})
+        opened.on("console", lambda message: wrong.append(message.text))
+        opened.on("pageerror", lambda error: wrong.append(str(error)))
+        opened.on("dialog", lambda dialog: wrong.append(dialog.message))
+        opened.on(
+            "request", lambda request: request.url == path.as_uri() or request.url[:5] == "blob:" or wrong.append(request.url)
+        )
+        opened.goto(path.as_uri())
+        opened.wait_for_function("window.stage !== undefined")
+        return opened
+
+    yield open_
+    assert not wrong
+
+
+def picture(page):
+    """The pixels of the scene."""
+    return page.evaluate("document.getElementById('scene').toDataURL()")
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_is_used(archive, page, width, open_page):
+    opened = open_page(page, width)
+    assert opened.evaluate("document.documentElement.scrollWidth") <= width
+    first = picture(opened)
+    box = opened.locator("#scene").bounding_box()
+    opened.locator("#scene").scroll_into_view_if_needed()
+    box = opened.locator("#scene").bounding_box()
+    opened.mouse.move(box["x"] + box["width"] / 2, box["y"] + box["height"] / 2)
+    opened.mouse.down()
+    opened.mouse.move(box["x"] + box["width"] / 2 + 80, box["y"] + box["height"] / 2 + 20, steps=3)
+    opened.mouse.up()
+    turned = picture(opened)
+    assert turned != first
+    opened.select_option("#component", "2")
+    along_z = picture(opened)
+    assert along_z != turned and opened.locator("#bar").is_visible()
+    with tc.open_archive(archive) as results:
+        largest = float(max(results[f"field/{part}"].six_sigma.sel(component="z").max() for part in ("base", "top")))
+        measured = results["measured"].values[:, :, 0]
+    assert float(opened.locator("#high").inner_text()) == pytest.approx(largest, rel=1e-3)
+    opened.select_option("#field", "")
+    assert not opened.locator("#bar").is_visible()
+    opened.locator("#which").fill("7")
+    said = opened.locator("#said").inner_text()
+    row = int(re.match(r"realization (\d+) ", said)[1])
+    raw, corrected = re.search(r"raw (\S+), corrected (\S+) mm", said).groups()
+    assert [float(raw), float(corrected)] == pytest.approx(measured[row], rel=1e-3)
+    moved = picture(opened)
+    opened.locator("input[name=state][value='0']").check()
+    assert picture(opened) != moved
+    opened.select_option("#across", "x")
+    assert opened.evaluate("stage.parts[0].materials[0].clippingPlanes.length") == 1
+
+
+@needs_browser
+def test_a_histogram_is_read_in_the_page(archive, page, open_page):
+    opened = open_page(page)
+    x, y = opened.evaluate("(() => { const t = document.querySelector('.chart').data[1]; return [t.x, t.y]; })()")
+    with tc.open_archive(archive) as results:
+        expected = tc.summarize(results)["statistic_value"].isel(measure=0, state=1)
+    mean = np.average(x, weights=y)
+    assert sum(y) == 500 and mean == pytest.approx(float(expected.sel(statistic="mean", interval="estimate")), abs=x[1] - x[0])
+
+
+@needs_browser
+def test_odd_names_are_texts(tmp_path, open_page):
+    a = tc.Assembly("odd &amp; <b>bold</b>")
+    block = a.part(ODD, tc.Mesh(trimesh.creation.box((10, 20, 10))), at=(5, 10, 5))
+    a.locate(block, cases.translating(0.1))
+    a.measure("quotes \" ' \\ & é 点", block.point(0, 0, 5), along="z", tolerance=1)
+    a.measure(ODD, block.point(0, 0, 5), along="z")
+    tc.run(a, samples=10, out=tmp_path / "odd.nc").close()
+    page_of(tmp_path / "odd.nc", tmp_path / "odd.html")
+    opened = open_page(tmp_path / "odd.html")
+    assert "odd &amp; <b>bold</b>" in opened.locator("h1").inner_text()
+    assert ODD in opened.locator("#parts").inner_text()
+    assert ODD in opened.locator("tbody").first.inner_text()
+    assert "quotes \" ' \\ & é 点 (mm)" in opened.locator("tbody").first.inner_text()

@@ -1,0 +1,84 @@
+"""What the charts of a page are drawn from: histograms of each measure in both states, and how estimates settle with N."""
+
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.realizations import pieces
+from tolcontact.report.figures import limits_text
+from tolcontact.report.html.packed import packed
+
+BINS = 60
+STEPS = 40  # numbers of realizations at which estimates are shown
+Z = 1.959964  # of 95 %
+FIGURES = {"mean": "mean", "sixSigma": "6 sigma", "outside": "outside limits"}
+
+
+def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]:
+    """For each measure its name, units, limits, figures and distributions."""
+    rows = results.to_dataset()[[words.MEASURED.name]].isel({words.REALIZATION: slice(summary.attrs["realizations"])})
+    found = []
+    for number, name in enumerate(summary["measure"].values):
+        of = summary.sel(measure=name)
+        states = [_of_state(rows, number, state) for state in range(len(words.STATES))]
+        edges = _edges(states)
+        for state, own in enumerate(states):
+            own["counts"] = _counts(rows, number, state, edges)
+            del own["range"]
+        found.append(
+            {
+                "name": str(name),
+                "units": str(of["measure_units"].values),
+                "limits": [_finite(of["measure_lower"]), _finite(of["measure_upper"])],
+                "said": limits_text(of),
+                "edges": edges.tolist(),
+                "states": states,
+                **{word: [_finite(each) for each in _estimates(of, name)] for word, name in FIGURES.items()},
+            }
+        )
+    return found
+
+
+def _estimates(of: xr.Dataset, statistic: str) -> xr.DataArray:
+    return of["statistic_value"].sel(statistic=statistic, interval="estimate")
+
+
+def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
+    """The range of a measure, and its mean and 6 sigma after more and more realizations, with the mean's 95 % interval."""
+    total = rows.sizes[words.REALIZATION]
+    steps = np.unique(np.geomspace(2, total, STEPS).round().astype(int))
+    low, high, count, middle = np.inf, -np.inf, 0, None
+    sums, found = np.zeros(2), []
+    for piece in pieces(rows):
+        x = piece[words.MEASURED.name].values[:, state, measure]
+        low, high = min(low, float(x.min())), max(high, float(x.max()))
+        middle = float(x[0]) if middle is None else middle
+        cumulated = np.cumsum([x - middle, (x - middle) ** 2], axis=1)
+        for n in steps[(steps > count) & (steps <= count + len(x))]:
+            first, second = (sums + cumulated[:, n - count - 1]) / n
+            s = float(np.sqrt(max(second - first**2, 0) * n / (n - 1)))
+            found.append([int(n), middle + first, Z * s / np.sqrt(n), 6 * s])
+        sums, count = sums + cumulated[:, -1], count + len(x)
+    return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 4))}
+
+
+def _edges(states: list[dict[str, Any]]) -> np.ndarray:
+    low, high = min(own["range"][0] for own in states), max(own["range"][1] for own in states)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return np.array([])
+    return np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, high + 0.5])
+
+
+def _counts(rows: xr.Dataset, measure: int, state: int, edges: np.ndarray) -> list[int]:
+    if not edges.size:
+        return []
+    counts = np.zeros(len(edges) - 1, dtype=int)
+    for piece in pieces(rows):
+        counts += np.histogram(piece[words.MEASURED.name].values[:, state, measure], edges)[0]
+    return counts.tolist()
+
+
+def _finite(value: xr.DataArray) -> float | None:
+    return float(value) if np.isfinite(value) else None

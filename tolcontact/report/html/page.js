@@ -1,0 +1,383 @@
+"use strict";
+// The page's own script: it unpacks the data, draws the assembly with three.js, and the charts with plotly.
+
+const data = JSON.parse(document.getElementById("data").textContent);
+const byId = (id) => document.getElementById(id);
+
+/** An array of numbers from its base64 form: {shape, values}. */
+function unpacked(packed) {
+  const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
+  const Kind = packed.kind === "f4" ? Float32Array : Int32Array;
+  return { shape: packed.shape, values: new Kind(bytes.buffer) };
+}
+
+const figure = (x) => (Number.isFinite(x) ? Number(x.toPrecision(4)).toString() : "-");
+
+// --- colours ---------------------------------------------------------------------------------------------------------
+
+// Viridis, and a diverging map from blue over white to orange: both are read by the colour-blind.
+const VIRIDIS = ["#440154", "#482878", "#3e4a89", "#31688e", "#26828e", "#1f9e89", "#35b779", "#6ece58", "#b5de2b", "#fde725"];
+const DIVERGING = ["#2166ac", "#67a9cf", "#d1e5f0", "#f7f7f7", "#fee0b6", "#f1a340", "#b35806"];
+
+function colourOf(map, share) {
+  const place = Math.min(Math.max(share, 0), 1) * (map.length - 1);
+  const first = Math.min(Math.floor(place), map.length - 2);
+  return new THREE.Color(map[first]).lerp(new THREE.Color(map[first + 1]), place - first);
+}
+
+/** 256 colours of a map, as numbers between 0 and 1. */
+function table(map) {
+  return Array.from({ length: 256 }, (_, k) => colourOf(map, k / 255).toArray());
+}
+
+const TABLES = new Map([VIRIDIS, DIVERGING].map((map) => [map, table(map)]));
+
+// --- the scene -------------------------------------------------------------------------------------------------------
+
+const GREYS = ["#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0"];
+const RAW = 0, CORRECTED = 1, DIFFERENCE = 2;
+const RED = "#d01c1c";
+
+class Stage {
+  constructor(scene) {
+    this.data = scene;
+    this.canvas = byId("scene");
+    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+    this.renderer.localClippingEnabled = true;
+    this.scene = new THREE.Scene();
+    this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b0b0, Math.PI));
+    this.section = new THREE.Plane(new THREE.Vector3(1, 0, 0), 0);
+    this.parts = scene.parts.map((part, k) => this.part(part, k));
+    this.box = new THREE.Box3();
+    this.parts.forEach((part) => this.box.expandByObject(part.group));
+    this.size = this.box.getSize(new THREE.Vector3()).length();
+    this.marks = {
+      locators: this.arrows(scene.locators, "#1f5fa8", 0.05),
+      forces: this.arrows(scene.forces.filter((force) => force.at), "#7a3fb0", 0.09),
+      contacts: this.contacts(),
+      points: this.points(),
+    };
+    this.look();
+    new ResizeObserver(() => this.resize()).observe(this.canvas.parentElement);
+    this.resize();
+  }
+
+  part(part, number) {
+    const vertices = unpacked(part.vertices), faces = unpacked(part.faces);
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(vertices.values, 3));
+    geometry.setAttribute("color", new THREE.BufferAttribute(new Float32Array(vertices.values.length), 3));
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(faces.values), 1));
+    const sharp = geometry.toNonIndexed();
+    sharp.computeVertexNormals();
+    const material = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide, clippingPlanes: [] });
+    const group = new THREE.Group();
+    group.matrixAutoUpdate = false;
+    const mesh = new THREE.Mesh(sharp, material);
+    const ink = new THREE.LineBasicMaterial({ color: "#30363d", clippingPlanes: [] });
+    group.add(mesh, new THREE.LineSegments(new THREE.EdgesGeometry(geometry, 25), ink));
+    this.scene.add(group);
+    const fields = {};
+    for (const name of ["mean", "sixSigma"]) if (part[name]) fields[name] = unpacked(part[name]);
+    return { name: part.name, group, mesh, materials: [material, ink], faces: faces.values, fields, own: GREYS[number % GREYS.length] };
+  }
+
+  arrows(things, colour, share) {
+    const group = new THREE.Group(), length = share * this.size;
+    const shape = new THREE.ConeGeometry(0.3 * length, length, 12);
+    shape.translate(0, -length / 2, 0);
+    const material = new THREE.MeshLambertMaterial({ color: colour });
+    for (const thing of things) {
+      const cone = new THREE.Mesh(shape, material), along = new THREE.Vector3(...thing.along).normalize();
+      cone.position.set(...thing.at);
+      cone.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along);
+      cone.name = thing.name;
+      group.add(cone);
+    }
+    this.scene.add(group);
+    return group;
+  }
+
+  contacts() {
+    const group = new THREE.Group();
+    this.pairs = this.data.contacts.map((pair) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.BufferAttribute(unpacked(pair.points).values, 3));
+      const material = new THREE.PointsMaterial({ color: "#0a7d4f", size: 4, sizeAttenuation: false, depthTest: false });
+      const points = new THREE.Points(geometry, material);
+      points.matrixAutoUpdate = false;
+      group.add(points);
+      return { name: pair.name, part: pair.part, points, material };
+    });
+    this.scene.add(group);
+    return group;
+  }
+
+  points() {
+    const group = new THREE.Group();
+    const shape = new THREE.SphereGeometry(0.008 * this.size, 16, 12);
+    const material = new THREE.MeshBasicMaterial({ color: "#c2410c", depthTest: false });
+    for (const measure of this.data.measures) {
+      for (const at of measure.points) {
+        const ball = new THREE.Mesh(shape, material);
+        ball.position.set(...at);
+        group.add(ball);
+      }
+      group.add(this.label(measure.name, measure.points[0]));
+    }
+    this.scene.add(group);
+    return group;
+  }
+
+  label(text, at) {
+    const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
+    context.font = "28px sans-serif";
+    canvas.width = Math.ceil(context.measureText(text).width) + 16;
+    canvas.height = 40;
+    context.font = "28px sans-serif";
+    context.fillStyle = "rgba(255,255,255,0.85)";
+    context.fillRect(0, 0, canvas.width, canvas.height);
+    context.fillStyle = "#7c2d12";
+    context.fillText(text, 8, 29);
+    const material = new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false, sizeAttenuation: false });
+    const sprite = new THREE.Sprite(material);
+    sprite.scale.set((0.032 * canvas.width) / canvas.height, 0.032, 1);
+    sprite.center.set(0, -0.4);
+    sprite.position.set(...at);
+    return sprite;
+  }
+
+  look() {
+    const middle = this.box.getCenter(new THREE.Vector3());
+    this.camera = new THREE.PerspectiveCamera(35, 1, this.size / 100, this.size * 20);
+    this.camera.up.set(0, 0, 1);
+    this.camera.position.copy(middle).add(new THREE.Vector3(0.9, -1.3, 0.8).normalize().multiplyScalar(1.45 * this.size));
+    this.turn = new THREE.OrbitControls(this.camera, this.canvas);
+    this.turn.target.copy(middle);
+    this.turn.listenToKeyEvents(this.canvas);
+    this.turn.keys = { LEFT: "ArrowLeft", UP: "ArrowUp", RIGHT: "ArrowRight", BOTTOM: "ArrowDown" };
+    this.turn.addEventListener("change", () => this.draw());
+    this.turn.update();
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.canvas.parentElement;
+    this.renderer.setPixelRatio(window.devicePixelRatio);
+    this.renderer.setSize(clientWidth, clientHeight, false);
+    this.camera.aspect = clientWidth / clientHeight;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+  }
+
+  draw() {
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  /** Colour the parts by a field, and return its range; without one in their own colours. */
+  paint(name, component, state) {
+    const known = name ? this.parts.filter((part) => part.fields[name]) : [];
+    const valueOf = (field, vertex) => {
+      const [, vertices, components] = field.shape;
+      const at = (s) => field.values[(s * vertices + vertex) * components + component];
+      return state === DIFFERENCE ? at(CORRECTED) - at(RAW) : at(state);
+    };
+    // One scale for both states, so that they can be compared.
+    let low = Infinity, high = -Infinity;
+    for (const part of known) {
+      const field = part.fields[name], vertices = field.shape[1];
+      for (let v = 0; v < vertices; v++) {
+        const values = state === DIFFERENCE ? [valueOf(field, v)] : [0, 1].map((s) => field.values[(s * vertices + v) * field.shape[2] + component]);
+        for (const value of values) if (Number.isFinite(value)) [low, high] = [Math.min(low, value), Math.max(high, value)];
+      }
+    }
+    const signed = state === DIFFERENCE || (name === "mean" && component < 3);
+    if (signed) [low, high] = [-Math.max(-low, high), Math.max(-low, high)];
+    const map = signed ? DIVERGING : VIRIDIS, colours = TABLES.get(map);
+    for (const part of this.parts) {
+      const colour = part.mesh.geometry.getAttribute("color"), field = name && part.fields[name];
+      const own = new THREE.Color(part.own).toArray();
+      part.faces.forEach((vertex, corner) => {
+        const value = field ? valueOf(field, vertex) : NaN;
+        const share = high > low ? (value - low) / (high - low) : 0.5;
+        colour.setXYZ(corner, ...(Number.isFinite(value) ? colours[Math.round(255 * Math.min(Math.max(share, 0), 1))] : own));
+      });
+      colour.needsUpdate = true;
+    }
+    this.draw();
+    return known.length && high >= low ? { low, high, map } : null;
+  }
+
+  /** Move the parts as in one realization, exaggerated by a factor; back to nominal without one. */
+  move(motions, number, state, factor, penetrating) {
+    this.parts.forEach((part, k) => {
+      part.group.matrix.copy(motions ? this.motion(motions, number, state, k, factor) : new THREE.Matrix4());
+      part.group.matrixWorldNeedsUpdate = true;
+    });
+    this.pairs.forEach((pair, k) => {
+      pair.points.matrix.copy(this.parts[pair.part].group.matrix);
+      pair.points.matrixWorldNeedsUpdate = true;
+      pair.material.color.set(penetrating && penetrating[k] ? RED : "#0a7d4f");
+    });
+    this.draw();
+  }
+
+  motion(motions, number, state, part, factor) {
+    const parts = motions.shape[2], start = ((number * 2 + state) * parts + part) * 12;
+    const m = Array.from(motions.values.subarray(start, start + 12), (x) => factor * x);
+    return new THREE.Matrix4().set(1 + m[0], m[1], m[2], m[9], m[3], 1 + m[4], m[5], m[10], m[6], m[7], 1 + m[8], m[11], 0, 0, 0, 1);
+  }
+
+  cut(axis, share) {
+    const k = "xyz".indexOf(axis), planes = axis ? [this.section] : [];
+    if (axis) {
+      this.section.normal.setComponent(0, 0).setComponent(1, 0).setComponent(2, 0).setComponent(k, -1);
+      const low = this.box.min.getComponent(k), high = this.box.max.getComponent(k);
+      this.section.constant = low + share * (high - low) + 1e-6 * this.size;
+    }
+    for (const part of this.parts) for (const material of part.materials) material.clippingPlanes = planes;
+    this.draw();
+  }
+}
+
+function drive(stage) {
+  const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
+  const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
+  const state = () => Number(document.querySelector("input[name=state]:checked").value);
+  byId("which").max = Math.max(one.rows.length - 1, 0);
+  byId("single").disabled = byId("play").disabled = !one.rows.length;
+
+  function painted() {
+    const range = stage.paint(byId("field").value, Number(byId("component").value), state());
+    byId("bar").hidden = !range;
+    if (!range) return;
+    byId("low").textContent = figure(range.low);
+    byId("high").textContent = figure(range.high);
+    byId("units").textContent = "mm";
+    byId("colours").style.background = `linear-gradient(to right, ${range.map.join(",")})`;
+  }
+
+  function moved() {
+    if (!byId("single").checked) {
+      byId("said").textContent = "";
+      return stage.move(null);
+    }
+    const k = Number(byId("which").value), seen = Math.min(state(), CORRECTED), pairs = gaps.shape[2];
+    const own = Array.from(gaps.values.subarray((k * 2 + seen) * pairs, (k * 2 + seen + 1) * pairs));
+    const values = data.charts.map((chart, m) => {
+      const at = (s) => figure(measured.values[(k * 2 + s) * data.charts.length + m]);
+      return `${chart.name}: raw ${at(RAW)}, corrected ${at(CORRECTED)} ${chart.units}`;
+    });
+    const deepest = pairs ? `smallest gap, ${seen ? "corrected" : "raw"}: ${figure(Math.min(...own))} mm` : "no contact pairs";
+    byId("said").textContent = [
+      `realization ${one.rows[k]} (${one.why[k]})`, `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
+    ].join("\n");
+    return stage.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
+  }
+
+  const both = () => { painted(); moved(); };
+  document.querySelectorAll("input[name=state]").forEach((input) => input.addEventListener("change", both));
+  ["field", "component"].forEach((id) => byId(id).addEventListener("change", painted));
+  ["single", "factor"].forEach((id) => byId(id).addEventListener("change", moved));
+  byId("which").addEventListener("input", () => { byId("single").checked = true; moved(); });
+  ["locators", "contacts", "points", "forces"].forEach((id) =>
+    byId(id).addEventListener("change", () => { stage.marks[id].visible = byId(id).checked; stage.draw(); }));
+  const cut = () => stage.cut(byId("across").value, Number(byId("cut").value) / 1000);
+  byId("across").addEventListener("change", cut);
+  byId("cut").addEventListener("input", cut);
+  for (const part of stage.parts) {
+    const label = document.createElement("label"), box = document.createElement("input");
+    Object.assign(box, { type: "checkbox", checked: true });
+    box.addEventListener("change", () => { part.group.visible = box.checked; stage.draw(); });
+    label.append(box, ` ${part.name}`);
+    byId("parts").append(label);
+  }
+  let playing = null;
+  byId("play").addEventListener("click", () => {
+    const stop = playing !== null;
+    if (stop) playing = clearInterval(playing) ?? null;
+    else {
+      byId("single").checked = true;
+      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.rows.length; moved(); }, 300);
+    }
+    byId("play").textContent = stop ? "play" : "stop";
+    byId("play").setAttribute("aria-pressed", String(!stop));
+  });
+  if (data.scene.parts.some((part) => part.sixSigma)) byId("field").value = "sixSigma";
+  both();
+}
+
+// --- charts ----------------------------------------------------------------------------------------------------------
+
+const COLOURS = ["#7f8894", "#d97706"];
+
+function layout(title, x, y) {
+  const ink = getComputedStyle(document.body).color, line = "rgba(128,128,128,0.3)";
+  return {
+    title: { text: title, font: { size: 15 } }, font: { color: ink, family: "system-ui, sans-serif" }, barmode: "overlay", bargap: 0,
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 12, t: 40, b: 48 },
+    xaxis: { title: { text: x }, gridcolor: line, zeroline: false }, yaxis: { title: { text: y }, gridcolor: line, zeroline: false },
+    legend: { orientation: "h", y: 1.08, x: 1, xanchor: "right" },
+  };
+}
+
+function chart(title) {
+  const box = document.createElement("div");
+  box.className = "chart";
+  box.setAttribute("role", "img");
+  box.setAttribute("aria-label", title);
+  byId("charts").append(box);
+  return box;
+}
+
+const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+const STATES = ["raw", "corrected"];
+const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+
+function histogram(measure) {
+  if (!measure.edges.length) return;
+  const name = escaped(measure.name), width = measure.edges[1] - measure.edges[0];
+  const middles = measure.edges.slice(0, -1).map((edge) => edge + width / 2);
+  const traces = measure.states.map((own, s) => ({
+    type: "bar", name: STATES[s], x: middles, y: own.counts, marker: { color: COLOURS[s] }, opacity: 0.6, width,
+    hovertemplate: `%{x:.4g} ${escaped(measure.units)}: %{y}<extra>${STATES[s]}</extra>`,
+  }));
+  measure.states.forEach((own, s) => {
+    const mean = measure.mean[s], sigma = measure.sixSigma[s] / 6, total = own.counts.reduce((a, b) => a + b, 0);
+    if (!(sigma > 0)) return;
+    const x = Array.from({ length: 121 }, (_, k) => mean + sigma * (k / 15 - 4));
+    const y = x.map((value) => (total * width * Math.exp(-(((value - mean) / sigma) ** 2) / 2)) / (sigma * Math.sqrt(2 * Math.PI)));
+    traces.push({ type: "scatter", mode: "lines", name: `normal, ${STATES[s]}`, x, y, line: { color: COLOURS[s], dash: "dot" }, hoverinfo: "skip" });
+  });
+  const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
+  shown.shapes = measure.limits.filter((limit) => limit !== null).map((limit) => ({
+    type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: RED, width: 2 },
+  }));
+  Plotly.newPlot(chart(`Histogram of ${measure.name}, raw and corrected`), traces, shown, SETTINGS);
+}
+
+function settling(measure) {
+  const name = escaped(measure.name);
+  const traces = measure.states.flatMap((own, s) => {
+    const { shape, values } = unpacked(own.settling);
+    const column = (k) => Array.from({ length: shape[0] }, (_, n) => values[n * 4 + k]);
+    return [{
+      type: "scatter", mode: "lines+markers", name: STATES[s], x: column(0), y: column(1), marker: { size: 4 },
+      line: { color: COLOURS[s] }, error_y: { type: "data", array: column(2), color: COLOURS[s], thickness: 1 },
+    }];
+  });
+  const shown = layout(`${name}: mean with its 95 % interval`, "realizations", escaped(measure.units));
+  shown.xaxis.type = "log";
+  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
+}
+
+for (const measure of data.charts) {
+  histogram(measure);
+  settling(measure);
+}
+try {
+  window.stage = new Stage(data.scene);
+  drive(window.stage);
+} catch (error) {
+  byId("scene").replaceWith(`The assembly cannot be drawn here: ${error.message}`);
+  console.warn(error);
+}

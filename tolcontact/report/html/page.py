@@ -1,0 +1,95 @@
+"""The page itself, from a template that holds its styles, scripts, libraries and data."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import markupsafe
+import xarray as xr
+
+from tolcontact.errors import ArchiveError
+from tolcontact.report.figures import grouped, limits_text, number, share
+from tolcontact.report.html.charts import charts_of
+from tolcontact.report.html.scene import scene_of
+from tolcontact.report.html.shown import shown_of
+from tolcontact.report.text.summary import APART, contact_lines, measure_rows
+from tolcontact.vocabulary import OUTSIDE, PPK, STATES
+
+HERE = Path(__file__).parent
+RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
+       "samples", "kept", "fields", "versions", "history", "format")  # fmt: skip
+
+
+def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
+    """Write the report of a run, whose summary is given. Raises ArchiveError if the file cannot be written."""
+    shown = shown_of(results)
+    data: dict[str, Any] = {"scene": scene_of(results, shown), "charts": charts_of(results, summary)}
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
+    page = environment.get_template("page.html.j2").render(
+        title=summary.attrs["title"],
+        realizations=grouped(summary.attrs["realizations"]),
+        begun=grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
+        overview=_overview(summary),
+        details=_details(summary),
+        contact=list(contact_lines(summary, summary.attrs["realizations"])),
+        run={name: str(results.attrs[name]) for name in RUN if name in results.attrs},
+        missing=_missing(data["scene"]),
+        data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
+        **{name: _as_is(file) for name, file in FILES.items()},
+    )
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_text(page, encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise ArchiveError(f'report "{path}" cannot be written: {error.strerror}') from error
+
+
+FILES = {
+    "style": "page.css",
+    "script": "page.js",
+    "three": "vendor/three.min.js",
+    "plotly": "vendor/plotly-basic.min.js",
+}
+
+
+def _as_is(file: str) -> Any:
+    return markupsafe.Markup((HERE / file).read_text(encoding="utf-8").replace("</script", "<\\/script"))
+
+
+def _plain_json(data: Any, **_: Any) -> str:
+    return json.dumps(data, allow_nan=False, separators=(",", ":"))
+
+
+def _overview(summary: xr.Dataset) -> list[dict[str, Any]]:
+    found = []
+    for measure in summary["measure"].values:
+        of = summary.sel(measure=measure)
+        for state in STATES:
+            values = of["statistic_value"].sel(state=state)
+            cells = [number(values.sel(statistic=word).values) for word in ("mean", "6 sigma", PPK)]
+            cells.append(share(values.sel(statistic=OUTSIDE).values))
+            units, said = str(of["measure_units"].values), limits_text(of)
+            found.append({"measure": str(measure), "units": units, "limits": said, "state": state, "cells": cells})
+    return found
+
+
+def _details(summary: xr.Dataset) -> list[dict[str, Any]]:
+    """All estimates of each measure, as rows of texts."""
+    found = []
+    for measure in summary["measure"].values:
+        rows, marked = measure_rows(summary.sel(measure=measure))
+        found.append({"name": str(measure), "rows": rows, "note": APART if marked else ""})
+    return found
+
+
+def _missing(scene: dict[str, Any]) -> list[str]:
+    """What the archive does not have, in words."""
+    said = []
+    if not any("mean" in part for part in scene["parts"]):
+        said.append("The archive has no displacement fields.")
+    if "motions" not in scene["realizations"]:
+        said.append("The archive has no poses: single realizations are shown by their numbers alone.")
+    return said
