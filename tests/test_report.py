@@ -1,5 +1,6 @@
 """The report: what its page says, what it leaves out, and how it is used in a browser."""
 
+import base64
 import gzip
 import json
 import re
@@ -14,7 +15,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import run
 from tests.test_formats import STORED
-from tolcontact.report import write_page
+from tolcontact.report import grouped, write_page
+from tolcontact.report.html import coarse
 
 CHROMIUM = shutil.which("chromium")
 ODD = "0<img src=x onerror=alert(1)> <script>alert(2)"
@@ -219,3 +221,22 @@ def test_odd_names_are_texts(tmp_path, open_page):
     assert ODD in opened.locator("#parts").inner_text()
     assert ODD in opened.locator("tbody").first.inner_text()
     assert "quotes \" ' \\ & é 点 (mm)" in opened.locator("tbody").first.inner_text()
+
+
+def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
+    monkeypatch.setattr(coarse, "TRIANGLES", 2000)
+    monkeypatch.setattr(coarse, "LEAST", 100)
+    a = tc.Assembly("ball")
+    ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=50)))
+    small = a.part("small", tc.Box(10, 20, 10), at=(200, 0, 0), fixed=True)
+    a.locate(ball, cases.translating(0.1))
+    a.measure("height", ball.point(0, 0, 50), to=small.point(0, 0, 0), along="z")
+    tc.run(a, samples=50, out=tmp_path / "ball.nc").close()
+    page = page_of(tmp_path / "ball.nc", tmp_path / "ball.html")
+    part = data_of(page)["scene"]["parts"][0]
+    count = part["faces"]["shape"][0]
+    assert count <= 2000 < part["triangles"] and f"drawn with {grouped(count)} of its" in page
+    vertices = np.frombuffer(base64.b64decode(part["vertices"]["data"]), "<f4").reshape(part["vertices"]["shape"])
+    assert np.abs(np.linalg.norm(vertices, axis=1) - 50).max() < 0.5
+    field = np.frombuffer(base64.b64decode(part["sixSigma"]["data"]), "<f4").reshape(part["sixSigma"]["shape"])
+    assert field.shape == (2, len(vertices), 4) and np.ptp(field[0, :, 2]) < 1e-5  # it does not turn: all points go alike

@@ -13,6 +13,7 @@ ROOMS = {
     "casadi": ("mechanics/", "compilation/"),
     "matplotlib": ("report/",),
     "jinja2": ("report/html/",),
+    "fast_simplification": ("report/html/coarse.py",),
     "plotly": ("report/",),
     "pyvista": ("report/",),
     "numba": ("compiled.py",),

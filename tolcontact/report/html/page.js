@@ -37,12 +37,15 @@ const TABLES = new Map([VIRIDIS, DIVERGING].map((map) => [map, table(map)]));
 const GREYS = ["#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0"];
 const RAW = 0, CORRECTED = 1, DIFFERENCE = 2;
 const RED = "#d01c1c";
+const MANY = 30_000; // triangles
 
 class Stage {
   constructor(scene) {
     this.data = scene;
     this.canvas = byId("scene");
-    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias: true, alpha: true, preserveDrawingBuffer: true });
+    // Smooth edges cost as much as all else where no graphics card draws.
+    const antialias = scene.parts.reduce((sum, part) => sum + part.faces.shape[0], 0) < MANY;
+    this.renderer = new THREE.WebGLRenderer({ canvas: this.canvas, antialias, alpha: true, preserveDrawingBuffer: true });
     this.renderer.localClippingEnabled = true;
     this.scene = new THREE.Scene();
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0xb0b0b0, Math.PI));

@@ -86,10 +86,15 @@ def _details(summary: xr.Dataset) -> list[dict[str, Any]]:
 
 
 def _missing(scene: dict[str, Any]) -> list[str]:
-    """What the archive does not have, in words."""
+    """What the archive does not have, or the page not all of, in words."""
     said = []
     if not any("mean" in part for part in scene["parts"]):
         said.append("The archive has no displacement fields.")
     if "motions" not in scene["realizations"]:
         said.append("The archive has no poses: single realizations are shown by their numbers alone.")
+    said += [
+        f"Part {part['name']} is drawn with {grouped(part['faces']['shape'][0])} of its {grouped(part['triangles'])} triangles."
+        for part in scene["parts"]
+        if part["faces"]["shape"][0] < part["triangles"]
+    ]
     return said

@@ -9,6 +9,7 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as words
+from tolcontact.report.html.coarse import allowed, coarser
 from tolcontact.report.html.packed import Packed, packed
 from tolcontact.report.html.shown import Shown
 
@@ -19,7 +20,7 @@ def scene_of(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     """Everything in the nominal assembly frame [mm]; what an archive does not have is left out."""
     document = json.loads(str(results["model"][words.DECLARATION.name].values))
     return {
-        "parts": [_part(results, str(name)) for name in results.to_dataset()[words.PART].values],
+        "parts": _parts(results),
         "locators": _locators(results),
         "contacts": list(_contacts(results)),
         "measures": list(_measures(document)),
@@ -30,15 +31,19 @@ def scene_of(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     }
 
 
-def _part(results: xr.DataTree, name: str) -> Drawn:
-    field = results["field"].children[words.group_of(name)].to_dataset()
-    drawn: Drawn = {
-        "name": name,
-        "vertices": packed(field[words.FIELD_VERTICES.name].values),
-        "faces": packed(field[words.FIELD_FACES.name].values, "i4"),
-    }
+def _parts(results: xr.DataTree) -> list[Drawn]:
+    names = [str(name) for name in results.to_dataset()[words.PART].values]
+    fields = [results["field"].children[words.group_of(name)].to_dataset() for name in names]
+    counts = allowed([field.sizes[words.FACE] for field in fields])
+    return [_part(name, field, count) for name, field, count in zip(names, fields, counts, strict=True)]
+
+
+def _part(name: str, field: xr.Dataset, count: int) -> Drawn:
+    before = field[words.FIELD_FACES.name].values
+    vertices, faces, nearest = coarser(field[words.FIELD_VERTICES.name].values, before, count)
+    drawn: Drawn = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(before)}
     for word, variable in (("mean", words.FIELD_MEAN), ("sixSigma", words.FIELD_SIX_SIGMA)):
-        values = field[variable.name].values
+        values = field[variable.name].values[:, nearest]
         if np.isfinite(values[..., :3]).all():
             drawn[word] = packed(values)
     return drawn
