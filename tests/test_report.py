@@ -208,6 +208,20 @@ def test_a_histogram_is_read_in_the_page(archive, page, open_page):
 
 
 @needs_browser
+def test_measures_are_shown_against_contributors_and_each_other(archive, page, open_page):
+    opened = open_page(page)
+    with tc.open_archive(archive) as results:
+        label = str(results["sample"].contributor.values[3])
+        x, y = results["sample/deviation"].values[:, 3], results["measured"].values[:, 1, 0]
+    opened.select_option("#abscissa", label=label)
+    read = "(() => { const t = document.getElementById('points-chart').data[1]; return [t.x, t.y]; })()"
+    assert np.abs(np.array(opened.evaluate(read)) - [x, y]).max() < 1e-5
+    opened.select_option("#abscissa", label="corner height")
+    same_x, same_y = opened.evaluate(read)
+    assert same_x == same_y
+
+
+@needs_browser
 def test_odd_names_are_texts(tmp_path, open_page):
     a = tc.Assembly("odd &amp; <b>bold</b>")
     block = a.part(ODD, tc.Mesh(trimesh.creation.box((10, 20, 10))), at=(5, 10, 5))

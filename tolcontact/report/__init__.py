@@ -18,7 +18,11 @@ cut.
 variation simulation of stand: 1000 realizations
 ...
 
-How to read it:
+`write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. It needs no network, and is
+sent like any file: the assembly to turn, with fields, single realizations and sections; histograms with limits, and how
+estimates settle; measures against contributors; contact, certificates, and how the run was made.
+
+How to read the text:
 
 - Each figure is `estimate [lower, upper]`, with as many decimals as its 95 % interval deserves.
 - The columns are the raw state, the corrected state, and the change between them. Changes are from the same draws, so their

@@ -11,6 +11,7 @@ from tolcontact.report.figures import limits_text
 from tolcontact.report.html.packed import packed
 
 BINS = 60
+POINTS = 2000  # realizations that are shown as points
 STEPS = 40  # numbers of realizations at which estimates are shown
 Z = 1.959964  # of 95 %
 FIGURES = {"mean": "mean", "sixSigma": "6 sigma", "outside": "outside limits"}
@@ -38,6 +39,27 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
                 **{word: [_finite(each) for each in _estimates(of, name)] for word, name in FIGURES.items()},
             }
         )
+    return found
+
+
+def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
+    """The first realizations one by one: measures (realization, state, measure), and deviations (realization, contributor)."""
+    some = {words.REALIZATION: slice(min(summary.attrs["realizations"], POINTS))}
+    sample = results["sample"].to_dataset()
+    found: dict[str, Any] = {
+        "measured": packed(results.to_dataset()[words.MEASURED.name].isel(some).values),
+        "contributors": [],
+    }
+    if words.DEVIATION.name in sample:
+        varying = sample[words.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
+        deviations = sample[words.DEVIATION.name].isel(some).values
+        moves = np.ptp(deviations, axis=0) > 0
+        units = (
+            sample[words.CONTRIBUTOR_UNITS.name].values if words.CONTRIBUTOR_UNITS.name in sample else np.full(len(moves), "mm")
+        )
+        labels = zip(sample[varying].values[moves], units[moves], strict=True)
+        found["contributors"] = [{"name": str(name), "units": str(unit)} for name, unit in labels]
+        found["deviations"] = packed(deviations[:, moves])
     return found
 
 

@@ -373,10 +373,38 @@ function settling(measure) {
   Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
 }
 
+/** One measure against a contributor, or against another measure, both in their states. */
+function relations() {
+  const measured = unpacked(data.relations.measured), measures = data.charts.length;
+  const deviations = data.relations.deviations && unpacked(data.relations.deviations), count = data.relations.contributors.length;
+  const ofMeasure = (m, s) => Array.from({ length: measured.shape[0] }, (_, n) => measured.values[(n * 2 + s) * measures + m]);
+  const ofContributor = (c) => Array.from({ length: deviations.shape[0] }, (_, n) => deviations.values[n * count + c]);
+  const axes = [
+    ...data.relations.contributors.map((each, c) => ({ ...each, values: () => ofContributor(c) })),
+    ...data.charts.map((each, m) => ({ ...each, values: (s) => ofMeasure(m, s) })),
+  ];
+  const offer = (select, things) => things.forEach((thing, k) => select.append(new Option(thing.name, k)));
+  offer(byId("ordinate"), data.charts);
+  offer(byId("abscissa"), axes);
+  const draw = () => {
+    const across = axes[byId("abscissa").value], up = data.charts[byId("ordinate").value];
+    const traces = STATES.map((name, s) => ({
+      type: "scatter", mode: "markers", name, x: across.values(s), y: ofMeasure(Number(byId("ordinate").value), s),
+      marker: { color: COLOURS[s], size: 4, opacity: 0.6 },
+    }));
+    const title = `${escaped(up.name)} against ${escaped(across.name)}`;
+    const named = (axis) => `${escaped(axis.name)} [${escaped(axis.units)}]`;
+    Plotly.react(byId("points-chart"), traces, layout(title, named(across), named(up)), SETTINGS);
+  };
+  ["ordinate", "abscissa"].forEach((id) => byId(id).addEventListener("change", draw));
+  draw();
+}
+
 for (const measure of data.charts) {
   histogram(measure);
   settling(measure);
 }
+relations();
 try {
   window.stage = new Stage(data.scene);
   drive(window.stage);

@@ -10,7 +10,7 @@ import xarray as xr
 
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import grouped, limits_text, number, share
-from tolcontact.report.html.charts import charts_of
+from tolcontact.report.html.charts import charts_of, relations_of
 from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows
@@ -24,7 +24,11 @@ RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set
 def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
     """Write the report of a run, whose summary is given. Raises ArchiveError if the file cannot be written."""
     shown = shown_of(results)
-    data: dict[str, Any] = {"scene": scene_of(results, shown), "charts": charts_of(results, summary)}
+    data: dict[str, Any] = {
+        "scene": scene_of(results, shown),
+        "charts": charts_of(results, summary),
+        "relations": relations_of(results, summary),
+    }
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
     page = environment.get_template("page.html.j2").render(
         title=summary.attrs["title"],
