@@ -4,7 +4,6 @@ import json
 from pathlib import Path
 
 import matplotlib as mpl
-import matplotlib.pyplot as plt
 import numpy as np
 import pyvista as pv
 import trimesh
@@ -183,24 +182,8 @@ def deep(run: xr.DataTree) -> int:
     return int(np.abs(depth - 5).argmin())
 
 
-def histogram(run: xr.DataTree, path: Path) -> None:
-    """The height of RA1's corner with and without contact."""
-    x = run.measured.isel(measure=0).values
-    figure, axes = plt.subplots(figsize=(6.4, 2.6), layout="constrained")
-    bins = np.linspace(-10, 10, 101)
-    for k, (state, colour) in enumerate(zip(STATES, ("#9aa7b5", "#c8443a"), strict=True)):
-        label = f"{TITLES[state]}: mean {x[:, k].mean():.2f} mm, 6 sigma {6 * x[:, k].std():.1f} mm"
-        axes.hist(x[:, k], bins, density=True, histtype="stepfilled", alpha=0.65, color=colour, label=label)
-    axes.set(xlabel="height of RA1's corner above nominal [mm]", ylabel="density [1/mm]", xlim=(-10, 10), ylim=(0, 0.36))
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(frameon=False, loc="upper center")
-    figure.savefig(path, dpi=110)
-    print(f"{path.name}: {path.stat().st_size // 1024} kB")
-
-
-def draw(runs: dict[str, xr.DataTree], large: xr.DataTree, folder: Path) -> None:
-    """All figures into `folder`: those of the paper from `runs`, and the histogram of RA1 from its `large` run."""
-    histogram(large, folder / "ra1.png")
+def draw(runs: dict[str, xr.DataTree], folder: Path) -> None:
+    """All figures of the paper into `folder`, from `runs`."""
     figure_3(runs, folder / "figure3.png")
     figure_4(runs["RA1"], folder / "figure4.png")
     figure_5(runs["RA1"], deep(runs["RA1"]), folder / "figure5.png")

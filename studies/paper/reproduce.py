@@ -43,7 +43,7 @@ def main() -> None:
         print(*table.table_1(name, runs[name], measured), "", *penetration, "", sep="\n", flush=True)
     print(*table.claims(runs, large), "", sep="\n")
     print(*table.first_order(large["RA1"]), "", sep="\n")
-    figures.draw({name: of[0] for name, of in runs.items()}, large["RA1"], chosen.to)
+    figures.draw({name: of[0] for name, of in runs.items()}, chosen.to)
 
 
 if __name__ == "__main__":
