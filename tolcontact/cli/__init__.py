@@ -8,6 +8,7 @@
     tolcontact report FILE.nc [--out FILE.html]          write it as one page, with the assembly to turn, and charts
     tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
     tolcontact compare MODEL.py --resolution linearized,exact
+    tolcontact view MODEL.py | FILE.stp                  look at it before any run: faces with the words that choose them
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
     tolcontact --version
@@ -41,7 +42,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 (True, 0)
 """
 
-from tolcontact.cli import bodies, check, compare, faces, report, run, summary
+from tolcontact.cli import bodies, check, compare, faces, report, run, summary, view
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "report", "run", "summary"]
+__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "report", "run", "summary", "view"]

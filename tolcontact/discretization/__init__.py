@@ -124,6 +124,7 @@ from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
+from tolcontact.discretization.seen import SeenPart, seen
 
 __all__ = [
     "BodyInFile",
@@ -138,6 +139,7 @@ __all__ = [
     "Offsets",
     "RoundPoint",
     "RoundPoints",
+    "SeenPart",
     "bodies_in",
     "discretize",
     "faces_in",
@@ -145,5 +147,6 @@ __all__ = [
     "forms_of",
     "known_surfaces",
     "parts_from",
+    "seen",
     "with_known_surfaces",
 ]

@@ -21,6 +21,8 @@ variation simulation of stand: 1000 realizations
 `write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. It needs no network, and is
 sent like any file: the assembly to turn, with fields, single realizations and sections; histograms with limits, and how
 estimates settle; measures against contributors; contact, certificates, and how the run was made.
+`write_view` (`tolcontact view`) writes the assembly before any run: faces with the words that choose them, locators, contact
+points, and nominal gaps.
 
 How to read the text:
 
@@ -35,7 +37,7 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 """
 
 from tolcontact.report.figures import grouped
-from tolcontact.report.html import write_page
+from tolcontact.report.html import write_page, write_view
 from tolcontact.report.text import comparison_text, population_text, summary_text
 
-__all__ = ["comparison_text", "grouped", "population_text", "summary_text", "write_page"]
+__all__ = ["comparison_text", "grouped", "population_text", "summary_text", "write_page", "write_view"]

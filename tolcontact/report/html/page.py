@@ -1,6 +1,7 @@
-"""The page itself, from a template that holds its styles, scripts, libraries and data."""
+"""The pages themselves, from templates that hold styles, scripts, libraries and data."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,11 +9,14 @@ import jinja2
 import markupsafe
 import xarray as xr
 
+from tolcontact.declaration import Assembly
+from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import grouped, limits_text, number, share
 from tolcontact.report.html.charts import charts_of, relations_of
 from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
+from tolcontact.report.html.view import gaps_in_words, view_of
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows
 from tolcontact.vocabulary import OUTSIDE, PPK, STATES
 
@@ -24,23 +28,41 @@ RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set
 def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
     """Write the report of a run, whose summary is given. Raises ArchiveError if the file cannot be written."""
     shown = shown_of(results)
-    data: dict[str, Any] = {
-        "scene": scene_of(results, shown),
-        "charts": charts_of(results, summary),
-        "relations": relations_of(results, summary),
+    scene = scene_of(results, shown)
+    values = {
+        "title": summary.attrs["title"],
+        "realizations": grouped(summary.attrs["realizations"]),
+        "begun": grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
+        "overview": _overview(summary),
+        "details": _details(summary),
+        "contact": list(contact_lines(summary, summary.attrs["realizations"])),
+        "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
+        "missing": _missing(scene),
+        "plotly": _as_is("vendor/plotly-basic.min.js"),
     }
+    data = {"scene": scene, "charts": charts_of(results, summary), "relations": relations_of(results, summary)}
+    _write("report", values, data, path)
+
+
+def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
+    """Write the view of a model before any run; `nominal` is None if it has faults.
+
+    Raises ArchiveError if the file cannot be written.
+    """
+    values = {"title": assembly.name, "faults": faults, "pairs": gaps_in_words(nominal)}
+    _write("view", values, {"scene": view_of(assembly, nominal), "charts": []}, path)
+
+
+def _write(kind: str, values: dict[str, Any], data: dict[str, Any], path: Path) -> None:
+    """Write a page of a kind, which has a template and a script."""
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
-    page = environment.get_template("page.html.j2").render(
-        title=summary.attrs["title"],
-        realizations=grouped(summary.attrs["realizations"]),
-        begun=grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
-        overview=_overview(summary),
-        details=_details(summary),
-        contact=list(contact_lines(summary, summary.attrs["realizations"])),
-        run={name: str(results.attrs[name]) for name in RUN if name in results.attrs},
-        missing=_missing(data["scene"]),
+    page = environment.get_template(f"{kind}.html.j2").render(
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
-        **{name: _as_is(file) for name, file in FILES.items()},
+        style=_as_is("page.css"),
+        three=_as_is("vendor/three.min.js"),
+        stage=_as_is("stage.js"),
+        script=_as_is(f"{kind}.js"),
+        **values,
     )
     part = path.with_name(f".{path.name}.part")
     try:
@@ -48,15 +70,7 @@ def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
         part.replace(path)
     except OSError as error:
         part.unlink(missing_ok=True)
-        raise ArchiveError(f'report "{path}" cannot be written: {error.strerror}') from error
-
-
-FILES = {
-    "style": "page.css",
-    "script": "page.js",
-    "three": "vendor/three.min.js",
-    "plotly": "vendor/plotly-basic.min.js",
-}
+        raise ArchiveError(f'page "{path}" cannot be written: {error.strerror}') from error
 
 
 def _as_is(file: str) -> Any:

@@ -1,0 +1,162 @@
+"use strict";
+// The report: fields and single realizations in the scene, and charts with plotly.
+
+function drive(stage) {
+  const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
+  const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
+  const state = () => Number(document.querySelector("input[name=state]:checked").value);
+  byId("which").max = Math.max(one.rows.length - 1, 0);
+  byId("single").disabled = byId("play").disabled = !one.rows.length;
+
+  function painted() {
+    const range = stage.paint(byId("field").value, Number(byId("component").value), state());
+    byId("bar").hidden = !range;
+    if (!range) return;
+    byId("low").textContent = figure(range.low);
+    byId("high").textContent = figure(range.high);
+    byId("units").textContent = "mm";
+    byId("colours").style.background = `linear-gradient(to right, ${range.map.join(",")})`;
+  }
+
+  function moved() {
+    if (!byId("single").checked) {
+      byId("said").textContent = "";
+      return stage.move(null);
+    }
+    const k = Number(byId("which").value), seen = Math.min(state(), CORRECTED), pairs = gaps.shape[2];
+    const own = Array.from(gaps.values.subarray((k * 2 + seen) * pairs, (k * 2 + seen + 1) * pairs));
+    const values = data.charts.map((chart, m) => {
+      const at = (s) => figure(measured.values[(k * 2 + s) * data.charts.length + m]);
+      return `${chart.name}: raw ${at(RAW)}, corrected ${at(CORRECTED)} ${chart.units}`;
+    });
+    const deepest = pairs ? `smallest gap, ${seen ? "corrected" : "raw"}: ${figure(Math.min(...own))} mm` : "no contact pairs";
+    byId("said").textContent = [
+      `realization ${one.rows[k]} (${one.why[k]})`, `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
+    ].join("\n");
+    return stage.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
+  }
+
+  const both = () => { painted(); moved(); };
+  document.querySelectorAll("input[name=state]").forEach((input) => input.addEventListener("change", both));
+  ["field", "component"].forEach((id) => byId(id).addEventListener("change", painted));
+  ["single", "factor"].forEach((id) => byId(id).addEventListener("change", moved));
+  byId("which").addEventListener("input", () => { byId("single").checked = true; moved(); });
+  let playing = null;
+  byId("play").addEventListener("click", () => {
+    const stop = playing !== null;
+    if (stop) playing = clearInterval(playing) ?? null;
+    else {
+      byId("single").checked = true;
+      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.rows.length; moved(); }, 300);
+    }
+    byId("play").textContent = stop ? "play" : "stop";
+    byId("play").setAttribute("aria-pressed", String(!stop));
+  });
+  if (data.scene.parts.some((part) => part.sixSigma)) byId("field").value = "sixSigma";
+  both();
+}
+
+// --- charts ----------------------------------------------------------------------------------------------------------
+
+const COLOURS = ["#7f8894", "#d97706"];
+
+function layout(title, x, y) {
+  const ink = getComputedStyle(document.body).color, line = "rgba(128,128,128,0.3)";
+  return {
+    title: { text: title, font: { size: 15 } }, font: { color: ink, family: "system-ui, sans-serif" }, barmode: "overlay", bargap: 0,
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 12, t: 40, b: 48 },
+    xaxis: { title: { text: x }, gridcolor: line, zeroline: false }, yaxis: { title: { text: y }, gridcolor: line, zeroline: false },
+    legend: { orientation: "h", y: 1.08, x: 1, xanchor: "right" },
+  };
+}
+
+function chart(title) {
+  const box = document.createElement("div");
+  box.className = "chart";
+  box.setAttribute("role", "img");
+  box.setAttribute("aria-label", title);
+  byId("charts").append(box);
+  return box;
+}
+
+const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
+const STATES = ["raw", "corrected"];
+const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+
+function histogram(measure) {
+  if (!measure.edges.length) return;
+  const name = escaped(measure.name), width = measure.edges[1] - measure.edges[0];
+  const middles = measure.edges.slice(0, -1).map((edge) => edge + width / 2);
+  const traces = measure.states.map((own, s) => ({
+    type: "bar", name: STATES[s], x: middles, y: own.counts, marker: { color: COLOURS[s] }, opacity: 0.6, width,
+    hovertemplate: `%{x:.4g} ${escaped(measure.units)}: %{y}<extra>${STATES[s]}</extra>`,
+  }));
+  measure.states.forEach((own, s) => {
+    const mean = measure.mean[s], sigma = measure.sixSigma[s] / 6, total = own.counts.reduce((a, b) => a + b, 0);
+    if (!(sigma > 0)) return;
+    const x = Array.from({ length: 121 }, (_, k) => mean + sigma * (k / 15 - 4));
+    const y = x.map((value) => (total * width * Math.exp(-(((value - mean) / sigma) ** 2) / 2)) / (sigma * Math.sqrt(2 * Math.PI)));
+    traces.push({ type: "scatter", mode: "lines", name: `normal, ${STATES[s]}`, x, y, line: { color: COLOURS[s], dash: "dot" }, hoverinfo: "skip" });
+  });
+  const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
+  shown.shapes = measure.limits.filter((limit) => limit !== null).map((limit) => ({
+    type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: RED, width: 2 },
+  }));
+  Plotly.newPlot(chart(`Histogram of ${measure.name}, raw and corrected`), traces, shown, SETTINGS);
+}
+
+function settling(measure) {
+  const name = escaped(measure.name);
+  const traces = measure.states.flatMap((own, s) => {
+    const { shape, values } = unpacked(own.settling);
+    const column = (k) => Array.from({ length: shape[0] }, (_, n) => values[n * 4 + k]);
+    return [{
+      type: "scatter", mode: "lines+markers", name: STATES[s], x: column(0), y: column(1), marker: { size: 4 },
+      line: { color: COLOURS[s] }, error_y: { type: "data", array: column(2), color: COLOURS[s], thickness: 1 },
+    }];
+  });
+  const shown = layout(`${name}: mean with its 95 % interval`, "realizations", escaped(measure.units));
+  shown.xaxis.type = "log";
+  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
+}
+
+/** One measure against a contributor, or against another measure, both in their states. */
+function relations() {
+  const measured = unpacked(data.relations.measured), measures = data.charts.length;
+  const deviations = data.relations.deviations && unpacked(data.relations.deviations), count = data.relations.contributors.length;
+  const ofMeasure = (m, s) => Array.from({ length: measured.shape[0] }, (_, n) => measured.values[(n * 2 + s) * measures + m]);
+  const ofContributor = (c) => Array.from({ length: deviations.shape[0] }, (_, n) => deviations.values[n * count + c]);
+  const axes = [
+    ...data.relations.contributors.map((each, c) => ({ ...each, values: () => ofContributor(c) })),
+    ...data.charts.map((each, m) => ({ ...each, values: (s) => ofMeasure(m, s) })),
+  ];
+  const offer = (select, things) => things.forEach((thing, k) => select.append(new Option(thing.name, k)));
+  offer(byId("ordinate"), data.charts);
+  offer(byId("abscissa"), axes);
+  const draw = () => {
+    const across = axes[byId("abscissa").value], up = data.charts[byId("ordinate").value];
+    const traces = STATES.map((name, s) => ({
+      type: "scatter", mode: "markers", name, x: across.values(s), y: ofMeasure(Number(byId("ordinate").value), s),
+      marker: { color: COLOURS[s], size: 4, opacity: 0.6 },
+    }));
+    const title = `${escaped(up.name)} against ${escaped(across.name)}`;
+    const named = (axis) => `${escaped(axis.name)} [${escaped(axis.units)}]`;
+    Plotly.react(byId("points-chart"), traces, layout(title, named(across), named(up)), SETTINGS);
+  };
+  ["ordinate", "abscissa"].forEach((id) => byId(id).addEventListener("change", draw));
+  draw();
+}
+
+for (const measure of data.charts) {
+  histogram(measure);
+  settling(measure);
+}
+relations();
+try {
+  window.stage = new Stage(data.scene);
+  control(window.stage);
+  drive(window.stage);
+} catch (error) {
+  byId("scene").replaceWith(`The assembly cannot be drawn here: ${error.message}`);
+  console.warn(error);
+}

@@ -1,0 +1,55 @@
+"use strict";
+// The view before any run: faces are picked, and the words that choose them in a script are shown.
+
+const TOUCHING = 1e-6; // mm
+
+function pick(stage) {
+  const ray = new THREE.Raycaster(), place = new THREE.Vector2();
+  let pressed = null;
+  stage.canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  stage.canvas.addEventListener("pointerup", (event) => {
+    if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return; // it was turned
+    const box = stage.canvas.getBoundingClientRect();
+    place.set((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
+    ray.setFromCamera(place, stage.camera);
+    const shown = stage.parts.filter((part) => part.group.visible);
+    const inside = (hit) => !stage.parts[0].materials[0].clippingPlanes.length || stage.section.distanceToPoint(hit.point) >= 0;
+    const hit = ray.intersectObjects(shown.map((part) => part.mesh)).find(inside);
+    choose(stage, hit && stage.parts.find((part) => part.mesh === hit.object), hit);
+  });
+}
+
+function choose(stage, part, hit) {
+  stage.paint("", 3, CORRECTED);
+  if (!part) {
+    byId("said").textContent = "Click on a face for the words that choose it.";
+    return;
+  }
+  const known = data.scene.parts[stage.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
+  const number = faces[hit.faceIndex], face = known.described[number];
+  const colour = part.mesh.geometry.getAttribute("color"), red = new THREE.Color("#f59e0b").toArray();
+  faces.forEach((own, triangle) => {
+    if (own === number) for (const corner of [0, 1, 2]) colour.setXYZ(3 * triangle + corner, ...red);
+  });
+  colour.needsUpdate = true;
+  stage.draw();
+  byId("said").textContent = [`part ${part.name}`, face.said, face.words].join("\n");
+}
+
+function gaps(stage) {
+  data.scene.contacts.forEach((pair, k) => {
+    const values = unpacked(pair.gaps).values, points = stage.pairs[k].points, colour = new THREE.Color();
+    const colours = Float32Array.from(Array.from(values).flatMap((gap) =>
+      colour.set(gap < -TOUCHING ? RED : gap > TOUCHING ? "#2563eb" : "#0a7d4f").toArray()));
+    points.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
+    Object.assign(points.material, { vertexColors: true, needsUpdate: true });
+    points.material.color.set("#ffffff");
+  });
+}
+
+const stage = new Stage(data.scene);
+control(stage);
+gaps(stage);
+stage.paint("", 3, CORRECTED);
+pick(stage);
+window.stage = stage;
