@@ -9,7 +9,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import run, simulate
+from tests.helpers import COMMAND, run, simulate
 from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import capability, shape
 from tolcontact.statistics.sample import Sample
@@ -77,7 +77,7 @@ def test_intervals_cover_the_truth_where_contact_cuts_a_distribution_off():
     expected["Ppk as normal"] = (upper - mean) / (3 * np.sqrt(0.1**2 / 2 - mean**2))
     covered = dict.fromkeys(expected, 0)
     for seed in range(500):
-        (block_of,) = simulate_blocks(program, samples=4000, seed=seed, block=4000)
+        (block_of,) = simulate_blocks(program, samples=2500, seed=seed, block=2500)
         found = estimates(block_of.measured[:, 1, 0], -np.inf, upper)
         for word, value in expected.items():
             covered[word] += bool(found[word].lower <= value <= found[word].upper)
@@ -200,17 +200,17 @@ def test_summaries_are_printed_as_json_and_csv(tmp_path):
     path = tmp_path / "stand.nc"
     tc.run(stand(limits=(None, 0.1)), samples=100, seed=2, out=path).close()
     expected = tc.summarize(path)["statistic_value"].sel(measure="height", state="raw", statistic="6 sigma").values
-    done = run(["tolcontact", "summary", path, "--json"])
+    done = run([*COMMAND, "summary", path, "--json"])
     found = json.loads(done.stdout)
     assert done.returncode == 0 and found["attrs"]["realizations"] == 100
     of = found["coords"]["statistic"]["data"].index("6 sigma")
     assert found["data_vars"]["statistic_value"]["data"][0][0][of] == expected.tolist()
     lower = found["coords"]["statistic"]["data"].index("below limit")
     assert found["data_vars"]["statistic_value"]["data"][0][0][lower] == [None] * 3
-    done = run(["tolcontact", "summary", path, "--csv"])
+    done = run([*COMMAND, "summary", path, "--csv"])
     rows = list(csv.reader(done.stdout.splitlines()))
     assert rows[0] == ["measure", "state", "statistic", "estimate", "lower", "upper"]
     (row,) = [row for row in rows if row[:3] == ["height", "raw", "6 sigma"]]
     assert [float(cell) for cell in row[3:]] == expected.tolist()
-    done = run(["tolcontact", "summary", path, "--csv", "--json"])
+    done = run([*COMMAND, "summary", path, "--csv", "--json"])
     assert (done.returncode, done.stdout) == (2, "") and "choose one" in done.stderr

@@ -59,8 +59,13 @@ def test_a_second_process_finds_it_compiled(installed):
     assert count(installed, "-O") == (1, 0)
 
 
-@pytest.mark.parametrize("kind", ["nbi", "nbc"])
-@pytest.mark.parametrize("left", ["nothing", "half", "all but a byte", "zeros", "garbage", "another pickle"])
+@pytest.mark.parametrize(
+    ("kind", "left"),
+    [
+        ("nbi", "nothing"), ("nbi", "all but a byte"), ("nbi", "garbage"),
+        ("nbc", "nothing"), ("nbc", "half"), ("nbc", "zeros"), ("nbc", "another pickle"),
+    ],
+)  # fmt: skip
 def test_a_damaged_file_is_replaced(kind, left, installed):
     file = cached(installed, kind)
     whole = file.read_bytes()

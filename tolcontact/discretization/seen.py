@@ -7,6 +7,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Part
+from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.discretization.brep_face import FaceInFile, described, numbered
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import BREP
@@ -50,11 +51,13 @@ def _words(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:
     if face.kind == "cylinder" and face.radius is not None:
         return f"face(tc.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
     own = face_of == face.number - 1
-    if face.kind == "plane" and face.direction is not None and max(map(abs, face.direction)) > 1 - SLIGHT:
-        axis = int(np.argmax(np.abs(face.direction)))
-        way = "+-"[face.direction[axis] < 0] + "xyz"[axis]
-        alike = np.asarray(mesh.face_normals) @ np.array(face.direction) > 1 - SLIGHT
-        return f'face("{way}")' if (alike == own).all() else f'face("{way}", {_inside(mesh, own)})'
+    if face.kind == "plane" and face.direction is not None:
+        along = np.array(face.direction)
+        axis = int(np.argmax(np.abs(along)))
+        is_named = abs(along[axis]) > 1 - SLIGHT
+        way = f'"{"+-"[int(along[axis] < 0)]}{"xyz"[axis]}"' if is_named else f"tc.Facing({_vector(along)})"
+        alike = np.asarray(mesh.face_normals) @ along >= np.cos(FACE_ANGLE)
+        return f"face({way})" if (alike == own).all() else f"face({way}, {_inside(mesh, own)})"
     return f"face({_inside(mesh, own)})"
 
 
