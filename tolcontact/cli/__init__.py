@@ -1,5 +1,6 @@
 """The command line: `tolcontact`, or `python -m tolcontact`. A chapter of the guide.
 
+    tolcontact new NAME                                  write a small model with comments, to begin with
     tolcontact check MODEL.py                            list every fault of a model; run nothing
     tolcontact check MODEL.py --population 1000          draw features, and print how many are inside their zones
     tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
@@ -42,7 +43,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 (True, 0)
 """
 
-from tolcontact.cli import bodies, check, compare, faces, report, run, summary, view
+from tolcontact.cli import bodies, check, compare, faces, new, report, run, summary, view
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "report", "run", "summary", "view"]
+__all__ = ["bodies", "check", "command_line", "compare", "faces", "main", "new", "report", "run", "summary", "view"]

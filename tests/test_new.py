@@ -1,0 +1,31 @@
+"""The model that beginners get."""
+
+import sys
+
+import pytest
+
+import tolcontact as tc
+from tests.helpers import COMMAND, run
+
+
+@pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2"])
+def test_it_is_checked_and_run_as_it_is(name, tmp_path):
+    done = run([*COMMAND, "new", name], cwd=tmp_path)
+    path = tmp_path / f"{name.removesuffix('.py')}.py"
+    assert (done.returncode, [*tmp_path.iterdir()]) == (0, [path]), done.stderr
+    assert tc.build(path).nominal.assembly.name == path.stem
+    done = run([sys.executable, path, "--samples", "100"])
+    assert done.returncode == 0 and "corner height (mm): displacement, limits -0.2 to 0.3" in done.stdout
+    assert "NAME" not in path.read_text(encoding="utf-8")
+
+
+def test_a_file_that_is_there_is_left_alone(tmp_path):
+    (tmp_path / "mine.py").write_text("# mine\n")
+    done = run([*COMMAND, "new", "mine"], cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "") and "exists already" in done.stderr
+    assert (tmp_path / "mine.py").read_text() == "# mine\n"
+
+
+def test_a_folder_that_is_not_there_is_said(tmp_path):
+    done = run([*COMMAND, "new", "nowhere/mine"], cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "") and "cannot be written" in done.stderr

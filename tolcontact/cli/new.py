@@ -1,0 +1,29 @@
+"""tolcontact new."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolcontact.cli.app import app
+from tolcontact.errors import OptionError, shown
+
+STARTER = Path(__file__).with_name("starter.py")
+
+
+@app.command()
+def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Of the model; its script is NAME.py.")]) -> None:
+    """Write a small model with comments, to begin with."""
+    path = Path(name).with_suffix(".py")
+    text = STARTER.read_text(encoding="utf-8")
+    text = text.replace('tc.Assembly("starter")', f"tc.Assembly({json.dumps(path.stem)})").replace("NAME.", f"{path.stem}.")
+    text = text.replace(" (NAME is this file without its ending)", "")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise OptionError(f'"{path}" exists already, and is left as it is; choose another name') from error
+    except OSError as error:
+        raise OptionError(f'"{path}" cannot be written: {error.strerror}') from error
+    typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")
