@@ -60,7 +60,7 @@ def test_words_of_step_files_and_boxes_choose_nothing_else():
 
 
 def test_the_command_shows_models_step_files_and_archives(tmp_path):
-    for what in (cases.MODELS / "cover.py", cases.MODELS / "cover.step"):
+    for what in (cases.MODELS / "ra1.py", cases.MODELS / "cover.step"):
         done = run([*COMMAND, "view", what, "--out", tmp_path / "page.html"])
         assert (done.returncode, done.stdout) == (0, f"page: {tmp_path / 'page.html'}\n"), done.stderr
         parts = data_of((tmp_path / "page.html").read_text())["scene"]["parts"]
