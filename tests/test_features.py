@@ -16,7 +16,6 @@ from tests.cases.fasteners import fasteners
 from tests.cases.round_contact import BARREL
 from tolcontact.discretization import discretize
 from tolcontact.discretization.shapes import shape
-from tolcontact.method import OBJECTIVES
 from tolcontact.report import summary_text
 from tolcontact.simulation import simulate_block
 from tolcontact.simulation.surfaces import check_surfaces
@@ -383,33 +382,3 @@ def test_points_and_locators_of_a_pair_of_planes_are_on_their_own_face():
     size, measured = drawn(results, "tab.width.size"), results.measured.sel(state="raw")
     assert np.abs(measured.sel(measure="width") - 10 - size).max() < 1e-9  # from low to high
     assert np.abs(measured.sel(measure="low")).max() < 1e-9  # it stands against its locators
-
-
-@pytest.mark.parametrize("search", ["fixed", "iterated"])
-@pytest.mark.parametrize("objective", sorted(OBJECTIVES))
-def test_faces_of_features_are_resolved_by_every_objective(objective, search, tmp_path):
-    """A block on a table, both faces of which deviate; its supports may be left: two of them, or all if it is pressed."""
-    a = tc.Assembly("table", method=tc.Method(resolution="exact", objective=objective, search=search))
-    table, block = a.part("table", tc.Box(100, 60, 10), fixed=True), a.part("block", tc.Box(50, 30, 20), at=(25, 15, 10))
-    table.feature("foot", table.face("-z"), datum="A")
-    top = table.feature("top", table.face("+z"), tc.Profile(0.3, "A"), tc.Parallelism(0.15, "A"))
-    block.feature("lid", block.face("+z"), datum="A")
-    under = block.feature("under", block.face("-z"), tc.Profile(0.2, "A"))
-    a.contact("interface", moving=under, reference=top)
-    feet = [(5, 5), (45, 5), (25, 25)]
-    held = [
-        tc.Locator(f"Z{k}", (x, y, 0), "z", 0.2, one_sided=k > 0 or objective == "seating", on=under)
-        for k, (x, y) in enumerate(feet)
-    ]
-    held += [
-        tc.Locator("X", (0, 15, 10), "x", 0.1),
-        tc.Locator("Y1", (5, 0, 10), "y", 0.1),
-        tc.Locator("Y2", (45, 0, 10), "y", 0.1),
-    ]
-    a.locate(block, held)
-    a.force("weight", at=block.point(25, 15, 10), vector=(0, 0, -1))
-    a.measure("height", under.point(50, 30, 0), along="z", tolerance=0.2)
-    results = tc.run(a, samples=100, seed=5, solver="daqp", surfaces=100, out=tmp_path / "table.nc")
-    assert set(results["status"].values.tolist()) <= {0, 1} and (results["status"].values == 1).any()
-    assert_resolved(tmp_path / "table.nc")
-    assert_gaps_recompute(tmp_path / "table.nc")

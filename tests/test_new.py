@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests.helpers import COMMAND, run
 
 
-@pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2"])
+@pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2", "bracket.v2"])
 def test_it_is_checked_and_run_as_it_is(name, tmp_path):
     done = run([*COMMAND, "new", name], cwd=tmp_path)
     path = tmp_path / f"{name.removesuffix('.py')}.py"
@@ -29,3 +29,10 @@ def test_a_file_that_is_there_is_left_alone(tmp_path):
 def test_a_folder_that_is_not_there_is_said(tmp_path):
     done = run([*COMMAND, "new", "nowhere/mine"], cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "") and "cannot be written" in done.stderr
+
+
+@pytest.mark.parametrize("name", ["", ".hidden", " "])
+def test_what_cannot_be_a_name_is_said(name, tmp_path):
+    done = run([*COMMAND, "new", name], cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (2, "") and "a name must be text that starts with" in done.stderr
+    assert not [*tmp_path.iterdir()]

@@ -17,6 +17,7 @@ from tests.helpers import COMMAND, run
 from tests.test_formats import STORED
 from tolcontact.report import grouped, write_page
 from tolcontact.report.html import coarse
+from tolcontact.statistics import intervals
 
 CHROMIUM = shutil.which("chromium")
 ODD = "0<img src=x onerror=alert(1)> <script>alert(2)"
@@ -254,3 +255,24 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
     assert np.abs(np.linalg.norm(vertices, axis=1) - 50).max() < 0.5
     field = np.frombuffer(base64.b64decode(part["sixSigma"]["data"]), "<f4").reshape(part["sixSigma"]["shape"])
     assert field.shape == (2, len(vertices), 4) and np.ptp(field[0, :, 2]) < 1e-5  # it does not turn: all points go alike
+
+
+def test_means_settle_within_students_interval(archive, page):
+    (chart,) = data_of(page.read_text())["charts"]
+    x = tc.open_archive(archive)["measured"].values[:, 1, 0]
+    of = chart["states"][1]["settling"]
+    found = np.frombuffer(base64.b64decode(of["data"]), "<f4").reshape(of["shape"])
+    assert found[0, 0] == 2 and found[-1, 0] == 500
+    for n, mean, half in found:
+        expected = intervals.mean(x[: int(n)])
+        assert [mean, half] == pytest.approx([expected.value, expected.upper - expected.value], rel=1e-5, abs=1e-6)
+
+
+def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
+    def stop(rows):
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        tc.run(cases.stack(), samples=60_000, solver="daqp", out=tmp_path / "part.nc", progress=stop)
+    page = page_of(tmp_path / "part.nc", tmp_path / "part.html")
+    assert "of 60 000; the run is unfinished" in page and len(data_of(page)["scene"]["realizations"]["rows"]) == 300

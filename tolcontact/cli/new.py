@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.cli.app import app
+from tolcontact.declaration.names import key_faults
 from tolcontact.errors import OptionError, shown
 
 STARTER = Path(__file__).with_name("starter.py")
@@ -15,7 +16,9 @@ STARTER = Path(__file__).with_name("starter.py")
 @app.command()
 def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Of the model; its script is NAME.py.")]) -> None:
     """Write a small model with comments, to begin with."""
-    path = Path(name).with_suffix(".py")
+    path = Path(name if name.endswith(".py") else f"{name}.py")
+    if faults := list(key_faults("model", [path.stem])):
+        raise OptionError(faults[0])
     text = STARTER.read_text(encoding="utf-8")
     text = text.replace('tc.Assembly("starter")', f"tc.Assembly({json.dumps(path.stem)})").replace("NAME.", f"{path.stem}.")
     text = text.replace(" (NAME is this file without its ending)", "")

@@ -35,11 +35,11 @@ def _plain(value: object) -> object:
 
 
 def check_page(path: Path) -> None:
-    """Raise OptionError unless a report may be written there; what is no page is never replaced."""
+    """Raise OptionError unless a page may be written there; what is no page is never replaced."""
     if path.suffix.lower() not in (".html", ".htm"):
-        raise OptionError(f'report "{path}" is not the name of a page; expected one that ends in .html')
+        raise OptionError(f'"{path}" is not the name of a page; expected one that ends in .html')
     if not path.parent.is_dir():
-        raise OptionError(f'report "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+        raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
 
 
 def print_summary(found: xr.Dataset) -> None:

@@ -16,7 +16,7 @@ from tolcontact.errors import ModelError, shown
 from tolcontact.report import write_page, write_view
 from tolcontact.workflow.run import summarize
 
-STEP = (".stp", ".step", ".p21")
+STEP = (".stp", ".step", ".p21")  # that the reader takes for STEP files
 
 
 @app.command()

@@ -103,13 +103,13 @@ def _of_places(estimate: np.ndarray, found: np.ndarray) -> Estimate:
 
 def _places(x: Sample) -> np.ndarray:
     """Where the percentiles may be, (percentile, trial)."""
-    found = []
-    for ranks in _ranks(x.count):
-        low, high = max(np.floor(ranks.min()), 1), min(np.ceil(ranks.max()), x.count)
-        some = np.unique(np.linspace(low, max(low, high), PLACES).round()).astype(np.int64)
-        values = np.interp(ranks, some, x.ordered((some - 1).tolist()))
-        found.append(np.where(ranks < 1, -np.inf, np.where(ranks > x.count, np.inf, values)))
-    return np.array(found)
+    ranks = _ranks(x.count)
+    low = np.maximum(np.floor(ranks.min(axis=1)), 1)
+    high = np.maximum(np.minimum(np.ceil(ranks.max(axis=1)), x.count), low)
+    some = np.linspace(low, high, PLACES, axis=1).round().astype(np.int64)
+    values = x.ordered((some - 1).ravel().tolist()).reshape(some.shape)  # at once: the sample is sorted for it
+    places = np.array([np.interp(*each) for each in zip(ranks, some, values, strict=True)])
+    return np.where(ranks < 1, -np.inf, np.where(ranks > x.count, np.inf, places))
 
 
 @lru_cache

@@ -4,17 +4,17 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy import special
 
 from tolcontact import vocabulary as words
 from tolcontact.realizations import pieces
-from tolcontact.report.figures import limits_text
 from tolcontact.report.html.packed import packed
 
 BINS = 60
 POINTS = 2000  # realizations that are shown as points
+UPPER = 0.975  # quantile that bounds 95 % from above
 STEPS = 40  # numbers of realizations at which estimates are shown
-Z = 1.959964  # of 95 %
-FIGURES = {"mean": "mean", "sixSigma": "6 sigma", "outside": "outside limits"}
+FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
 
 
 def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]:
@@ -33,7 +33,6 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
                 "name": str(name),
                 "units": str(of["measure_units"].values),
                 "limits": [_finite(of["measure_lower"]), _finite(of["measure_upper"])],
-                "said": limits_text(of),
                 "edges": edges.tolist(),
                 "states": states,
                 **{word: [_finite(each) for each in _estimates(of, name)] for word, name in FIGURES.items()},
@@ -68,7 +67,7 @@ def _estimates(of: xr.Dataset, statistic: str) -> xr.DataArray:
 
 
 def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
-    """The range of a measure, and its mean and 6 sigma after more and more realizations, with the mean's 95 % interval."""
+    """The range of a measure, and its mean after more and more realizations, with half of its 95 % interval (Student's t)."""
     total = rows.sizes[words.REALIZATION]
     steps = np.unique(np.geomspace(2, total, STEPS).round().astype(int))
     low, high, count, middle = np.inf, -np.inf, 0, None
@@ -81,9 +80,9 @@ def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
         for n in steps[(steps > count) & (steps <= count + len(x))]:
             first, second = (sums + cumulated[:, n - count - 1]) / n
             s = float(np.sqrt(max(second - first**2, 0) * n / (n - 1)))
-            found.append([int(n), middle + first, Z * s / np.sqrt(n), 6 * s])
+            found.append([int(n), middle + first, special.stdtrit(n - 1, UPPER) * s / np.sqrt(n)])
         sums, count = sums + cumulated[:, -1], count + len(x)
-    return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 4))}
+    return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 3))}
 
 
 def _edges(states: list[dict[str, Any]]) -> np.ndarray:

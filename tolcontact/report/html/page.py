@@ -12,13 +12,13 @@ import xarray as xr
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
-from tolcontact.report.figures import grouped, limits_text, number, share
+from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.charts import charts_of, relations_of
 from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
 from tolcontact.report.html.view import gaps_in_words, view_of
-from tolcontact.report.text.summary import APART, contact_lines, measure_rows
-from tolcontact.vocabulary import OUTSIDE, PPK, STATES
+from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells
+from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
@@ -86,9 +86,7 @@ def _overview(summary: xr.Dataset) -> list[dict[str, Any]]:
     for measure in summary["measure"].values:
         of = summary.sel(measure=measure)
         for state in STATES:
-            values = of["statistic_value"].sel(state=state)
-            cells = [number(values.sel(statistic=word).values) for word in ("mean", "6 sigma", PPK)]
-            cells.append(share(values.sel(statistic=OUTSIDE).values))
+            cells = overview_cells(of["statistic_value"].sel(state=state))
             units, said = str(of["measure_units"].values), limits_text(of)
             found.append({"measure": str(measure), "units": units, "limits": said, "state": state, "cells": cells})
     return found

@@ -109,7 +109,7 @@ function settling(measure) {
   const name = escaped(measure.name);
   const traces = measure.states.flatMap((own, s) => {
     const { shape, values } = unpacked(own.settling);
-    const column = (k) => Array.from({ length: shape[0] }, (_, n) => values[n * 4 + k]);
+    const column = (k) => Array.from({ length: shape[0] }, (_, n) => values[n * 3 + k]);
     return [{
       type: "scatter", mode: "lines+markers", name: STATES[s], x: column(0), y: column(1), marker: { size: 4 },
       line: { color: COLOURS[s] }, error_y: { type: "data", array: column(2), color: COLOURS[s], thickness: 1 },

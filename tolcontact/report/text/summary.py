@@ -83,10 +83,14 @@ def _overview(summary: xr.Dataset) -> Table:
     for measure in summary["measure"].values:
         rows.append([str(measure), "", "", "", ""])
         for state in (RAW, CORRECTED):
-            of = summary["statistic_value"].sel(measure=measure, state=state)
-            mean, spread, ppk, outside = (of.sel(statistic=word).values for word in ("mean", "6 sigma", PPK, OUTSIDE))
-            rows.append([f"  {state}", number(mean), number(spread), number(ppk), share(outside)])
+            rows.append([f"  {state}", *overview_cells(summary["statistic_value"].sel(measure=measure, state=state))])
     return _table(["", "mean", "6 sigma", PPK, "outside"], rows)
+
+
+def overview_cells(of: xr.DataArray) -> list[str]:
+    """Mean, 6 sigma, Ppk and share outside of a measure in one state."""
+    mean, spread, ppk, outside = (of.sel(statistic=word).values for word in ("mean", "6 sigma", PPK, OUTSIDE))
+    return [number(mean), number(spread), number(ppk), share(outside)]
 
 
 def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
