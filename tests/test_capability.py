@@ -9,7 +9,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, run, simulate
+from tests.helpers import call, simulate
 from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import capability, shape
 from tolcontact.statistics.sample import Sample
@@ -200,17 +200,17 @@ def test_summaries_are_printed_as_json_and_csv(tmp_path):
     path = tmp_path / "stand.nc"
     tc.run(stand(limits=(None, 0.1)), samples=100, seed=2, out=path).close()
     expected = tc.summarize(path)["statistic_value"].sel(measure="height", state="raw", statistic="6 sigma").values
-    done = run([*COMMAND, "summary", path, "--json"])
+    done = call(tmp_path, "summary", path, "--json")
     found = json.loads(done.stdout)
     assert done.returncode == 0 and found["attrs"]["realizations"] == 100
     of = found["coords"]["statistic"]["data"].index("6 sigma")
     assert found["data_vars"]["statistic_value"]["data"][0][0][of] == expected.tolist()
     lower = found["coords"]["statistic"]["data"].index("below limit")
     assert found["data_vars"]["statistic_value"]["data"][0][0][lower] == [None] * 3
-    done = run([*COMMAND, "summary", path, "--csv"])
+    done = call(tmp_path, "summary", path, "--csv")
     rows = list(csv.reader(done.stdout.splitlines()))
     assert rows[0] == ["measure", "state", "statistic", "estimate", "lower", "upper"]
     (row,) = [row for row in rows if row[:3] == ["height", "raw", "6 sigma"]]
     assert [float(cell) for cell in row[3:]] == expected.tolist()
-    done = run([*COMMAND, "summary", path, "--csv", "--json"])
+    done = call(tmp_path, "summary", path, "--csv", "--json")
     assert (done.returncode, done.stdout) == (2, "") and "choose one" in done.stderr

@@ -1,12 +1,23 @@
 """The command line: what it prints and returns, which options it refuses, and which files it leaves alone."""
 
+import io
+import re
 import sys
+from pathlib import Path
 
 import pytest
+import typer
+from rich.cells import cell_len
+from rich.console import Console
 
+import tolcontact as tc
 from tests.cases import MODELS
 from tests.helpers import SCRIPTS, call, run
 from tests.model_scripts import GOOD, HEADER, write_model
+from tests.test_report import data_of
+from tolcontact.cli import progress
+from tolcontact.cli.app import app
+from tolcontact.report import summary_text
 
 OPTIONS = {
     "unknown resolution": (["--resolution", "precise"], ["resolution", "precise", "linearized, exact"]),
@@ -105,3 +116,50 @@ def test_the_summary_says_of_how_many_realizations_magnitudes_are(fields, said, 
     below = done.stdout.split("over the surface of each part (mm)\n")[1].splitlines()
     assert below[0] == said if said else below[0].startswith("part")
     assert any(line.startswith("top") for line in below) == (fields != "none")
+
+
+def test_limits_alone_are_printed(archive, tmp_path):
+    done = call(tmp_path, "summary", archive, "--limits")
+    assert done.returncode == 0 and "Ppk as normal" in done.stdout and "touched by contact" not in done.stdout
+    assert done.stdout.count("\noutside ") == 1
+    done = call(tmp_path, "summary", archive, "--limits", "--json")
+    assert done.returncode == 2 and "--json and --limits" in done.stderr
+
+
+def test_tables_are_as_wide_as_the_terminal(archive):
+    with tc.open_archive(archive) as results:
+        shown = summary_text(tc.summarize(results))
+    heights = []
+    for width in (80, 200):
+        console = Console(width=width, force_terminal=True, file=io.StringIO())
+        console.print(shown)
+        lines = console.file.getvalue().splitlines()
+        assert max(cell_len(re.sub("\x1b.*?m", "", line)) for line in lines) <= width
+        heights.append(len(lines))
+    assert heights[1] < heights[0]
+
+
+def test_a_run_without_a_terminal_says_how_far_it_is(monkeypatch, tmp_path):
+    monkeypatch.setattr(progress, "EVERY", 0.0)
+    model, size = MODELS / "ra1.py", ("--samples", "20000", "--solver", "daqp", "--surfaces", "0")
+    done = call(tmp_path, "run", model, *size)
+    lines = [line for line in done.stderr.splitlines() if line.startswith("ra1: ")]
+    assert re.fullmatch(r"ra1: \d+ \d{3} of 20 000, [\d ]+ a second, \d+ s left", lines[-1]), done.stderr
+    again = call(tmp_path, "run", model, *size, "--quiet")
+    assert again.stderr == "" and again.stdout == done.stdout
+
+
+def test_every_command_has_examples_that_name_it():
+    for command in app.registered_commands:
+        name = command.callback.__name__
+        assert command.epilog.startswith("Examples:") and f"tolcontact {name} " in command.epilog
+
+
+def test_a_model_is_checked_and_seen(monkeypatch, tmp_path):
+    opened = []
+    monkeypatch.setattr(typer, "launch", lambda path: opened.append(path))
+    bad = write_model(tmp_path, {"contact": GOOD["contact"].replace("-z", "-w")})
+    done = call(tmp_path, "check", bad, "--view")
+    assert done.returncode == 2 and "-w" in done.stderr
+    page = Path(opened[0]).read_text(encoding="utf-8")
+    assert [part["name"] for part in data_of(page)["scene"]["parts"] if part["faulty"]] == ["base", "top"]

@@ -1,38 +1,36 @@
 """The model that beginners get."""
 
-import sys
-
 import pytest
 
 import tolcontact as tc
-from tests.helpers import COMMAND, run
+from tests.helpers import call
 
 
 @pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2", "bracket.v2"])
 def test_it_is_checked_and_run_as_it_is(name, tmp_path):
-    done = run([*COMMAND, "new", name], cwd=tmp_path)
+    done = call(tmp_path, "new", name)
     path = tmp_path / f"{name.removesuffix('.py')}.py"
     assert (done.returncode, [*tmp_path.iterdir()]) == (0, [path]), done.stderr
     assert tc.build(path).nominal.assembly.name == path.stem
-    done = run([sys.executable, path, "--samples", "100"])
+    done = call(tmp_path, "run", path, "--samples", "100", "--surfaces", "8")
     assert done.returncode == 0 and "corner height (mm): displacement, limits -0.2 to 0.3" in done.stdout
     assert "NAME" not in path.read_text(encoding="utf-8")
 
 
 def test_a_file_that_is_there_is_left_alone(tmp_path):
     (tmp_path / "mine.py").write_text("# mine\n")
-    done = run([*COMMAND, "new", "mine"], cwd=tmp_path)
+    done = call(tmp_path, "new", "mine")
     assert (done.returncode, done.stdout) == (2, "") and "exists already" in done.stderr
     assert (tmp_path / "mine.py").read_text() == "# mine\n"
 
 
 def test_a_folder_that_is_not_there_is_said(tmp_path):
-    done = run([*COMMAND, "new", "nowhere/mine"], cwd=tmp_path)
+    done = call(tmp_path, "new", "nowhere/mine")
     assert (done.returncode, done.stdout) == (2, "") and "cannot be written" in done.stderr
 
 
 @pytest.mark.parametrize("name", ["", ".hidden", " "])
 def test_what_cannot_be_a_name_is_said(name, tmp_path):
-    done = run([*COMMAND, "new", name], cwd=tmp_path)
+    done = call(tmp_path, "new", name)
     assert (done.returncode, done.stdout) == (2, "") and "a name must be text that starts with" in done.stderr
     assert not [*tmp_path.iterdir()]

@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, run
+from tests.helpers import call
 from tests.test_formats import STORED
 from tolcontact.report import grouped, write_page
 from tolcontact.report.html import coarse
@@ -48,10 +48,10 @@ def page(archive):
 
 
 def test_the_command_writes_a_page_that_says_what_the_summary_says(archive, tmp_path):
-    done = run([*COMMAND, "report", archive, "--out", tmp_path / "page.html"])
+    done = call(tmp_path, "report", archive, "--out", tmp_path / "page.html")
     assert (done.returncode, done.stdout) == (0, f"report: {tmp_path / 'page.html'}\n"), done.stderr
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
-    printed = run([*COMMAND, "summary", archive]).stdout
+    printed = call(tmp_path, "summary", archive).stdout
     for figures in re.findall(r"\[[-\d., inf]+\]", printed)[:40]:
         assert figures in page
     assert 1_800_000 < len(page) < 8_000_000
@@ -111,7 +111,7 @@ def test_a_measure_that_is_no_number_leaves_its_chart_out(tmp_path):
 @pytest.mark.parametrize(("name", "said"), [("page.nc", "not the name of a page"), ("nowhere/page.html", "no folder")])
 def test_where_no_page_can_be_is_said_before_anything_is_done(name, said, archive, tmp_path):
     for command in (["report", archive, "--out", tmp_path / name], ["run", "x.py", "--report", tmp_path / name]):
-        done = run([*COMMAND, *command])
+        done = call(tmp_path, *command)
         assert (done.returncode, done.stdout) == (2, "") and said in done.stderr
     assert not [*tmp_path.iterdir()]
 
@@ -141,7 +141,7 @@ def open_page(browser):
     """Opens a page, of a width; what it complains of, or asks the network for, fails the test."""
     wrong = []
 
-    def open_(path, width=1280):
+    def open_(path, width=1280, drawn="#scene"):
         opened = browser.new_page(viewport={"width": width, "height": 900})
         opened.on("console", lambda message: wrong.append(message.text))
         opened.on("pageerror", lambda error: wrong.append(str(error)))
@@ -150,7 +150,8 @@ def open_page(browser):
             "request", lambda request: request.url == path.as_uri() or request.url[:5] == "blob:" or wrong.append(request.url)
         )
         opened.goto(path.as_uri())
-        opened.wait_for_function("window.stage !== undefined")
+        opened.wait_for_selector(drawn)
+        opened.wait_for_function(f"window.stage !== undefined || {json.dumps(drawn)} !== '#scene'")
         return opened
 
     yield open_

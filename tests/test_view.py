@@ -8,7 +8,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, run
+from tests.helpers import call
 from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
 from tolcontact.discretization import discretize, seen
 from tolcontact.discretization.faces import patch, triangles
@@ -61,14 +61,14 @@ def test_words_of_step_files_and_boxes_choose_nothing_else():
 
 def test_the_command_shows_models_step_files_and_archives(tmp_path):
     for what in (cases.MODELS / "ra1.py", cases.MODELS / "cover.step"):
-        done = run([*COMMAND, "view", what, "--out", tmp_path / "page.html"])
+        done = call(tmp_path, "view", what, "--out", tmp_path / "page.html")
         assert (done.returncode, done.stdout) == (0, f"page: {tmp_path / 'page.html'}\n"), done.stderr
         parts = data_of((tmp_path / "page.html").read_text())["scene"]["parts"]
         assert all(words["words"].startswith("face(tc.Brep((") for words in parts[-1]["described"]) or what.suffix == ".py"
     tc.run(cases.stack(), samples=10, solver="daqp", out=tmp_path / "stack.nc").close()
-    done = run([*COMMAND, "view", tmp_path / "stack.nc", "--out", tmp_path / "run.html"])
+    done = call(tmp_path, "view", tmp_path / "stack.nc", "--out", tmp_path / "run.html")
     assert done.returncode == 0 and "Contact and certificates" in (tmp_path / "run.html").read_text()
-    done = run([*COMMAND, "view", tmp_path / "nothing.step", "--out", tmp_path / "no.html"])
+    done = call(tmp_path, "view", tmp_path / "nothing.step", "--out", tmp_path / "no.html")
     assert (done.returncode, done.stdout) == (2, "") and not (tmp_path / "no.html").exists()
 
 

@@ -49,7 +49,7 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
 | run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
 | write models as JSON | `write_model` |
-| read results | `summarize`, `open_archive`, `model_of`, `Status` |
+| read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
 | warnings | `ContactWarning`, `UnitsWarning` |
 

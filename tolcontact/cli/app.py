@@ -18,7 +18,6 @@ from tolcontact.version import __version__
 app = typer.Typer(
     help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
 )
 
@@ -56,6 +55,11 @@ Objective = Annotated[
     str | None,
     typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
+
+
+def examples(*commands: str) -> str:
+    """The end of a help text, a command a line."""
+    return "Examples:\n\n" + "\n\n".join(f"tolcontact {command}" for command in commands)
 
 
 def chosen(**words: str | None) -> dict[str, str]:

@@ -6,16 +6,16 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import StepFile, app
+from tolcontact.cli.app import StepFile, app, examples
 from tolcontact.discretization import bodies_in
 from tolcontact.errors import shown
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print them as JSON.")]
 
 
-@app.command()
+@app.command(epilog=examples("bodies parts.stp"))
 def bodies(file: StepFile, as_json: AsJson = False) -> None:
-    """List the bodies of a STEP file: numbers, names, sizes [mm] and faces, in its product tree; and its units of length."""
+    """List the bodies of a STEP file: numbers, names, sizes in mm and faces, in its product tree; and its units of length."""
     found = bodies_in(file)
     if as_json:
         typer.echo(json.dumps([asdict(body) for body in found]))

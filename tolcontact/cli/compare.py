@@ -6,22 +6,35 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+import xarray as xr
 
-from tolcontact.archive import taken
-from tolcontact.cli.app import Model, Samples, Seed, app, chosen, or_
-from tolcontact.cli.output import console, print_data
+from tolcontact.archive import open_archive, taken
+from tolcontact.cli.app import Samples, Seed, app, chosen, examples, or_
+from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
+from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.report import comparison_text
+from tolcontact.report import comparison_text, runs_text, write_comparison
 from tolcontact.workflow.compare import compare as compare_solvers
+from tolcontact.workflow.compare_runs import compare_runs, named
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
 _ONE_OR_MORE = "One or more of {}. Default: the model's."
+_OF_MODELS = ("solvers", "samples", "seed", "resolution", "objective")
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "compare model.py --solvers daqp,qpoases", "compare model.py --resolution linearized,exact",
+        "compare before.nc after.nc --report both.html",
+    )
+)  # fmt: skip
 def compare(
-    model: Model,
+    context: typer.Context,
+    what: Annotated[
+        list[Path],
+        typer.Argument(metavar="MODEL.py | FILE.nc FILE.nc ...", help="A model, or archives; the first is the reference."),
+    ],
     solvers: Annotated[
         str, typer.Option(help="Names of solvers, separated by commas; the first one is the reference.")
     ] = DEFAULT_SOLVER,
@@ -31,11 +44,28 @@ def compare(
     objective: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(OBJECTIVES)))] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Of archives: also write a page to look at.")] = None,
 ) -> None:
-    """Compare solvers, resolutions or objectives on the same draws: agreement, failures, residuals, time."""
-    methods = [chosen(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
+    """Compare solvers, resolutions or objectives of a model on the same draws; or archives with each other.
+
+    Of a model: agreement, failures, residuals, time. Of archives, from the same draws or not: how measures change.
+    """
+    of_archives = [path.suffix.lower() == ".nc" for path in what]
+    if not all(of_archives) and len(what) > 1:
+        raise OptionError(f"{', '.join(map(str, what))} are not one model, nor archives (.nc); expected one of these")
+    given = [word for word in _OF_MODELS if context.get_parameter_source(word).name == "COMMANDLINE"]  # type: ignore[union-attr]
+    if all(of_archives) and given:
+        raise OptionError(f"--{given[0]} is for models; runs in archives have their own")
+    if report is not None:
+        if not all(of_archives):
+            raise OptionError("--report is for archives; write one for each solver (run --out), and compare these")
+        check_page(report)
     with contextlib.nullcontext() if out is None else taken(out) as path:
-        found = compare_solvers(load_model(model), _listed(solvers), samples=samples, seed=seed, methods=methods)
+        if all(of_archives):
+            found = _of_archives(what, report)
+        else:
+            methods = [chosen(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
+            found = compare_solvers(load_model(what[0]), _listed(solvers), samples=samples, seed=seed, methods=methods)
         if path is not None:
             # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}
@@ -43,7 +73,18 @@ def compare(
     if as_json:
         print_data(found)
     else:
-        console().print(comparison_text(found))
+        console().print((runs_text if all(of_archives) else comparison_text)(found))
+        if report is not None:
+            typer.echo(f"\nreport: {shown(str(report))}")
+
+
+def _of_archives(files: Sequence[Path], report: Path | None) -> xr.Dataset:
+    with contextlib.ExitStack() as stack:
+        runs = {name: stack.enter_context(open_archive(path)) for name, path in named(files).items()}
+        found = compare_runs(runs)
+        if report is not None:
+            write_comparison(runs, found, report)
+    return found
 
 
 def _names(words: str | None) -> Sequence[str | None]:

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import StepFile, app
+from tolcontact.cli.app import StepFile, app, examples
 from tolcontact.cli.bodies import AsJson
 from tolcontact.discretization import faces_in
 
 Body = Annotated[str | None, typer.Option(help="Name or number of the body; a file with a single one needs none.")]
 
 
-@app.command()
+@app.command(epilog=examples("faces parts.stp --body lid"))
 def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
     """List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them."""
     found = faces_in(file, int(body) if body is not None and body.isdigit() else body)

@@ -6,14 +6,14 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import app
+from tolcontact.cli.app import app, examples
 from tolcontact.declaration.names import key_faults
 from tolcontact.errors import OptionError, shown
 
 STARTER = Path(__file__).with_name("starter.py")
 
 
-@app.command()
+@app.command(epilog=examples("new bracket"))
 def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Of the model; its script is NAME.py.")]) -> None:
     """Write a small model with comments, to begin with."""
     path = Path(name if name.endswith(".py") else f"{name}.py")

@@ -6,14 +6,14 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Archive, app
+from tolcontact.cli.app import Archive, app, examples
 from tolcontact.cli.output import check_page
 from tolcontact.errors import shown
 from tolcontact.report import write_page
 from tolcontact.workflow.run import summarize
 
 
-@app.command()
+@app.command(epilog=examples("report run.nc", "report run.nc --out page.html"))
 def report(
     archive: Archive,
     out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="The page. Default: beside the archive.")] = None,

@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, chosen, or_
+from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, chosen, examples, or_
 from tolcontact.cli.output import check_page, print_summary
-from tolcontact.cli.progress import log_shown, progress_bar, stopped
+from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.report import write_page
@@ -17,7 +17,11 @@ from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
 
 
-@app.command()
+@app.command(
+    epilog=examples(
+        "run model.py --samples 10000", "run model.py --out run.nc --report run.html", "run model.py --out run.nc --resume"
+    )
+)
 def run(
     model: Model,
     samples: Samples = 1000,
@@ -37,6 +41,7 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; the summary is printed.")] = False,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 
@@ -47,19 +52,18 @@ def run(
     if report is not None:
         check_page(report)
     method = chosen(resolution=resolution, objective=objective)
-    with stopped(out, done := [0, samples]), progress_bar() as bar:  # who stops it gets the cursor back first
-        task = bar.add_task(shown(model.stem), total=samples)
+    # Who stops it gets the cursor back first.
+    with stopped(out, done := [0, samples]), shown_progress(model.stem, samples, quiet=quiet) as show:
 
-        def show(rows: int) -> None:
+        def progress(rows: int) -> None:
             done[:] = rows, max(samples, rows)
-            bar.update(task, completed=rows, total=done[1], description=shown(model.stem))
+            show(*done)
 
-        with log_shown(bar.console, lambda words: bar.update(task, description=words)):
-            results = run_model(
-                functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-                overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
-                fields=int(fields) if fields.isdigit() else fields, progress=show,
-            )  # fmt: skip
+        results = run_model(
+            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
+            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
+            fields=int(fields) if fields.isdigit() else fields, progress=progress,
+        )  # fmt: skip
     with results:
         found = summarize(results)
         if report is not None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import app
+from tolcontact.cli.app import app, examples
 from tolcontact.cli.output import check_page
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
@@ -19,7 +19,7 @@ from tolcontact.workflow.run import summarize
 STEP = (".stp", ".step", ".p21")  # that the reader takes for STEP files
 
 
-@app.command()
+@app.command(epilog=examples("view model.py", "view parts.stp", "view model.py --out page.html"))
 def view(
     what: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
     out: Annotated[
@@ -31,8 +31,14 @@ def view(
 
     Faults of a model are listed on the page. Of an archive it is the report.
     """
+    if out is not None:
+        check_page(out)
+    show(what, out)
+
+
+def show(what: Path, out: Path | None) -> None:
+    """Write the page `out`; without it a temporary one, opened in the browser."""
     path = out or Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{what.stem}.html"
-    check_page(path)
     if what.suffix.lower() == ".nc":
         with open_archive(what) as results:
             write_page(results, summarize(results), path)

@@ -1,8 +1,8 @@
 """Report: summaries and comparisons as tables for a terminal. A chapter of the guide.
 
-`summary_text`, `comparison_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare` and
-`tc.check_population` into something that rich prints. A table fits into 80 columns, and output to a file or a pipe is never
-cut.
+`summary_text`, `comparison_text`, `runs_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare`,
+`tc.compare_runs` and `tc.check_population` into something that rich prints. Tables fit into 80 columns, or take what a wider
+terminal gives; output to a file or a pipe is never cut.
 
 >>> import tolcontact as tc
 >>> from rich.console import Console
@@ -22,7 +22,7 @@ variation simulation of stand: 1000 realizations
 sent like any file: the assembly to turn, with fields, single realizations and sections; histograms with limits, and how
 estimates settle; measures against contributors; contact, certificates, and how the run was made.
 `write_view` (`tolcontact view`) writes the assembly before any run: faces with the words that choose them, locators, contact
-points, and nominal gaps.
+points, and nominal gaps. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes runs side by side.
 
 How to read the text:
 
@@ -37,7 +37,10 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 """
 
 from tolcontact.report.figures import grouped
-from tolcontact.report.html import write_page, write_view
-from tolcontact.report.text import comparison_text, population_text, summary_text
+from tolcontact.report.html import write_comparison, write_page, write_view
+from tolcontact.report.text import capability_text, comparison_text, population_text, runs_text, summary_text
 
-__all__ = ["comparison_text", "grouped", "population_text", "summary_text", "write_page", "write_view"]
+__all__ = [
+    "capability_text", "comparison_text", "grouped", "population_text", "runs_text", "summary_text", "write_comparison",
+    "write_page", "write_view",
+]  # fmt: skip

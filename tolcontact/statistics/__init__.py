@@ -59,7 +59,8 @@ each point.
 ('vertex',)
 """
 
+from tolcontact.statistics.comparison import compare_runs
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
 from tolcontact.statistics.summary import summarize
 
-__all__ = ["BlockSums", "DisplacementFields", "summarize"]
+__all__ = ["BlockSums", "DisplacementFields", "compare_runs", "summarize"]

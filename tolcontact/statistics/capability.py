@@ -124,4 +124,4 @@ def _ranks(n: int) -> np.ndarray:
 
 def _hits(u: np.ndarray, n: np.ndarray | int, p: float) -> np.ndarray:
     """Quantiles of a binomial distribution less one, as places between whole numbers."""
-    return np.where(u < special.bdtr(0, n, p), -0.5, special.bdtrik(u, n, p))
+    return np.where(u < (1 - p) ** n, -0.5, special.bdtrik(u, n, p))

@@ -1,6 +1,7 @@
-"""Every variable of a comparison of solvers."""
+"""Every variable of a comparison: of solvers, or of runs."""
 
-from tolcontact.vocabulary.labels import EXTENT, MEASURE, SOLVER, STATUS_MEANING
+from tolcontact.vocabulary.labels import EXTENT, MEASURE, RUN, SOLVER, STATE, STATUS_MEANING
+from tolcontact.vocabulary.summary import CHANGE_OF, INTERVAL, OUTSIDE, PPK, SHIFT, SPREAD_RATIO, STATISTIC
 from tolcontact.vocabulary.variable import Variable, label
 
 COMPARED_LABELS = (
@@ -18,4 +19,16 @@ COMPARED = (
     ),
     Variable("measure_difference", (SOLVER, EXTENT, MEASURE), "f8", "difference of a measure, in its own units"),
     Variable("both_resolved", (SOLVER,), "i8", "number of realizations that the differences cover", "1"),
+)
+
+SAME_DRAWS, SAME_SEED, OTHER_DRAWS = "same", "same seed", "other"
+COMPARED_STATISTICS = ("mean", "6 sigma", PPK, OUTSIDE)
+CHANGES_OF_RUNS = (SHIFT, SPREAD_RATIO, "shift of the share outside")
+COMPARED_RUNS = (
+    Variable("value", (RUN, STATE, MEASURE, STATISTIC, INTERVAL), "f8", "estimate, in the measure's units; shares are of 1"),
+    Variable("change", (RUN, STATE, MEASURE, CHANGE_OF, INTERVAL), "f8", "difference from the first run, or ratio to it"),
+    Variable("furthest", (RUN, STATE, MEASURE), "f8", "largest difference of a realization from the first run's"),
+    Variable("by_status", (RUN, STATUS_MEANING), "i8", "number of realizations", "1"),
+    Variable("penetration", (RUN, STATE), "f8", "largest true penetration of any contact point", "mm"),
+    Variable("draws", (RUN,), str, "draws: same as the first run's, of the same seed, or other ones"),
 )

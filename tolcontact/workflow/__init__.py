@@ -44,6 +44,14 @@ True
 
 `methods=[{"resolution": "linearized"}, {"resolution": "exact"}]` compares methods in the same way.
 
+`tc.compare_runs` compares runs that are there already, results by their names or archives: other designs, tolerances, methods.
+Every change stands with its 95 % interval. Runs of the same seed are compared realization by realization, which makes their
+intervals narrow; others as independent ones.
+
+>>> found = tc.compare_runs({"linearized": results, "exact": exact})
+>>> str(found.draws.sel(run="exact").values), found.change.sel(run="exact", change_of="shift of the mean").dims
+('same', ('state', 'measure', 'interval'))
+
 `tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside
 of every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
 
@@ -59,8 +67,9 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 """
 
 from tolcontact.workflow.compare import compare
+from tolcontact.workflow.compare_runs import compare_runs
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.written import write_model
 
-__all__ = ["build", "check", "check_population", "compare", "run", "summarize", "write_model"]
+__all__ = ["build", "check", "check_population", "compare", "compare_runs", "run", "summarize", "write_model"]

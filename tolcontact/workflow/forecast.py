@@ -35,7 +35,7 @@ def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
         )
         log.warning(
             "%d parts, %d contact pairs, %d contact points: %d realizations will take about %s%s, and %s in an archive",
-            len(nominal.parts), len(nominal.pairs), points, samples, _duration(seconds), memory,
+            len(nominal.parts), len(nominal.pairs), points, samples, duration(seconds), memory,
             size_in_words(bytes_of_rows(nominal, keep, samples)),
         )  # fmt: skip
 
@@ -52,7 +52,8 @@ def _of_one(program: Program, seed: int) -> float:
         trial *= 8
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
+    """A time in words."""
     for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"

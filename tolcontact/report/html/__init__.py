@@ -1,5 +1,6 @@
-"""Pages for a browser that hold everything and need no network: the report of a run, and the view of a model before any."""
+"""Pages for a browser that hold everything and need no network: the report of a run, runs side by side, and the view of a
+model before any."""
 
-from tolcontact.report.html.page import write_page, write_view
+from tolcontact.report.html.page import write_comparison, write_page, write_view
 
-__all__ = ["write_page", "write_view"]
+__all__ = ["write_comparison", "write_page", "write_view"]

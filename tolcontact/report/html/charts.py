@@ -1,5 +1,6 @@
 """What the charts of a page are drawn from: histograms of each measure in both states, and how estimates settle with N."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,36 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
                 "edges": edges.tolist(),
                 "states": states,
                 **{word: [_finite(each) for each in _estimates(of, name)] for word, name in FIGURES.items()},
+            }
+        )
+    return found
+
+
+def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> list[dict[str, Any]]:
+    """For each measure of a comparison the share [%] of realizations in the same bins, by run and state."""
+    found = []
+    rows = {
+        name: run.to_dataset()[[words.MEASURED.name]].isel({words.REALIZATION: slice(int(count))})
+        for (name, run), count in zip(runs.items(), comparison["realizations"].values, strict=True)
+    }
+    for name in comparison["measure"].values:
+        places = {run: own[words.MEASURE].values.tolist().index(name) for run, own in rows.items()}
+        both = range(len(words.STATES))
+        edges = _edges([{"range": _range(own, places[run], state)} for run, own in rows.items() for state in both])
+        shares = [
+            {
+                "name": run,
+                "shares": [[100 * k / own.sizes[words.REALIZATION] for k in _counts(own, places[run], s, edges)] for s in both],
+            }
+            for run, own in rows.items()
+        ]
+        found.append(
+            {
+                "name": str(name),
+                "units": str(comparison["measure_units"].sel(measure=name).values),
+                "limits": [_finite(comparison[f"measure_{side}"].sel(measure=name)[0]) for side in words.BOUNDS],
+                "edges": edges.tolist(),
+                "runs": shares,
             }
         )
     return found
@@ -83,6 +114,12 @@ def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
             found.append([int(n), middle + first, special.stdtrit(n - 1, UPPER) * s / np.sqrt(n)])
         sums, count = sums + cumulated[:, -1], count + len(x)
     return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 3))}
+
+
+def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
+    """The least and the largest value of a measure."""
+    values = [piece[words.MEASURED.name].values[:, state, measure] for piece in pieces(rows)]
+    return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
 def _edges(states: list[dict[str, Any]]) -> np.ndarray:

@@ -1,7 +1,7 @@
 """The pages themselves, from templates that hold styles, scripts, libraries and data."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,20 @@ from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import grouped, limits_text
-from tolcontact.report.html.charts import charts_of, relations_of
+from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
 from tolcontact.report.html.view import gaps_in_words, view_of
+from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells
 from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
+SCRIPTS = {
+    "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "stage.js", "charts.js", "report.js"),
+    "view": ("vendor/three.min.js", "data.js", "stage.js", "view.js"),
+    "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
+}
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
        "samples", "kept", "fields", "versions", "history", "format")  # fmt: skip
 
@@ -38,7 +44,6 @@ def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
         "missing": _missing(scene),
-        "plotly": _as_is("vendor/plotly-basic.min.js"),
     }
     data = {"scene": scene, "charts": charts_of(results, summary), "relations": relations_of(results, summary)}
     _write("report", values, data, path)
@@ -50,18 +55,32 @@ def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str
     Raises ArchiveError if the file cannot be written.
     """
     values = {"title": assembly.name, "faults": faults, "pairs": gaps_in_words(nominal)}
-    _write("view", values, {"scene": view_of(assembly, nominal), "charts": []}, path)
+    _write("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []}, path)
+
+
+def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, path: Path) -> None:
+    """Write runs side by side (see compare_runs). Raises ArchiveError if the file cannot be written."""
+    measures = []
+    for measure in comparison["measure"].values:
+        of = comparison.sel(measure=measure)
+        tables = [{"columns": VALUES, "rows": value_rows(of)}, {"columns": CHANGES, "rows": change_rows(of)}]
+        measures.append({"name": str(measure), "units": str(of["measure_units"].values), "tables": tables})
+    values = {
+        "title": comparison.attrs["title"],
+        "reference": comparison.attrs["reference_run"],
+        "lines": list(runs_lines(comparison)),
+        "measures": measures,
+    }
+    _write("compare", values, {"charts": compared_charts(runs, comparison)}, path)
 
 
 def _write(kind: str, values: dict[str, Any], data: dict[str, Any], path: Path) -> None:
-    """Write a page of a kind, which has a template and a script."""
+    """Write a page of a kind, which has a template and scripts."""
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
     page = environment.get_template(f"{kind}.html.j2").render(
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
-        three=_as_is("vendor/three.min.js"),
-        stage=_as_is("stage.js"),
-        script=_as_is(f"{kind}.js"),
+        scripts=[_as_is(file) for file in SCRIPTS[kind]],
         **values,
     )
     part = path.with_name(f".{path.name}.part")

@@ -58,31 +58,6 @@ function drive(stage) {
 
 // --- charts ----------------------------------------------------------------------------------------------------------
 
-const COLOURS = ["#7f8894", "#d97706"];
-
-function layout(title, x, y) {
-  const ink = getComputedStyle(document.body).color, line = "rgba(128,128,128,0.3)";
-  return {
-    title: { text: title, font: { size: 15 } }, font: { color: ink, family: "system-ui, sans-serif" }, barmode: "overlay", bargap: 0,
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 60, r: 12, t: 40, b: 48 },
-    xaxis: { title: { text: x }, gridcolor: line, zeroline: false }, yaxis: { title: { text: y }, gridcolor: line, zeroline: false },
-    legend: { orientation: "h", y: 1.08, x: 1, xanchor: "right" },
-  };
-}
-
-function chart(title) {
-  const box = document.createElement("div");
-  box.className = "chart";
-  box.setAttribute("role", "img");
-  box.setAttribute("aria-label", title);
-  byId("charts").append(box);
-  return box;
-}
-
-const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
-const STATES = ["raw", "corrected"];
-const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-
 function histogram(measure) {
   if (!measure.edges.length) return;
   const name = escaped(measure.name), width = measure.edges[1] - measure.edges[0];
@@ -99,9 +74,7 @@ function histogram(measure) {
     traces.push({ type: "scatter", mode: "lines", name: `normal, ${STATES[s]}`, x, y, line: { color: COLOURS[s], dash: "dot" }, hoverinfo: "skip" });
   });
   const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
-  shown.shapes = measure.limits.filter((limit) => limit !== null).map((limit) => ({
-    type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: RED, width: 2 },
-  }));
+  shown.shapes = limits(measure);
   Plotly.newPlot(chart(`Histogram of ${measure.name}, raw and corrected`), traces, shown, SETTINGS);
 }
 

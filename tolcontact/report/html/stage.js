@@ -1,17 +1,5 @@
 "use strict";
-// What all pages share: it unpacks the data, and draws the assembly with three.js.
-
-const data = JSON.parse(document.getElementById("data").textContent);
-const byId = (id) => document.getElementById(id);
-
-/** An array of numbers from its base64 form: {shape, values}. */
-function unpacked(packed) {
-  const bytes = Uint8Array.from(atob(packed.data), (c) => c.charCodeAt(0));
-  const Kind = packed.kind === "f4" ? Float32Array : Int32Array;
-  return { shape: packed.shape, values: new Kind(bytes.buffer) };
-}
-
-const figure = (x) => (Number.isFinite(x) ? Number(x.toPrecision(4)).toString() : "-");
+// The assembly to turn, drawn with three.js.
 
 // --- colours ---------------------------------------------------------------------------------------------------------
 
@@ -35,6 +23,7 @@ const TABLES = new Map([VIRIDIS, DIVERGING].map((map) => [map, table(map)]));
 // --- the scene -------------------------------------------------------------------------------------------------------
 
 const GREYS = ["#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0"];
+const FAULTY = "#e38a84";
 const RAW = 0, CORRECTED = 1, DIFFERENCE = 2;
 const RED = "#d01c1c";
 const MANY = 30_000; // triangles
@@ -82,7 +71,7 @@ class Stage {
     this.scene.add(group);
     const fields = {};
     for (const name of ["mean", "sixSigma"]) if (part[name]) fields[name] = unpacked(part[name]);
-    return { name: part.name, group, mesh, materials: [material, ink], faces: faces.values, fields, own: GREYS[number % GREYS.length] };
+    return { name: part.name, group, mesh, materials: [material, ink], faces: faces.values, fields, own: part.faulty ? FAULTY : GREYS[number % GREYS.length] };
   }
 
   arrows(things, colour, share) {

@@ -1,6 +1,6 @@
 """What is declared, before any run: parts in their places, faces with the words that choose them, locators, gaps."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,9 +11,15 @@ from tolcontact.report.html.packed import packed
 from tolcontact.report.html.scene import Drawn
 
 
-def view_of(assembly: Assembly, nominal: Nominal | None) -> Drawn:
+def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Drawn:
     """The scene; without a `nominal` assembly, which has faults, only the parts whose shapes are sound."""
-    drawn: Drawn = {"parts": list(_parts(assembly)), "locators": [], "contacts": [], "measures": [], "forces": []}
+    drawn: Drawn = {
+        "parts": list(_parts(assembly, _faulty(assembly, faults))),
+        "locators": [],
+        "contacts": [],
+        "measures": [],
+        "forces": [],
+    }
     if nominal is None:
         return drawn
     locators = nominal.locators
@@ -54,13 +60,22 @@ def _position(nominal: Nominal, point: Point) -> list[float]:
     return [float(x) for x in nominal.position(point)]
 
 
-def _parts(assembly: Assembly) -> Iterator[Drawn]:
+def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
+    """Parts that faults name, and those of contact pairs that they name."""
+    said = "\n".join(faults)
+    pairs = [pair for pair in assembly.pairs if f'"{pair.name}" (' in said]
+    of_pairs = {face.part.name for pair in pairs for face in (pair.moving, pair.reference)}
+    return of_pairs | {part.name for part in assembly.parts if f'part "{part.name}"' in said}
+
+
+def _parts(assembly: Assembly, faulty: set[str]) -> Iterator[Drawn]:
     for part in assembly.parts:
         own = seen(part)
         if own is None:
             continue
         yield {
             "name": part.name,
+            "faulty": part.name in faulty,
             "vertices": packed(own.vertices),
             "faces": packed(own.faces, "i4"),
             "faceOfTriangle": packed(own.face_of, "i4"),

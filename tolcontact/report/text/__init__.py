@@ -2,6 +2,7 @@
 
 from tolcontact.report.text.comparison import comparison_text
 from tolcontact.report.text.population import population_text
-from tolcontact.report.text.summary import summary_text
+from tolcontact.report.text.runs import runs_text
+from tolcontact.report.text.summary import capability_text, summary_text
 
-__all__ = ["comparison_text", "population_text", "summary_text"]
+__all__ = ["capability_text", "comparison_text", "population_text", "runs_text", "summary_text"]

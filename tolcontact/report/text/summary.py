@@ -1,17 +1,16 @@
-"""The summary as text for a terminal of 80 columns."""
+"""The summary as text for a terminal."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
-from rich import box
 from rich.console import Group
 from rich.padding import Padding
-from rich.table import Table
 from rich.text import Text
 
 from tolcontact.report.figures import grouped, limits_text, number, percent, share
+from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
     ABOVE,
     BELOW,
@@ -32,9 +31,7 @@ RAW, CORRECTED = STATES
 _CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 _SHORT = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
 _BY_PERCENTILES = {PP_NORMAL: PP, PPK_NORMAL: PPK}
-NAME_WIDTH = 12  # of names and labels; longer ones may be wrapped
 ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
-WIDTH = 80
 APART = "* apart from that by percentiles: as of a normal distribution it is wrong"
 
 
@@ -43,7 +40,7 @@ def summary_text(summary: xr.Dataset) -> Group:
     return Group(*_sections(summary))
 
 
-def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
+def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
     count = summary.attrs["realizations"]
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
@@ -63,28 +60,32 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | Table | Padding]:
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
 
 
-def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """Columns as wide as their cells; if they need more than WIDTH, each interval goes below its estimate."""
-    widths = [max(len(row[k]) for row in [columns, *rows]) for k in range(len(columns))]
-    if sum(widths) + 2 * len(widths) > WIDTH:
-        rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-    for k, column in enumerate(columns):
-        least = min(widths[0], NAME_WIDTH) if k == 0 else None
-        table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=least)
-    for row in rows:
-        table.add_row(*row)
-    return table
+def capability_text(summary: xr.Dataset) -> Group:
+    """How each measure of a summary keeps within its limits, and no more."""
+    return Group(
+        Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold"), *_limits(summary)
+    )
 
 
-def _overview(summary: xr.Dataset) -> Table:
+def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
+    for measure in summary["measure"].values:
+        of = summary.sel(measure=measure)
+        yield Text(f"\n{measure} ({of['measure_units'].values}): {limits_text(of) or 'no limits'}", style="bold")
+        if limits_text(of):
+            rows, marked = measure_rows(of.sel(statistic=[*SHARES, *CAPABILITY]))
+            yield FigureTable(["", RAW, CORRECTED], [row[:-1] for row in rows])
+            if marked:
+                yield Text(APART)
+
+
+def _overview(summary: xr.Dataset) -> FigureTable:
     """Of each measure what a decision is made by."""
     rows = []
     for measure in summary["measure"].values:
         rows.append([str(measure), "", "", "", ""])
         for state in (RAW, CORRECTED):
             rows.append([f"  {state}", *overview_cells(summary["statistic_value"].sel(measure=measure, state=state))])
-    return _table(["", "mean", "6 sigma", PPK, "outside"], rows)
+    return FigureTable(["", "mean", "6 sigma", PPK, "outside"], rows)
 
 
 def overview_cells(of: xr.DataArray) -> list[str]:
@@ -93,12 +94,12 @@ def overview_cells(of: xr.DataArray) -> list[str]:
     return [number(mean), number(spread), number(ppk), share(outside)]
 
 
-def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | Table]:
+def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | FigureTable]:
     units, quantity = str(of["measure_units"].values), str(of["measure_quantity"].values)
     said = ", ".join(each for each in (quantity, limits_text(of)) if each)
     yield Text(f"\n{name} ({units}){': ' if said else ''}{said}", style="bold")
     rows, marked = measure_rows(of)
-    yield _table(["", RAW, CORRECTED, "change"], rows)
+    yield FigureTable(["", RAW, CORRECTED, "change"], rows)
     if marked:
         yield Text(APART)
 
@@ -132,14 +133,14 @@ def _are_apart(one: np.ndarray, other: np.ndarray) -> bool:
     return bool(one[1] > other[2] or other[1] > one[2])
 
 
-def _field_table(summary: xr.Dataset) -> Table:
+def _field_table(summary: xr.Dataset) -> FigureTable:
     rows = []
     for part in summary["part"].values:
         for state in (RAW, CORRECTED):
             of = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(of.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), state, *extremes])
-    return _table(["part", "state", "least", "largest"], rows)
+    return FigureTable(["part", "state", "least", "largest"], rows)
 
 
 def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:

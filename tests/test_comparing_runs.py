@@ -1,0 +1,149 @@
+"""Runs side by side: from the same draws or not, on the command line and as a page."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tolcontact.report import write_comparison
+from tolcontact.statistics import two_samples
+from tolcontact.statistics.sample import Sample
+
+
+def lifted(by, name="top", tolerance=None):
+    """The stack, measured from another height; and a measure that others do not have."""
+    a = cases.stack()
+    upper, bottom = a.parts[-1], a.parts[0]
+    a.measure("thickness", bottom.point(0, 0, 10 - by), to=upper.point(0, 0, 10), along="z", tolerance=1)
+    a.measure(name, upper.point(0, 0, 10), along="x") if name != "top" else None
+    return a
+
+
+@pytest.fixture(scope="module")
+def runs():
+    made = {
+        "one": (lifted(0.0), 300, 1),
+        "higher": (lifted(0.25), 200, 1),
+        "other": (lifted(0.0, "sideways"), 400, 2),
+    }
+    return {name: tc.run(model, samples=n, seed=seed, solver="daqp", surfaces=0) for name, (model, n, seed) in made.items()}
+
+
+def test_a_known_shift_is_found_exactly_from_the_same_draws(runs):
+    found = tc.compare_runs(runs)
+    of = found.sel(run="higher", measure="thickness")
+    assert str(of.draws.values) == "same" and str(found.draws.sel(run="other").values) == "other"
+    shift = of.change.sel(change_of="shift of the mean", state="corrected").values
+    assert shift == pytest.approx([0.25] * 3, abs=1e-4)  # parts turn, a little
+    assert of.change.sel(change_of="ratio of 6 sigma", interval="estimate").values == pytest.approx(1, abs=1e-3)
+    assert of.furthest.values == pytest.approx(0.25, abs=1e-3)
+    assert np.isnan(found.furthest.sel(run="other")).all() and np.isnan(found.change.sel(run="one")).all()
+
+
+def test_values_are_those_of_the_summaries(runs):
+    found = tc.compare_runs(runs)
+    for name, run in runs.items():
+        expected = tc.summarize(run).statistic_value.sel(measure="thickness", statistic="6 sigma")
+        assert np.array_equal(found.value.sel(run=name, measure="thickness", statistic="6 sigma"), expected)
+    assert found.realizations.values.tolist() == [300, 200, 400] and found.attrs["left_out"] == "sideways"
+
+
+def test_independent_runs_have_wider_intervals_than_the_same_draws(runs):
+    found = tc.compare_runs(runs).change.sel(measure="thickness", state="corrected", change_of="shift of the mean")
+    assert found.sel(run="other", interval="lower") < 0 < found.sel(run="other", interval="upper")
+    assert np.ptp(found.sel(run="other").values) > 100 * np.ptp(found.sel(run="higher").values)
+
+
+def test_a_tolerance_that_differs_is_of_the_same_seed():
+    wider = cases.stack()
+    wider_run = tc.run(wider, samples=50, solver="daqp", keep="measures", surfaces=0)
+    narrow_run = tc.run(lifted(0.0), samples=50, solver="daqp", keep="measures", surfaces=0)
+    assert str(tc.compare_runs({"a": wider_run, "b": narrow_run}).draws.sel(run="b").values) == "same seed"
+
+
+def hits(generator, p, n):
+    return generator.random(n) < p
+
+
+DIFFERENCES = {  # samples of 80 realizations, and the true difference or ratio
+    "shift": (two_samples.shift, lambda g: (g.exponential(2, 80), g.normal(1, 1, 80)), 1.0),
+    "ratio": (two_samples.variance_ratio, lambda g: (g.normal(0, 2, 80), g.uniform(-1, 1, 80)), 12.0),
+    "share": (two_samples.share_shift, lambda g: (hits(g, 0.3, 80), hits(g, 0.1, 80)), 0.2),
+}
+
+
+@pytest.mark.parametrize("name", DIFFERENCES)
+def test_intervals_of_independent_samples_cover(name):
+    """500 repeats: 95 % is covered in 465 to 487 of them with 98 % probability; shares are a little conservative."""
+    function, draw, truth = DIFFERENCES[name]
+    generator, inside = np.random.default_rng(5), 0
+    for _ in range(500):
+        after, before = (Sample.of(x) for x in draw(generator))
+        estimate = function(after, before, paired=False)
+        inside += estimate.lower <= truth <= estimate.upper
+    assert 463 <= inside <= 490
+
+
+def test_intervals_of_paired_shares_cover():
+    generator, inside = np.random.default_rng(6), 0
+    for _ in range(500):
+        u = generator.random(100)
+        estimate = two_samples.share_shift(Sample.of(u < 0.3), Sample.of((u > 0.05) & (u < 0.2)), paired=True)
+        inside += estimate.lower <= 0.15 <= estimate.upper
+    assert 463 <= inside <= 492
+
+
+def test_the_command_compares_archives(archive, tmp_path):
+    again = tmp_path / "again.nc"
+    tc.run(cases.stack(), samples=100, seed=4, solver="daqp", out=again, surfaces=0).close()
+    done = call(tmp_path, "compare", archive, again, "--out", "both.nc", "--report", "both.html")
+    assert done.returncode == 0, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 80 and "other draws" in done.stdout
+    with xr.open_dataset(tmp_path / "both.nc") as read:
+        assert read["run"].values.astype(str).tolist() == ["stack", "again"]
+    assert [chart["name"] for chart in data_of((tmp_path / "both.html").read_text())["charts"]]
+    said = json.loads(call(tmp_path, "compare", archive, again, "--json").stdout, parse_constant=pytest.fail)
+    assert said["data_vars"]["realizations"]["data"] == [300, 100]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["{}"], "two runs or more"),
+        (["{}", "{}"], "name each once"),
+        (["{}", "model.py"], "not one model, nor archives"),
+        (["{}", "other.nc"], "does not exist"),
+        (["{}", "other.nc", "--samples", "20"], "--samples is for models"),
+        (["model.py", "--report", "page.html"], "--report is for archives"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(options, said, archive, tmp_path):
+    done = call(tmp_path, "compare", *(each.format(archive) for each in options))
+    assert done.returncode == 2 and said in done.stderr and "Traceback" not in done.stderr
+    assert not [*tmp_path.iterdir()]
+
+
+def test_runs_without_a_measure_in_common_are_refused(runs):
+    a = tc.Assembly("alone")
+    block = a.part("block", tc.Box(10, 20, 10))
+    a.locate(block, cases.translating(0.1))
+    a.measure("height", block.point(5, 5, 10), along="z")
+    with pytest.raises(tc.OptionError, match="share no measure"):
+        tc.compare_runs({"stack": runs["one"], "alone": tc.run(a, samples=10, surfaces=0)})
+
+
+@needs_browser
+@pytest.mark.parametrize("width", [1280, 390])
+def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):  # noqa: F811 (a fixture)
+    odd = {"<img src=x onerror=alert(1)>": runs["one"], **{name: runs[name] for name in ("higher", "other")}}
+    write_comparison(odd, tc.compare_runs(odd), tmp_path / "runs.html")
+    opened = open_page(tmp_path / "runs.html", width, drawn=".js-plotly-plot")
+    assert opened.evaluate("document.documentElement.scrollWidth") <= width
+    assert "<img src=x" in opened.locator("ul").inner_text()
+    y = opened.evaluate("document.querySelectorAll('.chart')[1].data.map((trace) => trace.y.reduce((a, b) => a + b, 0))")
+    assert y == pytest.approx([100, 100, 100])

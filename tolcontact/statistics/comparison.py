@@ -1,0 +1,171 @@
+"""Runs side by side: what each shows of the measures that they share, and how they differ from the first one."""
+
+import json
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.errors import OptionError
+from tolcontact.realizations import pieces
+from tolcontact.statistics import intervals, two_samples
+from tolcontact.statistics.intervals import NOTHING, Estimate
+from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.summary import summarize
+
+DRAWS = ("seed", "sampler")  # attributes: what the numbers of a realization follow from
+
+
+def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
+    """Statistics of two runs or more, by their names, and how they differ from the first one, each with its 95 % interval.
+
+        value        (run, state, measure, statistic, interval)   mean, 6 sigma, Ppk and the share outside its own limits
+        change       (run, state, measure, change_of, interval)   shift of the mean, ratio of 6 sigma, shift of the share;
+                                                                  NaN of the first run itself
+        furthest     (run, state, measure)     largest difference of a realization; NaN if the draws are not the same
+        by_status    (run, status_meaning)     number of realizations
+        penetration  (run, state)              largest true penetration of any contact point [mm]
+        draws        (run)                     "same", "same seed" or "other": than the first one's
+
+    Runs of the same seed are compared realization by realization, as far as both go; others as independent ones.
+    Raises OptionError if they share no measure of the same name, units and quantity, ArchiveError for a run that is not
+    finished far enough.
+    """
+    (first, reference), *_ = runs.items()
+    summaries = {name: summarize(run) for name, run in runs.items()}
+    shared = _shared(summaries)
+    if not shared:
+        raise OptionError(
+            f"{', '.join(runs)} share no measure of the same name, units and quantity; there is nothing to compare"
+        )
+    counts = {name: summaries[name].attrs["realizations"] for name in runs}
+    draws = {name: _draws(run, reference, min(counts[name], counts[first])) for name, run in runs.items()}
+    values = {name: of["statistic_value"].sel(statistic=list(words.COMPARED_STATISTICS)) for name, of in summaries.items()}
+    changes = {name: _Change(run, reference, summaries[name], summaries[first], draws[name]) for name, run in runs.items()}
+    nothing = np.full((len(words.STATES), len(shared), len(words.CHANGES_OF_RUNS), len(words.ESTIMATE)), np.nan)
+    of_runs = {
+        "value": [of.sel(measure=shared).transpose(words.STATE, words.MEASURE, ...).values for of in values.values()],
+        "change": [of.everywhere(shared) if name != first else nothing for name, of in changes.items()],
+        "furthest": [of.furthest(shared) for of in changes.values()],
+        "by_status": [of["by_status"].values for of in summaries.values()],
+        "penetration": [of["penetration"].values for of in summaries.values()],
+        "draws": list(draws.values()),
+    }
+    one, own = summaries[first].sel(measure=shared), list(summaries.values())
+    return xr.Dataset(
+        {of.name: (of.dims, np.array(of_runs[of.name]), of.all_attributes) for of in words.COMPARED_RUNS},
+        coords={
+            words.RUN: list(runs),
+            words.STATE: list(words.STATES),
+            words.MEASURE: shared,
+            words.STATISTIC: list(words.COMPARED_STATISTICS),
+            words.CHANGE_OF: list(words.CHANGES_OF_RUNS),
+            words.INTERVAL: list(words.ESTIMATE),
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+            "measure_units": (words.MEASURE, one["measure_units"].values.astype(str)),
+            **{
+                f"measure_{side}": (
+                    (words.RUN, words.MEASURE),
+                    np.array([of[f"measure_{side}"].sel(measure=shared) for of in own]),
+                )
+                for side in words.BOUNDS
+            },
+            "realizations": (words.RUN, list(counts.values())),
+            "title": (words.RUN, [of.attrs["title"] for of in summaries.values()]),
+        },
+        attrs={"title": f"comparison of {len(runs)} runs", "reference_run": first, "left_out": _left_out(summaries, shared)},
+    )
+
+
+def _shared(summaries: Mapping[str, xr.Dataset]) -> list[str]:
+    """Measures that all runs have, in the order of the first one."""
+    alike = [
+        set(zip(of["measure"].values, of["measure_units"].values, of["measure_quantity"].values, strict=True))
+        for of in summaries.values()
+    ]
+    first = next(iter(summaries.values()))
+    known = {name for name, _, _ in set.intersection(*alike)}
+    return [str(name) for name in first["measure"].values if name in known]
+
+
+def _left_out(summaries: Mapping[str, xr.Dataset], shared: list[str]) -> str:
+    every = dict.fromkeys(str(name) for of in summaries.values() for name in of["measure"].values)
+    return ", ".join(name for name in every if name not in shared)
+
+
+def _draws(run: xr.DataTree, first: xr.DataTree, count: int) -> str:
+    """Whether a run has the draws of the first one, in so many realizations."""
+    if any(run.attrs[word] != first.attrs[word] for word in DRAWS):
+        return words.OTHER_DRAWS
+    own, theirs = (each["sample"].to_dataset() for each in (run, first))
+    if words.DEVIATION.name in own and words.DEVIATION.name in theirs:
+        a, b = (each[words.DEVIATION.name] for each in (own, theirs))
+        labels = [each[each.dims[-1]].values.tolist() for each in (a, b)]
+        some = {words.REALIZATION: slice(count)}
+        both = zip(pieces(a.isel(some).to_dataset()), pieces(b.isel(some).to_dataset()), strict=True)
+        same = labels[0] == labels[1] and all(np.array_equal(x[a.name].values, y[b.name].values) for x, y in both)
+    else:
+        same = _drawn_from(run) == _drawn_from(first)
+    return words.SAME_DRAWS if same else words.SAME_SEED
+
+
+def _drawn_from(run: xr.DataTree) -> dict:
+    """The declaration but the method, which draws nothing."""
+    return {
+        word: value for word, value in json.loads(str(run["model"][words.DECLARATION.name].values)).items() if word != "method"
+    }
+
+
+class _Change:
+    """How a run differs from the first one, measure by measure."""
+
+    def __init__(self, run: xr.DataTree, first: xr.DataTree, summary: xr.Dataset, of_first: xr.Dataset, draws: str) -> None:
+        self.same, self.paired = draws == words.SAME_DRAWS, draws != words.OTHER_DRAWS
+        counts = [of.attrs["realizations"] for of in (summary, of_first)]
+        counts = [min(counts)] * 2 if self.paired else counts
+        self.summaries = summary, of_first
+        self.rows = [
+            each.to_dataset()[[words.MEASURED.name]].isel({words.REALIZATION: slice(count)})
+            for each, count in zip((run, first), counts, strict=True)
+        ]
+
+    def everywhere(self, measures: list[str]) -> np.ndarray:
+        return np.array([[self._of(measure, state) for measure in measures] for state in words.STATES])
+
+    def furthest(self, measures: list[str]) -> np.ndarray:
+        return np.array([[self._furthest(measure, state) for measure in measures] for state in words.STATES])
+
+    def _samples(self, measure: str, state: str) -> list[Sample]:
+        return [_sample(rows, measure, state) for rows in self.rows]
+
+    def _of(self, measure: str, state: str) -> list[Estimate]:
+        after, before = self._samples(measure, state)
+        if not (np.isfinite(after.mean) and np.isfinite(before.mean)):
+            return [NOTHING] * len(words.CHANGES_OF_RUNS)
+        hits = [_outside(x, of.sel(measure=measure)) for x, of in zip((after, before), self.summaries, strict=True)]
+        return [
+            two_samples.shift(after, before, paired=self.paired),
+            intervals.root(two_samples.variance_ratio(after, before, paired=self.paired)),
+            NOTHING if hits[0] is None or hits[1] is None else two_samples.share_shift(hits[0], hits[1], paired=self.paired),
+        ]
+
+    def _furthest(self, measure: str, state: str) -> float:
+        if not self.same:
+            return np.nan
+        after, before = self._samples(measure, state)
+        return float(max(np.abs(a - b).max() for a, b in zip(after.pieces(), before.pieces(), strict=True)))
+
+
+def _sample(rows: xr.Dataset, measure: str, state: str) -> Sample:
+    place = {words.MEASURE: rows[words.MEASURE].values.tolist().index(measure), words.STATE: words.STATES.index(state)}
+    of = rows.isel(place)
+    return Sample(lambda: (np.asarray(piece[words.MEASURED.name].values) for piece in pieces(of)))
+
+
+def _outside(x: Sample, of: xr.Dataset) -> Sample | None:
+    """Which values are beyond a run's own limits; nothing without limits."""
+    lower, upper = float(of["measure_lower"]), float(of["measure_upper"])
+    if not (np.isfinite(lower) or np.isfinite(upper)):
+        return None
+    return Sample(lambda: ((piece < lower) | (piece > upper) for piece in x.pieces()))
