@@ -121,7 +121,7 @@ def test_the_summary_says_of_how_many_realizations_magnitudes_are(fields, said, 
 def test_limits_alone_are_printed(archive, tmp_path):
     done = call(tmp_path, "summary", archive, "--limits")
     assert done.returncode == 0 and "Ppk as normal" in done.stdout and "touched by contact" not in done.stdout
-    assert done.stdout.count("\noutside ") == 1
+    assert done.stdout.count("\noutside ") == 2
     done = call(tmp_path, "summary", archive, "--limits", "--json")
     assert done.returncode == 2 and "--json and --limits" in done.stderr
 
