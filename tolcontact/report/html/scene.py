@@ -1,33 +1,34 @@
 """What the turning picture of a page is drawn from: bodies, fields, locators, contact points, and single realizations."""
 
-import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as words
 from tolcontact.report.html.coarse import allowed, coarser
 from tolcontact.report.html.packed import Packed, packed
 from tolcontact.report.html.shown import Shown
+from tolcontact.report.marks import Marks, marks_of
 
 Drawn = dict[str, Any]
 
 
 def scene_of(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     """Everything in the nominal assembly frame [mm]; what an archive does not have is left out."""
-    document = json.loads(str(results["model"][words.DECLARATION.name].values))
+    return {"parts": _parts(results), **drawn_marks(marks_of(results)), "realizations": _realizations(results, shown)}
+
+
+def drawn_marks(marks: Marks) -> Drawn:
+    """Locators, contact points, measures and forces, as a page holds them."""
     return {
-        "parts": _parts(results),
-        "locators": _locators(results),
-        "contacts": list(_contacts(results)),
-        "measures": list(_measures(document)),
-        "forces": [
-            {"name": each["name"], "at": _at(document, each["at"]), "along": each["vector"]} for each in document["forces"]
+        "locators": marks.locators,
+        "contacts": [
+            {word: packed(value) if isinstance(value, np.ndarray) else value for word, value in pair.items()}
+            for pair in marks.contacts
         ],
-        "realizations": _realizations(results, shown),
+        "measures": marks.measures,
+        "forces": marks.forces,
     }
 
 
@@ -47,44 +48,6 @@ def _part(name: str, field: xr.Dataset, count: int) -> Drawn:
         if np.isfinite(values[..., :3]).all():
             drawn[word] = packed(values)
     return drawn
-
-
-def _locators(results: xr.DataTree) -> list[Drawn]:
-    sample = results["sample"].to_dataset()
-    if words.LOCATOR_POINT.name not in sample:
-        return []
-    points, directions = sample[words.LOCATOR_POINT.name].values, sample[words.LOCATOR_DIRECTION.name].values
-    return [
-        {"name": str(name), "at": at.tolist(), "along": along.tolist()}
-        for name, at, along in zip(sample[words.LOCATOR].values, points, directions, strict=True)
-    ]
-
-
-def _contacts(results: xr.DataTree) -> Iterator[Drawn]:
-    contact = results["contact"].to_dataset()
-    if words.MOVING_POINT.name not in contact:
-        return
-    points, pair_of_point = contact[words.MOVING_POINT.name].values, contact[words.PAIR_OF_POINT.name].values
-    for number, name in enumerate(results.to_dataset()[words.PAIR].values):
-        moving = int(contact[words.MOVING_PART.name].values[number])
-        yield {"name": str(name), "part": moving, "points": packed(points[pair_of_point == number])}
-
-
-def _measures(document: Drawn) -> Iterator[Drawn]:
-    for measure in document["measures"]:
-        ends = [_at(document, measure[word]) for word in ("of", "to") if word in measure]
-        known = [end for end in ends if end is not None]
-        if known:
-            yield {"name": measure["name"], "points": known, "along": measure["along"]}
-
-
-def _at(document: Drawn, point: Drawn) -> list[float] | None:
-    """Where a declared point is in the nominal assembly; None of an axis's end, which is the geometry's."""
-    if "position" not in point:
-        return None
-    part = next(each for each in document["parts"] if each["name"] == point["part"])
-    R = Rotation.from_rotvec(part["rotation"]).as_matrix()
-    return [float(x) for x in R @ point["position"] + part["at"]]
 
 
 def _realizations(results: xr.DataTree, shown: list[Shown]) -> Drawn:

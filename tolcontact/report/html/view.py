@@ -3,61 +3,27 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-import numpy as np
-
-from tolcontact.declaration import Assembly, Point
-from tolcontact.discretization import ContactPoints, Nominal, seen
+from tolcontact.declaration import Assembly
+from tolcontact.discretization import Nominal, seen
 from tolcontact.report.html.packed import packed
-from tolcontact.report.html.scene import Drawn
+from tolcontact.report.html.scene import Drawn, drawn_marks
+from tolcontact.report.marks import Marks, fixed_points, marks_of_nominal
 
 
 def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Drawn:
     """The scene; without a `nominal` assembly, which has faults, only the parts whose shapes are sound."""
-    drawn: Drawn = {
-        "parts": list(_parts(assembly, _faulty(assembly, faults))),
-        "locators": [],
-        "contacts": [],
-        "measures": [],
-        "forces": [],
-    }
-    if nominal is None:
-        return drawn
-    locators = nominal.locators
-    drawn["locators"] = [
-        {"name": name, "at": at.tolist(), "along": along.tolist()}
-        for name, at, along in zip(locators.labels, locators.points, locators.directions, strict=True)
-    ]
-    for pair in nominal.pairs:
-        points, gaps = _fixed_points(pair)
-        drawn["contacts"].append({"name": pair.name, "part": pair.moving, "points": packed(points), "gaps": packed(gaps)})
-    for measure in nominal.measures:
-        if measure.points:
-            at = [_position(nominal, point) for point in measure.points]
-            drawn["measures"].append({"name": measure.name, "points": at, "along": measure.along})
-    drawn["forces"] = [
-        {"name": force.name, "at": _position(nominal, force.at), "along": list(force.vector)} for force in assembly.forces
-    ]
-    return drawn
+    marks = Marks([], [], [], []) if nominal is None else marks_of_nominal(nominal)
+    return {"parts": list(_parts(assembly, _faulty(assembly, faults))), **drawn_marks(marks)}
 
 
 def gaps_in_words(nominal: Nominal | None) -> list[dict[str, Any]]:
     """The smallest and the largest gap of each pair of faces, in the nominal assembly."""
     found = []
     for pair in () if nominal is None else nominal.pairs:
-        _, gaps = _fixed_points(pair)
+        _, gaps = fixed_points(pair)
         least, most = (f"{gap + 0.0:.4g}" for gap in (gaps.min(), gaps.max()))
         found.append({"name": pair.name, "count": len(gaps), "smallest": least, "largest": most})
     return found
-
-
-def _fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
-    """Contact points (point, 3) and gaps (point,) [mm]; the nearest tangent of a hollow wall, which moves, is left out."""
-    stays = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
-    return pair.P_m[stays], ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1)[stays]
-
-
-def _position(nominal: Nominal, point: Point) -> list[float]:
-    return [float(x) for x in nominal.position(point)]
 
 
 def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
