@@ -11,11 +11,10 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Who may import a library: folders and files, relative to the package.
 ROOMS = {
     "casadi": ("mechanics/", "compilation/"),
-    "matplotlib": ("report/",),
+    "matplotlib": ("plot/",),
     "jinja2": ("report/html/",),
     "fast_simplification": ("report/html/coarse.py",),
-    "plotly": ("report/",),
-    "pyvista": ("report/",),
+    "pyvista": ("plot/",),
     "numba": ("compiled.py",),
     "jaxtyping": ("arrays.py",),
     "llvmlite": ("compilation/functions/native.py",),
@@ -31,13 +30,14 @@ NOT_IN = {"xarray": ("declaration/", "discretization/", "variation/", "mechanics
 NEVER = {
     "statistics": ("contact", "simulation"),
     "archive": ("contact", "statistics"),
-    "report": ("contact", "simulation", "archive", "workflow"),
+    "report": ("contact", "simulation", "archive"),
+    "plot": ("contact", "simulation", "archive"),
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
     "compiled", "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation",
-    "statistics", "archive", "workflow", "report", "recomputed", "testing", "cli", "__init__", "__main__",
+    "statistics", "archive", "report", "plot", "workflow", "recomputed", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

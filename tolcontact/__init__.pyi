@@ -1,4 +1,5 @@
-from .archive import model_of, open_archive
+from . import plot
+from .archive import model_of
 from .cli import command_line, main
 from .compilation import Program
 from .declaration import (
@@ -48,7 +49,7 @@ from .method import Method
 from .simulation import simulate_blocks
 from .version import __version__
 from .vocabulary import Status
-from .workflow import build, check, check_population, compare, compare_runs, run, summarize, write_model
+from .workflow import build, check, check_population, compare, compare_runs, open_archive, run, summarize, write_model
 
 __all__ = [
     "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "Coaxiality", "ContactPair",
@@ -56,6 +57,6 @@ __all__ = [
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
-    "command_line", "compare", "compare_runs", "faces_in", "main", "model_of", "open_archive", "parts_from", "run",
+    "command_line", "compare", "compare_runs", "faces_in", "main", "model_of", "open_archive", "parts_from", "plot", "run",
     "simulate_blocks", "summarize", "three_two_one", "write_model",
 ]  # fmt: skip

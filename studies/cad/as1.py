@@ -11,17 +11,11 @@ the room between the rod's nuts. A tolerance is the full width of its zone [mm].
 import sys
 from pathlib import Path
 
-import matplotlib.pyplot as plt
-import numpy as np
-from matplotlib.colors import to_rgb
-from mpl_toolkits.mplot3d.art3d import Poly3DCollection
-
 import tolcontact as tc
 
 FILE = Path(__file__).with_name("as1-oc-214.stp")
 MOVING = ["l-bracket_1", "l-bracket_1 (2)", "nut_1", "nut_2"]
 PLACED = 0.4
-COLOURS = {"plate": "#b8c4d0", "l-bracket": "#5b8cb8", "rod": "#c9a227", "nut": "#c0563b", "bolt": "#8a8f98"}
 
 
 def assembly() -> tc.Assembly:
@@ -44,22 +38,8 @@ def assembly() -> tc.Assembly:
 
 
 def draw(figure: Path) -> None:
-    """A picture of the assembly, a colour for each product."""
-    program = tc.build(assembly(), solver="daqp")
-    axes = plt.figure(figsize=(6, 4.5), dpi=110).add_subplot(projection="3d", proj_type="ortho")
-    corners, colours = [], []
-    for part in program.nominal.parts:
-        triangles = part.vertices[part.faces]  # small ones: they are drawn from the back to the front
-        normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-        light = normals @ (-0.4, -0.6, 0.7) / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)
-        corners.append(triangles)
-        colours.append((0.55 + 0.45 * np.clip(light, 0, 1))[:, None] * to_rgb(COLOURS.get(part.name.split("_")[0], "grey")))
-    axes.add_collection3d(Poly3DCollection(np.concatenate(corners), facecolors=np.concatenate(colours), linewidths=0))
-    axes.set(xlim=(-10, 190), ylim=(-20, 170), zlim=(-5, 85))
-    axes.set_box_aspect((200, 190, 90))
-    axes.set_axis_off()
-    axes.view_init(elev=28, azim=-62)
-    plt.savefig(figure, bbox_inches="tight")
+    """A picture of the assembly, a colour for each part."""
+    tc.plot.assembly(assembly(), marks=False).screenshot(figure, window_size=(760, 560))
 
 
 if __name__ == "__main__":

@@ -12,6 +12,8 @@ from PIL import Image
 from published import PAPER, STATES
 from scipy.spatial import Delaunay
 
+import tolcontact as tc
+
 mpl.use("Agg")
 pv.vtk_verbosity("off")  # without a display VTK says so, and goes on
 GREY, DARK, BLUE, RED, GREEN = "#c9ced6", "#8f98a5", "#2f6fb7", "#d03b30", "#1f8a5b"
@@ -156,19 +158,16 @@ def figure_6_7(name: str, run: xr.DataTree, path: Path) -> None:
     plotter = stage(2, 600, bar=True)
     for column, state in enumerate(STATES):
         plotter.subplot(0, column)
-        top = 0.0
-        for part in run.part.values:
-            mesh = surface(run, part)
-            mesh["field"] = run[f"field/{part}"].six_sigma.sel(state=state, component="magnitude").values
-            top = max(top, float(mesh["field"].max()))
-            # Unlit, so that a colour on the part is the colour in the bar.
-            shown = {"scalars": "field", "cmap": "turbo", "clim": PAPER[name].scale, "show_scalar_bar": False}
-            plotter.add_mesh(mesh, lighting=False, **shown)
-            outline(plotter, mesh)
+        tc.plot.field(run, state=state, limits=PAPER[name].scale, plotter=plotter)
+        plotter.remove_scalar_bar()
+        fields = [run[f"field/{part}"].six_sigma.sel(state=state, component="magnitude") for part in run.part.values]
+        top = float(max(field.max() for field in fields))
         caption(plotter, f"{TITLES[state]}: up to {top:.1f} mm")
         look(plotter, name)
     plotter.subplot(1, 0)
-    plotter.add_mesh(mesh, opacity=0.0, **shown)
+    mesh = surface(run, run.part.values[0])
+    mesh["field"] = fields[0].values
+    plotter.add_mesh(mesh, opacity=0.0, cmap="viridis", clim=PAPER[name].scale, show_scalar_bar=False)
     plotter.add_scalar_bar(
         "6 sigma of the displacement magnitude [mm]\n", n_labels=5, fmt="%.1f", color="black",
         position_x=0.3, position_y=0.1, width=0.4, height=0.7, title_font_size=18 * FINE, label_font_size=16 * FINE,

@@ -24,7 +24,7 @@ from tolcontact.mechanics.quiet import MAKING, quiet
 from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
-from tolcontact.readable import Readable
+from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
 
 log = logging.getLogger(__name__)
@@ -40,7 +40,7 @@ class ContactGroup:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Program(Readable):
+class Program(Pictured):
     """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
 
     draws        of everything that varies

@@ -21,12 +21,12 @@ from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import direction, script_line
 from tolcontact.declaration.vectors import vector as _vector
 from tolcontact.method import Method
-from tolcontact.readable import Readable
+from tolcontact.readable import Pictured
 
 CONSTANT = 1e-3
 
 
-class Assembly(Readable):
+class Assembly(Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record what is declared; `faults()` lists everything that is wrong with it.

@@ -61,6 +61,6 @@ each point.
 
 from tolcontact.statistics.comparison import compare_runs
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
-from tolcontact.statistics.summary import summarize
+from tolcontact.statistics.summary import Summary, summarize
 
-__all__ = ["BlockSums", "DisplacementFields", "compare_runs", "summarize"]
+__all__ = ["BlockSums", "DisplacementFields", "Summary", "compare_runs", "summarize"]

@@ -7,6 +7,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as words
 from tolcontact.errors import ArchiveError
+from tolcontact.readable import picture_of
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import Estimate
@@ -16,7 +17,16 @@ from tolcontact.statistics.shape import kurtosis, skewness
 LEAST = 2
 
 
-def summarize(results: xr.DataTree) -> xr.Dataset:
+class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
+    """A dataset that a notebook shows as tables."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return picture_of(self)
+
+
+def summarize(results: xr.DataTree) -> Summary:
     """Statistics of a run, each as (estimate, lower, upper) with a 95 % interval.
 
     statistic_value (measure, state, statistic, interval) in the measure's units; shares are of 1
@@ -48,7 +58,7 @@ def summarize(results: xr.DataTree) -> xr.Dataset:
     by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total = int(by_status.sum())
     parts = rows[words.PART].values
-    return xr.Dataset(
+    return Summary(
         {
             "statistic_value": ((words.MEASURE, words.STATE, words.STATISTIC, words.INTERVAL), values),
             "change": ((words.MEASURE, words.CHANGE_OF, words.INTERVAL), changes),

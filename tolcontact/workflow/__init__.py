@@ -66,10 +66,23 @@ Traceback (most recent call last):
 tolcontact.errors.OptionError: resolution is 'precise'; expected one of: linearized, exact
 """
 
+from tolcontact.archive import open_archive
+from tolcontact.workflow import accessor
 from tolcontact.workflow.compare import compare
 from tolcontact.workflow.compare_runs import compare_runs
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.written import write_model
 
-__all__ = ["build", "check", "check_population", "compare", "compare_runs", "run", "summarize", "write_model"]
+__all__ = [
+    "accessor",
+    "build",
+    "check",
+    "check_population",
+    "compare",
+    "compare_runs",
+    "open_archive",
+    "run",
+    "summarize",
+    "write_model",
+]

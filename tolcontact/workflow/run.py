@@ -18,7 +18,7 @@ from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import Block, map_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
-from tolcontact.statistics import BlockSums, DisplacementFields
+from tolcontact.statistics import BlockSums, DisplacementFields, Summary
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT
 from tolcontact.workflow.forecast import announce
@@ -177,7 +177,7 @@ def _simulate(
         writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
 
 
-def summarize(results: xr.DataTree | str | Path) -> xr.Dataset:
+def summarize(results: xr.DataTree | str | Path) -> Summary:
     """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize).
 
     Raises ArchiveError if realizations are not what was written, or if fewer than two are finished.

@@ -33,6 +33,21 @@ RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set
 
 def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
     """Write the report of a run, whose summary is given. Raises ArchiveError if the file cannot be written."""
+    _write(page_of(results, summary), path)
+
+
+def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
+    """Write the view of a model before any run (see view_page). Raises ArchiveError if the file cannot be written."""
+    _write(view_page(assembly, nominal, faults), path)
+
+
+def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, path: Path) -> None:
+    """Write runs side by side (see compare_runs). Raises ArchiveError if the file cannot be written."""
+    _write(comparison_page(runs, comparison), path)
+
+
+def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
+    """The report of a run, whose summary is given."""
     shown = shown_of(results)
     scene = scene_of(results, shown)
     values = {
@@ -46,20 +61,17 @@ def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
         "missing": _missing(scene),
     }
     data = {"scene": scene, "charts": charts_of(results, summary), "relations": relations_of(results, summary)}
-    _write("report", values, data, path)
+    return _page("report", values, data)
 
 
-def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
-    """Write the view of a model before any run; `nominal` is None if it has faults.
-
-    Raises ArchiveError if the file cannot be written.
-    """
+def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
+    """The view of a model before any run; `nominal` is None if it has faults."""
     values = {"title": assembly.name, "faults": faults, "pairs": gaps_in_words(nominal)}
-    _write("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []}, path)
+    return _page("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []})
 
 
-def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, path: Path) -> None:
-    """Write runs side by side (see compare_runs). Raises ArchiveError if the file cannot be written."""
+def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> str:
+    """Runs side by side."""
     measures = []
     for measure in comparison["measure"].values:
         of = comparison.sel(measure=measure)
@@ -71,18 +83,30 @@ def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, pa
         "lines": list(runs_lines(comparison)),
         "measures": measures,
     }
-    _write("compare", values, {"charts": compared_charts(runs, comparison)}, path)
+    return _page("compare", values, {"charts": compared_charts(runs, comparison)})
 
 
-def _write(kind: str, values: dict[str, Any], data: dict[str, Any], path: Path) -> None:
-    """Write a page of a kind, which has a template and scripts."""
-    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
-    page = environment.get_template(f"{kind}.html.j2").render(
+def summary_table(summary: xr.Dataset) -> str:
+    """The overview of a summary, as a table that needs no page."""
+    return _template("overview").render(overview=_overview(summary))
+
+
+def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
+    """A page of a kind, which has a template and scripts."""
+    return _template(kind).render(
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
         scripts=[_as_is(file) for file in SCRIPTS[kind]],
         **values,
     )
+
+
+def _template(name: str) -> jinja2.Template:
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, undefined=jinja2.StrictUndefined)
+    return environment.get_template(f"{name}.html.j2")
+
+
+def _write(page: str, path: Path) -> None:
     part = path.with_name(f".{path.name}.part")
     try:
         part.write_text(page, encoding="utf-8")

@@ -1,0 +1,181 @@
+"""The assembly and its displacement fields, with pyvista, which draws without a display, too."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.declaration import Assembly
+from tolcontact.discretization import discretize
+from tolcontact.errors import OptionError
+from tolcontact.report.marks import Mark, Marks, marks_of, marks_of_nominal
+
+try:
+    import pyvista as pv
+except ModuleNotFoundError as error:
+    raise OptionError("bodies need pyvista, which is not installed; install it: pip install '.[plot]'") from error
+
+STATISTICS = {"mean": words.FIELD_MEAN, "6 sigma": words.FIELD_SIX_SIGMA}
+GREYS = ("#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0")
+INK, LOCATOR, FORCE, CONTACT, MEASURE = "#30363d", "#1f5fa8", "#7a3fb0", "#0a7d4f", "#d01c1c"
+SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+EDGE = 25.0  # degrees: sharper edges are drawn
+VIEW = (-1.0, -2.4, 1.5)  # from where it is looked at
+
+
+class _Body(NamedTuple):
+    """A body in its nominal place [mm]."""
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+
+
+def assembly(
+    of: xr.DataTree | Assembly,
+    *,
+    realization: int | None = None,
+    state: str = "corrected",
+    marks: bool = True,
+    opacity: float = 1.0,
+    plotter: Any = None,
+) -> Any:
+    """The bodies of results or of a declared model, with locators, contact points, measures and forces; a pyvista.Plotter.
+
+    Nominal, or as in a `realization` of results and its `state`, where marks stay at their nominal places.
+    Raises OptionError for a realization or a state that is not there, ModelError for a model with faults.
+    """
+    plotter, is_own = plotter or _plotter(), plotter is None
+    bodies, found = _declared(of) if isinstance(of, Assembly) else (list(_bodies(of)), marks_of(of))
+    for number, body in enumerate(bodies):
+        mesh = _mesh(body)
+        if realization is not None:
+            mesh.points = _moved(of, number, realization, state, body.vertices)
+        plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity, name=f"body {number}")
+        _add_edges(plotter, mesh)
+    if marks:
+        _add_marks(plotter, found, _size(bodies))
+    return _looked_at(plotter) if is_own else plotter
+
+
+def field(
+    results: xr.DataTree,
+    statistic: str = "6 sigma",
+    *,
+    component: str = "magnitude",
+    state: str = "corrected",
+    limits: tuple[float, float] | None = None,
+    plotter: Any = None,
+) -> Any:
+    """The displacement field of all parts as colours [mm]; a pyvista.Plotter.
+
+    `statistic` is "mean" or "6 sigma". Colours run over `limits`; without them over both states of all parts, so that pictures
+    of both can be compared. Raises OptionError for a word that is not known, or an archive without fields.
+    """
+    _expect("statistic", statistic, tuple(STATISTICS))
+    _expect("component", component, words.COMPONENTS)
+    _expect("state", state, words.STATES)
+    of = {words.COMPONENT: component}
+    values = [group[STATISTICS[statistic].name].sel(of) for group in _groups(results)]
+    every = np.concatenate([each.values.ravel() for each in values])
+    if not np.isfinite(every).any():
+        raise OptionError("the archive has no displacement fields of this kind; run again with --fields")
+    is_signed = statistic == "mean" and component != "magnitude"
+    low, high = limits or ((-np.nanmax(abs(every)),) if is_signed else (np.nanmin(every),)) + (
+        np.nanmax(abs(every) if is_signed else every),
+    )
+    plotter, is_own = plotter or _plotter(), plotter is None
+    title = f"{statistic} of displacement, {component} [mm]\n"
+    for body, value in zip(_bodies(results), values, strict=True):
+        mesh = _mesh(body)
+        mesh["field"] = value.sel({words.STATE: state}).values
+        plotter.add_mesh(
+            mesh, scalars="field", clim=(float(low), float(high)), cmap=DIVERGING if is_signed else SEQUENTIAL, lighting=False,
+            scalar_bar_args={"title": title, "color": "black", "n_labels": 5, "fmt": "%.3g"},
+        )  # fmt: skip
+        _add_edges(plotter, mesh)
+    return _looked_at(plotter) if is_own else plotter
+
+
+def _plotter() -> Any:
+    pv.vtk_verbosity("off")  # without a display VTK says so, and goes on
+    plotter = pv.Plotter(off_screen=True, window_size=(1200, 900), line_smoothing=True)
+    plotter.set_background("white")
+    return plotter
+
+
+def _looked_at(plotter: Any) -> Any:
+    plotter.enable_parallel_projection()
+    plotter.view_vector(VIEW, viewup=(0, 0, 1))
+    return plotter
+
+
+def _expect(word: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise OptionError(f"{word} is {value!r}; expected one of: {', '.join(known)}")
+
+
+def _groups(results: xr.DataTree) -> list[xr.Dataset]:
+    names = results.to_dataset()[words.PART].values
+    return [results["field"].children[words.group_of(str(name))].to_dataset() for name in names]
+
+
+def _bodies(results: xr.DataTree) -> Iterator[_Body]:
+    for name, group in zip(results.to_dataset()[words.PART].values, _groups(results), strict=True):
+        yield _Body(str(name), group[words.FIELD_VERTICES.name].values, group[words.FIELD_FACES.name].values)
+
+
+def _declared(model: Assembly) -> tuple[list[_Body], Marks]:
+    nominal = discretize(model)
+    return [_Body(part.name, part.vertices, part.faces) for part in nominal.parts], marks_of_nominal(nominal)
+
+
+def _mesh(body: _Body) -> Any:
+    return pv.make_tri_mesh(body.vertices, body.faces)
+
+
+def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: str, vertices: np.ndarray) -> np.ndarray:
+    _expect("state", state, words.STATES)
+    if isinstance(results, Assembly):
+        raise OptionError("realizations are those of results; a declared model has none")
+    rows = results.to_dataset()
+    if not 0 <= realization < rows.sizes[words.REALIZATION]:
+        raise OptionError(f"realization is {realization}; expected 0 to {rows.sizes[words.REALIZATION] - 1}")
+    if words.ROTATION.name not in rows:
+        raise OptionError("the archive has no poses; run again with --keep poses")
+    at = {words.REALIZATION: realization, words.STATE: words.STATES.index(state), words.PART: part}
+    R, t = (rows[of.name].isel(at).values for of in (words.ROTATION, words.TRANSLATION))
+    return np.asarray(vertices @ R.T + t)
+
+
+def _size(bodies: list[_Body]) -> float:
+    return float(np.linalg.norm(np.ptp(np.concatenate([body.vertices for body in bodies]), axis=0)))
+
+
+def _add_edges(plotter: Any, mesh: Any) -> None:
+    edges = mesh.extract_feature_edges(EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
+    if edges.n_points:
+        plotter.add_mesh(edges, color=INK, line_width=1.5)
+
+
+def _add_marks(plotter: Any, marks: Marks, size: float) -> None:
+    def arrow(mark: Mark, length: float, colour: str) -> None:
+        """It points at its place."""
+        along = np.array(mark["along"]) / np.linalg.norm(mark["along"])
+        start = np.array(mark["at"]) - length * along
+        plotter.add_mesh(pv.Arrow(start=start, direction=along, scale=length, tip_radius=0.2, shaft_radius=0.08), color=colour)
+
+    for locator in marks.locators:
+        arrow(locator, 0.07 * size, LOCATOR)
+    for force in marks.forces:
+        if force["at"] is not None:
+            arrow(force, 0.1 * size, FORCE)
+    for pair in marks.contacts:
+        if len(pair["points"]):
+            plotter.add_points(np.array(pair["points"]), color=CONTACT, point_size=5, render_points_as_spheres=True)
+    for measure in marks.measures:
+        plotter.add_points(np.array(measure["points"]), color=MEASURE, point_size=12, render_points_as_spheres=True)
+        if len(measure["points"]) == 2:
+            plotter.add_mesh(pv.Line(*measure["points"]), color=MEASURE, line_width=2)
