@@ -7,12 +7,10 @@ import pytest
 import trimesh
 from rich.console import Console
 from scipy.spatial.transform import Rotation
-from scipy.stats import binom
 
 import tolcontact as tc
 from tests import cases
 from tests.cases import Frame, toleranced
-from tests.cases.fasteners import fasteners
 from tests.cases.round_contact import BARREL
 from tolcontact.discretization import discretize
 from tolcontact.discretization.shapes import shape
@@ -231,46 +229,6 @@ def test_a_feature_follows_the_datums_that_it_refers_to():
     points = Rotation.from_rotvec((1e-3, 0, 0)).apply([[50, 0, 10], [50, 50, 10], [50, 0, 5.0 + 5], [50, 0, 0]])
     top_slope, side_slope = points[1][2] - points[0][2], points[2][1] - points[3][1]
     assert np.sign(top_slope * -side_slope) == np.sign(tilts * side_tilt)[0]  # outward of the side is -y
-
-
-def test_a_pocket_of_four_freedoms():
-    """CASES C5: P(gap < 0) = 5.22305 % exact."""
-    t = 0.31
-    a = tc.Assembly("pocket")
-    corners = {}
-    for name, length in (("male", 99.8), ("pocket", 100.0)):
-        part = a.part(name, tc.Box(length, 10, 5), fixed=True)
-        part.feature("stop", part.face("-x"), datum="A")
-        # Equal spreads t / 6 of the offset and of both tilts; the second tilt does nothing in the middle of the face.
-        wall = part.feature("wall", part.face("+x"), tc.Position(t / 6 * 11.7683, "A"))
-        corners[name] = [wall.point(length, y, 2.5) for y in (0, 10)]
-    for k in (0, 1):
-        a.measure(f"gap {k}", corners["male"][k], to=corners["pocket"][k], along="x")
-    gaps = tc.run(a, samples=400_000, surfaces=0, fields="none", keep="measures").measured.sel(state="raw").values.min(axis=1)
-    low, high = binom.interval(0.9999, len(gaps), 0.0522305)
-    assert low < (gaps < 0).sum() < high
-    assert gaps.mean() == pytest.approx(0.14170, abs=1e-3) and gaps.std() == pytest.approx(0.08532, abs=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("is_fixed", "pull", "distance", "without_float"),
-    [(True, -3, 47, 48.5), (True, 3, 53, 51.5), (False, -3, 46, 48), (False, 3, 54, 52)],
-)
-def test_extremes_of_fasteners(is_fixed, pull, distance, without_float):
-    """CASES C4, with float by contact: all features at the ends of their zones."""
-    program = tc.build(fasteners(is_fixed, pull), solver="daqp")
-    plate, share = ("thread", 0.25) if is_fixed else ("hole", 0.5)
-    sign = np.sign(pull)
-    at = {
-        f"plate.left {plate}.shift x": -sign * share,
-        f"plate.right {plate}.shift x": sign * share,
-        "left.hole.shift x": sign / 2,
-        "right.hole.shift x": -sign / 2,
-    }
-    labels = program.nominal.contributors
-    assert set(at) <= set(labels)
-    block = simulate_block(program, np.array([[at.get(label, 0.0) for label in labels]]))
-    assert block.measured[0, 1] == pytest.approx([distance, without_float], abs=1e-9)
 
 
 @pytest.mark.parametrize("hole", [tc.Brep((19.05, 15.0, 1)), tc.Cylinder(inner=True, radius=4.05)], ids=["B-rep", "kind"])

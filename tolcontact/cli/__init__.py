@@ -2,20 +2,24 @@
 
     tolcontact new NAME                                  write a small model with comments, to begin with
     tolcontact check MODEL.py                            list every fault of a model; run nothing
+    tolcontact check MODEL.py --view                     also open the page of `view`, with faults marked
     tolcontact check MODEL.py --population 1000          draw features, and print how many are inside their zones
     tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
     tolcontact run MODEL.py --out FILE.nc                simulate into an archive
     tolcontact summary FILE.nc [--json | --csv]          print the summary of an archive
+    tolcontact summary FILE.nc --limits                  only how measures keep within their limits
     tolcontact report FILE.nc [--out FILE.html]          write it as one page, with the assembly to turn, and charts
     tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
     tolcontact compare MODEL.py --resolution linearized,exact
+    tolcontact compare A.nc B.nc [--report FILE.html]    runs side by side, from the same draws or not
     tolcontact view MODEL.py | FILE.stp                  look at it before any run: faces with the words that choose them
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
     tolcontact --version
 
-`tolcontact COMMAND --help` lists the options. A script with `tc.main(assembly)` under its main guard takes those of `run`.
-Results go to stdout; progress, warnings and errors go to stderr. `compare` prints JSON with `--json`, and writes netCDF with
+`tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` completes them in the shell. A script with `tc.main(assembly)` under its main guard takes those of `run`.
+Results go to stdout; progress, warnings and errors go to stderr: a bar with rate and time left in a terminal, elsewhere a line
+every ten seconds, nothing with `--quiet`. Tables are as wide as the terminal lets them be, and never cut in files and pipes. `compare` prints JSON with `--json`, and writes netCDF with
 `--out`.
 
 | option of `run` | |
@@ -26,6 +30,7 @@ Results go to stdout; progress, warnings and errors go to stderr. `compare` prin
 | `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
 | `--keep measures`, `poses` or `all` | what is archived of each realization |
 | `--fields` | how many realizations the magnitudes of displacement fields cover: a number, `some`, `all` or `none` |
+| `--quiet` | no progress, no notices |
 | `--report FILE.html` | also write the page that `report` writes |
 | `--surfaces` | how many realizations are checked between contact points, 64 by default |
 

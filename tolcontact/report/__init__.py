@@ -1,4 +1,4 @@
-"""Report: summaries and comparisons as tables for a terminal. A chapter of the guide.
+"""Report: tables for a terminal, pages for a browser, and what notebooks show. A chapter of the guide.
 
 `summary_text`, `comparison_text`, `runs_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare`,
 `tc.compare_runs` and `tc.check_population` into something that rich prints. Tables fit into 80 columns, or take what a wider
@@ -22,7 +22,8 @@ variation simulation of stand: 1000 realizations
 sent like any file: the assembly to turn, with fields, single realizations and sections; histograms with limits, and how
 estimates settle; measures against contributors; contact, certificates, and how the run was made.
 `write_view` (`tolcontact view`) writes the assembly before any run: faces with the words that choose them, locators, contact
-points, and nominal gaps. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes runs side by side.
+points, and nominal gaps. In a notebook a declared assembly and a program show this page; a summary shows its tables, and
+`results.tolcontact` the report. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes runs side by side.
 
 How to read the text:
 

@@ -1,4 +1,4 @@
-"""The whole flow from Python: run, build, check, compare, summarize. A chapter of the guide.
+"""The whole flow from Python: run, build, check, compare, summarize, and verbs on results. A chapter of the guide.
 
 All of them accept a model as an assembly, as the function that declares it, or as the path of its script.
 
@@ -54,6 +54,17 @@ intervals narrow; others as independent ones.
 
 `tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside
 of every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
+
+What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
+
+>>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
+(500, 4)
+>>> str(results.tolcontact.realization(17).status_meaning.values)
+'resolved'
+>>> results.tolcontact.where_status("not_assemblable").sizes["realization"]
+0
+
+`results.tolcontact.plot` has the pictures of `tolcontact.plot`.
 
 `tc.summarize` gives the statistics of results, or of the archive of that path (see `tolcontact.statistics`).
 

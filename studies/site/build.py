@@ -1,0 +1,108 @@
+"""The site: guide and reference from docstrings, a gallery of the models, and every problem with a known answer, computed anew.
+
+python -m studies.site.build FOLDER [--samples N]
+"""
+
+import argparse
+import ast
+import inspect
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import markupsafe
+import pdoc
+from PIL import Image
+
+import tolcontact as tc
+from studies.verification.problems import PROBLEMS, Problem
+from studies.verification.verify import COLUMNS, row
+from tolcontact.report.html import summary_table
+from tolcontact.report.html.page import HERE as REPORT
+
+HERE = Path(__file__).resolve().parent
+MODELS = HERE.parents[1] / "models"
+LINES = 10  # of a model
+REFERENCE = (
+    "tolcontact",
+    *(
+        f"tolcontact.{chapter}"
+        for chapter in (
+            "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics",
+            "archive", "report", "workflow", "cli", "testing",
+        )
+    ),
+)  # fmt: skip
+
+
+def models() -> list[Path]:
+    """Scripts that declare a model."""
+    return [path for path in sorted(MODELS.glob("*.py")) if "def assembly(" in path.read_text(encoding="utf-8")]
+
+
+def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
+    """A model: its question, a picture, its first lines, and its answer."""
+    text = path.read_text(encoding="utf-8")
+    question, _, rest = (ast.get_docstring(ast.parse(text)) or "").partition("\n\n")
+    results = tc.run(path, samples=samples, seed=1, solver="daqp", surfaces=0, fields="none")
+    plotter = tc.plot.assembly(results, opacity=0.75)
+    Image.fromarray(plotter.screenshot(None, return_img=True, window_size=(900, 600))).quantize(128).save(
+        folder / f"{path.stem}.png"
+    )
+    plotter.close()
+    body = text[text.index("def assembly(") :].splitlines()
+    return {
+        "name": path.stem,
+        "question": question.replace("\n", " "),
+        "text": rest.replace("\n", " "),
+        "picture": f"{path.stem}.png",
+        "lines": "\n".join([*body[:LINES], "    ..."]),
+        "answer": markupsafe.Markup(summary_table(results.tolcontact.summary())),
+    }
+
+
+def computed(problem: Problem) -> dict[str, Any]:
+    """A problem with its figures."""
+    rows = [row(figure) for figure in problem.figures()]
+    return {"number": problem.number, "name": problem.name, "text": problem.text, "rows": rows}
+
+
+def build(folder: Path, samples: int, scripts: Sequence[Path], problems: Sequence[Problem] = PROBLEMS) -> None:
+    """The pages of these models and problems, into a folder that need not be there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    pdoc.render.configure(show_source=False)
+    pdoc.pdoc(*REFERENCE, output_directory=folder / "reference")
+    found = [computed(problem) for problem in problems]
+    figures = [line for problem in found for line in problem["rows"]]
+    differ = sum(line[-1] == "DIFFERS" for line in figures)
+    _write(
+        folder / "verification.html", "Verification",
+        f"{len(figures)} figures of {len(found)} problems, computed anew by tolcontact {tc.__version__}; {differ} of them "
+        "differ from what is expected. Bounds of estimates cover 99.9 % of runs; other bounds are tolerances.", problems=found,
+    )  # fmt: skip
+    _write(
+        folder / "gallery.html", "Gallery",
+        f"What each model asks, and what {samples} realizations answer, without contact (raw) and with it (corrected).",
+        models=[shown(path, folder, samples) for path in scripts],
+    )  # fmt: skip
+    _write(folder / "index.html", "tolcontact", inspect.getdoc(tc).partition("\n\n")[0])
+
+
+def _write(path: Path, title: str, said: str, **things: Any) -> None:
+    environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True)
+    style = markupsafe.Markup((REPORT / "page.css").read_text(encoding="utf-8"))
+    page = environment.get_template("pages.html.j2").render(title=title, said=said, style=style, columns=COLUMNS, **things)
+    path.write_text(page, encoding="utf-8")
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("folder", type=Path)
+    options.add_argument("--samples", type=int, default=1000)
+    chosen = options.parse_args()
+    build(chosen.folder, chosen.samples, models())
+
+
+if __name__ == "__main__":
+    main()
