@@ -17,10 +17,11 @@
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
     tolcontact --version
 
-`tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` completes them in the shell. A script with `tc.main(assembly)` under its main guard takes those of `run`.
-Results go to stdout; progress, warnings and errors go to stderr: a bar with rate and time left in a terminal, elsewhere a line
-every ten seconds, nothing with `--quiet`. Tables are as wide as the terminal lets them be, and never cut in files and pipes. `compare` prints JSON with `--json`, and writes netCDF with
-`--out`.
+`tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` completes them in the shell. A
+script with `tc.main(assembly)` under its main guard takes those of `run`. Results go to stdout; progress, warnings and errors
+go to stderr: a bar with rate and time left in a terminal, elsewhere a line every ten seconds, nothing with `--quiet`. Tables
+are as wide as the terminal lets them be, and never cut in files and pipes. `compare` prints JSON with `--json`, and writes
+netCDF with `--out`.
 
 | option of `run` | |
 |---|---|
