@@ -102,4 +102,20 @@ def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
     place = opened.evaluate("new THREE.Vector3(50, 25, 20).project(stage.camera).toArray()")
     opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
     said = opened.locator("#said").inner_text()
-    assert said.startswith("part box\n") and said.endswith('face("+z")')
+    assert said.startswith("part box\n") and 'face("+z")\npoint(' in said and said.endswith("on it")
+
+
+@needs_browser
+def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa: F811
+    a = tc.Assembly("box")
+    a.part("box", tc.Box(100, 50, 20), at=(30, -20, 5), rotation=(0, 0, np.pi / 2))
+    write_view(a, None, [], tmp_path / "box.html")
+    opened = open_page(tmp_path / "box.html")
+    box = opened.locator("#scene").bounding_box()
+    for own in ((99.5, 0.5, 20), (50, 25, 20)):
+        at = [30 - own[1], -20 + own[0], 5 + own[2]]  # turned to the left
+        place = opened.evaluate(f"new THREE.Vector3(...{at}).project(stage.camera).toArray()")
+        opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
+        words = opened.locator("#said").inner_text().splitlines()[-1]
+        found = [float(x) for x in re.search(r"point\((.*)\)", words)[1].split(", ")]
+        assert found == pytest.approx([100, 0, 20] if own[1] < 1 else own, abs=0.3) and ("on it" in words) == (own[1] > 1)

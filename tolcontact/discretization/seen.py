@@ -19,11 +19,13 @@ SLIGHT = 1e-6  # of a direction, and of a part's size
 class SeenPart(NamedTuple):
     """Triangles in the nominal assembly: vertices (vertex, 3) [mm], faces (triangle, 3); and what they belong to.
 
+    rotation   (3, 3) of the part
     face_of    (triangle,) numbers of faces from 0: of a STEP file's, or smooth pieces
     described  the faces, and
     words      how a script chooses each
     """
 
+    rotation: np.ndarray
     vertices: np.ndarray
     faces: np.ndarray
     face_of: np.ndarray
@@ -39,10 +41,11 @@ def seen(part: Part) -> SeenPart | None:
         mesh = shape(part.geometry).mesh
     except GeometryFault:
         return None
-    vertices = np.asarray(mesh.vertices) @ Rotation.from_rotvec(part.rotation).as_matrix().T + np.array(part.at)
+    R = Rotation.from_rotvec(part.rotation).as_matrix()
+    vertices = np.asarray(mesh.vertices) @ R.T + np.array(part.at)
     face_of, _ = numbered(mesh)
     faces = described(mesh)
-    return SeenPart(vertices, np.asarray(mesh.faces), face_of, faces, tuple(_words(mesh, face_of, face) for face in faces))
+    return SeenPart(R, vertices, np.asarray(mesh.faces), face_of, faces, tuple(_words(mesh, face_of, face) for face in faces))
 
 
 def _words(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:

@@ -66,8 +66,18 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
 
 def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
     """The view of a model before any run; `nominal` is None if it has faults."""
-    values = {"title": assembly.name, "faults": faults, "pairs": gaps_in_words(nominal)}
+    values = {
+        "title": assembly.name,
+        "faults": faults,
+        "pairs": gaps_in_words(nominal),
+        "file": _file(assembly, nominal, faults),
+    }
     return _page("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []})
+
+
+def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
+    """The file that all parts were taken from, if nothing else is declared yet."""
+    return "" if nominal or faults or not assembly.parts else Path(str(getattr(assembly.parts[0].geometry, "source", ""))).name
 
 
 def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> str:

@@ -49,6 +49,7 @@ class Stage {
       contacts: this.contacts(),
       points: this.points(),
     };
+    this.axes();
     this.look();
     new ResizeObserver(() => this.resize()).observe(this.canvas.parentElement);
     this.resize();
@@ -103,6 +104,20 @@ class Stage {
     });
     this.scene.add(group);
     return group;
+  }
+
+  /** The axes of the assembly, beside it. */
+  axes() {
+    const length = 0.12 * this.size, start = this.box.min.clone().addScalar(-0.04 * this.size);
+    ["x", "y", "z"].forEach((name, k) => {
+      const end = start.clone();
+      end.setComponent(k, end.getComponent(k) + length);
+      const line = new THREE.BufferGeometry().setFromPoints([start, end]);
+      this.scene.add(new THREE.LineSegments(line, new THREE.LineBasicMaterial({ color: "#5b6470" })));
+      const label = this.label(name, end.toArray());
+      label.center.set(0.5, 0.5);
+      this.scene.add(label);
+    });
   }
 
   points() {

@@ -2,6 +2,7 @@
 // The view before any run: faces are picked, and the words that choose them in a script are shown.
 
 const TOUCHING = 1e-6; // mm
+const NEAR = 0.03; // of the assembly: a corner that is so near is meant
 
 function pick(stage) {
   const ray = new THREE.Raycaster(), place = new THREE.Vector2();
@@ -22,7 +23,7 @@ function pick(stage) {
 function choose(stage, part, hit) {
   stage.paint("", 3, CORRECTED);
   if (!part) {
-    byId("said").textContent = "Click on a face for the words that choose it.";
+    byId("said").textContent = "Click on a face for the words that choose it, and the point.";
     return;
   }
   const known = data.scene.parts[stage.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
@@ -33,7 +34,19 @@ function choose(stage, part, hit) {
   });
   colour.needsUpdate = true;
   stage.draw();
-  byId("said").textContent = [`part ${part.name}`, face.said, face.words].join("\n");
+  byId("said").textContent = [`part ${part.name}`, face.said, face.words, pointAt(known, part, hit)].join("\n");
+}
+
+/** The words for the corner of the triangle next to a hit, if it is near, else for the hit, in the part's own frame. */
+function pointAt(known, part, hit) {
+  const place = part.mesh.geometry.getAttribute("position");
+  const corners = [0, 1, 2].map((corner) => new THREE.Vector3().fromBufferAttribute(place, 3 * hit.faceIndex + corner));
+  const nearest = corners.reduce((one, other) => (other.distanceTo(hit.point) < one.distanceTo(hit.point) ? other : one));
+  const isNear = nearest.distanceTo(hit.point) < NEAR * stage.size;
+  const [a, b] = [(isNear ? nearest : hit.point).toArray(), known.placement];
+  const off = a.map((x, k) => x - b[9 + k]);
+  const own = [0, 1, 2].map((k) => off[0] * b[k] + off[1] * b[3 + k] + off[2] * b[6 + k]); // R transposed
+  return `point(${own.map((x) => Number(x.toFixed(3)) + 0).join(", ")})${isNear ? "" : " on it"}`;
 }
 
 function gaps(stage) {

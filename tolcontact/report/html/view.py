@@ -42,6 +42,7 @@ def _parts(assembly: Assembly, faulty: set[str]) -> Iterator[Drawn]:
         yield {
             "name": part.name,
             "faulty": part.name in faulty,
+            "placement": [*own.rotation.ravel().tolist(), *part.at],
             "vertices": packed(own.vertices),
             "faces": packed(own.faces, "i4"),
             "faceOfTriangle": packed(own.face_of, "i4"),
