@@ -10,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from models import ra1
-from tests.helpers import COMMAND, model_in, run, script
+from tests.helpers import COMMAND, call, model_in, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.archive import inspection
@@ -85,10 +85,14 @@ def resume(program, path):
 def test_the_command_refuses_with_code_2(name, good, tmp_path):
     path = tmp_path / "hostile.nc"
     make(good, path, name)
-    done, model = (run(command, timeout=30) for command in ([*COMMAND, "summary", path], script("model_of", path)))
+    done = run([*COMMAND, "summary", path], timeout=30) if name in CRASHES else call(tmp_path, "summary", path)
     assert "Traceback" not in done.stderr and "\x1b" not in done.stdout + done.stderr
     assert done.returncode == (0 if name in ("runs tests",) else 2), done.stderr
-    assert "ArchiveError" in model.stderr.splitlines()[-1]
+    if name in CRASHES:
+        assert "ArchiveError" in run(script("model_of", path), timeout=30).stderr.splitlines()[-1]
+        return
+    with pytest.raises(ArchiveError):
+        model_in(path)
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -37,7 +37,7 @@ NEVER = {
 ORDER = (
     "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
     "compiled", "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation",
-    "statistics", "archive", "report", "plot", "workflow", "recomputed", "testing", "cli", "__init__", "__main__",
+    "recomputed", "statistics", "archive", "report", "plot", "workflow", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Gaps of round faces from what an archive holds of them, another way than the simulation computes them.
+"""Gaps from what an archive holds alone, another way than the simulation computes them.
 
 The distance of a ball from a wall is that of its centre, less its radius. A shaft inside a wall is as far from it as its end is
 from the nearest of the wall's tangent planes: here all directions are tried, and the nearest one is narrowed down.
@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
+import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as words
@@ -15,6 +16,11 @@ from tolcontact import vocabulary as words
 DIRECTIONS = 72  # that are tried
 NARROWINGS = 60
 GOLDEN = (np.sqrt(5) - 1) / 2
+Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
+
+
+class NotKeptError(LookupError):
+    """The archive does not keep what gaps are computed from."""
 
 
 def archived_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[ArchivedPoint]":
@@ -150,3 +156,76 @@ class ArchivedFaces:
                 inward = self._sample[words.LOCATOR_DIRECTION.name][locator]
                 found[:, place] += self.height(face, deviations) - (tau + np.cross(rho, arm)) @ inward
         return found
+
+
+class ArchivedPair:
+    """The nominal contact points of a pair, and where the archived poses put them.
+
+    places   (point,): which of the archived contact points have gaps, numbers from the pair's first one on
+    """
+
+    def __init__(self, tree: xr.DataTree, pair: int) -> None:
+        contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
+        own = contact[words.PAIR_OF_POINT.name] == pair
+        points = (words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL)
+        self.moving_point, self.reference_point, self.normal = (contact[variable.name][own] for variable in points)
+        self.moving_part, self.reference_part = (
+            int(contact[variable.name][pair]) for variable in (words.MOVING_PART, words.REFERENCE_PART)
+        )
+        self.locators = contact[words.LOCATOR_OF_POINT.name][own]
+        self.round = archived_points(contact, np.flatnonzero(own))
+        sample = {str(name): values.values for name, values in tree.children["sample"].to_dataset().data_vars.items()}
+        self.faces = ArchivedFaces(contact, sample)
+        self.moving_face, self.reference_face = (
+            int(contact[variable.name][pair]) if variable.name in contact else -1
+            for variable in (words.FACE_OF_MOVING, words.FACE_OF_REFERENCE)
+        )
+        self.places = np.arange(own.sum())
+        if self.round:
+            of_round = contact[words.POINT_OF_ROUND.name]
+            self.places = of_round[np.isin(of_round, np.flatnonzero(own))] - np.flatnonzero(own)[0]
+        self.facing = contact[words.FACING.name][own] if words.FACING.name in contact else None
+
+    @property
+    def _is_drawn(self) -> bool:
+        """Whether deviations matter beside poses."""
+        return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
+
+    def gaps(self, rows: Rows, some: slice) -> np.ndarray:
+        """Gaps (realization, state, point) [mm] of some realizations, at the `places`.
+
+        Raises NotKeptError, with the name of a variable that they need and the archive does not have.
+        """
+        moving, reference = (_pose(rows, some, part) for part in (self.moving_part, self.reference_part))
+        drawn = _needed(rows, words.DEVIATION.name, some) if self._is_drawn else np.zeros((1, 0))
+        R_m, t_m = self.faces.placed(self.moving_face, drawn, *moving)
+        R_r, t_r = self.faces.placed(self.reference_face, drawn, *reference)
+        of_moving, of_reference = (self.faces.height(face, drawn) for face in (self.moving_face, self.reference_face))
+        if self.round:
+            turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
+            apart = np.einsum("...ij,...j->...i", turn, t_m - t_r)
+            grown = (of_moving[:, None], of_reference[:, None])
+            return np.stack([point.gaps(turn @ R_m, apart, *grown) for point in self.round], axis=-1)
+        moving = self.moving_point @ R_m.swapaxes(-1, -2) + t_m[..., None, :]
+        reference = self.reference_point @ R_r.swapaxes(-1, -2) + t_r[..., None, :]
+        normal = self.normal @ R_r.swapaxes(-1, -2)
+        gaps = ((moving - reference) * normal).sum(axis=-1) / np.linalg.norm(normal, axis=-1)
+        if self.facing is not None:
+            gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
+        supports = self.locators >= 0
+        if supports.any():
+            gaps[..., supports] -= self.faces.held(self.locators[supports], drawn)[:, None]
+        return np.asarray(gaps)
+
+
+def _pose(rows: Rows, some: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
+    """R (realization, state, 3, 3) and t (realization, state, 3) [mm]; of the ground, part -1, one that moves nothing."""
+    if part < 0:
+        return np.eye(3)[None, None], np.zeros((1, 1, 3))
+    return _needed(rows, words.ROTATION.name, some)[:, :, part], _needed(rows, words.TRANSLATION.name, some)[:, :, part]
+
+
+def _needed(rows: Rows, name: str, some: slice) -> np.ndarray:
+    if name not in rows:
+        raise NotKeptError(f'"{name}"')
+    return np.asarray(rows[name][some].values)

@@ -13,7 +13,7 @@
 """
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +22,9 @@ import xarray as xr
 from tolcontact import vocabulary as words
 from tolcontact.archive import open_archive
 from tolcontact.errors import OptionError
-from tolcontact.recomputed import ArchivedFaces, archived_points
+from tolcontact.recomputed import ArchivedPair, NotKeptError, Rows
 
 Results = xr.DataTree | str | Path
-Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
 FIRST = 5  # realizations that a message names
 AT_ONCE = 500_000  # gaps that are computed at once
 
@@ -63,11 +62,11 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
         archived, held = rows[words.GAP_MIN.name], _holds_its_points(rows)
         largest, place = 0.0, ""
         for number, name in enumerate(archived[words.PAIR].values):
-            pair = _Pair(tree, number)
+            pair = ArchivedPair(tree, number)
             at_once = max(1, AT_ONCE // len(pair.normal))
             for start in range(0, len(held), at_once):
                 some = slice(start, start + at_once)
-                apart = np.abs(pair.least_gaps(rows, some) - archived[some, :, number].values)[held[some]]
+                apart = np.abs(_least_gaps(pair, rows, some) - archived[some, :, number].values)[held[some]]
                 apart[np.isnan(apart)] = np.inf
                 if apart.max(initial=0.0) > largest:
                     largest = float(apart.max())
@@ -151,67 +150,14 @@ def _holds_its_points(rows: Rows) -> np.ndarray:
     return np.asarray(held)
 
 
-class _Pair:
-    """The nominal contact points of a pair, and where the archived poses put them."""
-
-    def __init__(self, tree: xr.DataTree, pair: int) -> None:
-        contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
-        own = contact[words.PAIR_OF_POINT.name] == pair
-        points = (words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL)
-        self.moving_point, self.reference_point, self.normal = (contact[variable.name][own] for variable in points)
-        self.moving_part, self.reference_part = (
-            int(contact[variable.name][pair]) for variable in (words.MOVING_PART, words.REFERENCE_PART)
-        )
-        self.locators = contact[words.LOCATOR_OF_POINT.name][own]
-        self.round = archived_points(contact, np.flatnonzero(own))
-        sample = {str(name): values.values for name, values in tree.children["sample"].to_dataset().data_vars.items()}
-        self.faces = ArchivedFaces(contact, sample)
-        self.moving_face, self.reference_face = (
-            int(contact[variable.name][pair]) if variable.name in contact else -1
-            for variable in (words.FACE_OF_MOVING, words.FACE_OF_REFERENCE)
-        )
-        self.facing = contact[words.FACING.name][own] if words.FACING.name in contact else None
-
-    @property
-    def _is_drawn(self) -> bool:
-        """Whether deviations matter beside poses."""
-        return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
-
-    def least_gaps(self, rows: Rows, some: slice) -> np.ndarray:
-        """The least gaps (realization, state) [mm] of some realizations."""
-        moving, reference = (_pose(rows, some, part) for part in (self.moving_part, self.reference_part))
-        drawn = _needed(rows, words.DEVIATION.name, some) if self._is_drawn else np.zeros((1, 0))
-        R_m, t_m = self.faces.placed(self.moving_face, drawn, *moving)
-        R_r, t_r = self.faces.placed(self.reference_face, drawn, *reference)
-        of_moving, of_reference = (self.faces.height(face, drawn) for face in (self.moving_face, self.reference_face))
-        if self.round:
-            turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
-            apart = np.einsum("...ij,...j->...i", turn, t_m - t_r)
-            grown = (of_moving[:, None], of_reference[:, None])
-            return np.asarray(np.min([point.gaps(turn @ R_m, apart, *grown) for point in self.round], axis=0))
-        moving = self.moving_point @ R_m.swapaxes(-1, -2) + t_m[..., None, :]
-        reference = self.reference_point @ R_r.swapaxes(-1, -2) + t_r[..., None, :]
-        normal = self.normal @ R_r.swapaxes(-1, -2)
-        gaps = ((moving - reference) * normal).sum(axis=-1) / np.linalg.norm(normal, axis=-1)
-        if self.facing is not None:
-            gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
-        supports = self.locators >= 0
-        if supports.any():
-            gaps[..., supports] -= self.faces.held(self.locators[supports], drawn)[:, None]
-        return np.asarray(gaps.min(axis=-1))
-
-
-def _pose(rows: Rows, some: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
-    """R (realization, state, 3, 3) and t (realization, state, 3) [mm]; of the ground, part -1, one that moves nothing."""
-    if part < 0:
-        return np.eye(3)[None, None], np.zeros((1, 1, 3))
-    return _needed(rows, words.ROTATION.name, some)[:, :, part], _needed(rows, words.TRANSLATION.name, some)[:, :, part]
-
-
-def _needed(rows: Rows, name: str, some: slice) -> np.ndarray:
-    if name not in rows:
-        raise AssertionError(f'gaps cannot be computed again without "{name}", which was not kept: tc.run(..., keep="all")')
-    return np.asarray(rows[name][some].values)
+def _least_gaps(pair: ArchivedPair, rows: Rows, some: slice) -> np.ndarray:
+    """The least gaps (realization, state) [mm] of some realizations."""
+    try:
+        return np.asarray(pair.gaps(rows, some).min(axis=-1))
+    except NotKeptError as error:
+        raise AssertionError(
+            f'gaps cannot be computed again without {error}, which was not kept: tc.run(..., keep="all")'
+        ) from error
 
 
 def _difference(name: str, one: Rows, other: Rows, numbers: np.ndarray) -> str:

@@ -40,6 +40,16 @@ run; its statistics are NaN, and the table shows "-". Statistics always cover al
 >>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence
 True
 
+Of contact it holds the share of realizations in which each pair carries, the mean and percentiles of its reaction (in the units
+of the objective: N only where it is the locators' stiffness or forces), and which pairs carry together. How points share a
+reaction is not unique where faces lie flat on each other; which points touch is. `results.tolcontact.touching()` looks at them
+in the first 2048 realizations.
+
+>>> round(float(summary.carried.sel(pair="interface", interval="estimate")), 2)
+0.9
+>>> results.tolcontact.touching().touching.dims
+('point', 'interval')
+
 The summary also holds the number of realizations of each status, the pairs in conflict, the largest penetration at contact
 points and between surfaces, and the number of steps: see `tc.summarize`, or `print(summary)`.
 
@@ -60,7 +70,8 @@ each point.
 """
 
 from tolcontact.statistics.comparison import compare_runs
+from tolcontact.statistics.contacts import touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
 from tolcontact.statistics.summary import Summary, summarize
 
-__all__ = ["BlockSums", "DisplacementFields", "Summary", "compare_runs", "summarize"]
+__all__ = ["BlockSums", "DisplacementFields", "Summary", "compare_runs", "summarize", "touching"]

@@ -9,7 +9,7 @@ from tolcontact import vocabulary as words
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import picture_of
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import capability, intervals
+from tolcontact.statistics import capability, contacts, intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
 from tolcontact.statistics.shape import kurtosis, skewness
@@ -39,6 +39,9 @@ def summarize(results: xr.DataTree) -> Summary:
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations
+    carried         (pair, interval)                     share of realizations in which a pair carries
+    reaction        (pair, of_reaction, interval)        mean and percentiles of its reaction, in the objective's units
+    together        (combination, interval)              share of realizations in which just these pairs carry
     iterations      (of_iterations)                      median and largest number of linear steps of those touched
     field_extreme   (part, state, extreme, interval)     least and largest 6 sigma of the displacement magnitude [mm]
     field_realizations                                   number of realizations in the displacement fields,
@@ -57,7 +60,7 @@ def summarize(results: xr.DataTree) -> Summary:
     changes = np.array([_change(raw, corrected) for raw, corrected in samples])
     by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total = int(by_status.sum())
-    parts = rows[words.PART].values
+    parts, together = rows[words.PART].values, contacts.combinations(rows)
     return Summary(
         {
             "statistic_value": ((words.MEASURE, words.STATE, words.STATISTIC, words.INTERVAL), values),
@@ -69,6 +72,16 @@ def summarize(results: xr.DataTree) -> Summary:
                 np.array(intervals.share_of(by_status[words.Status.NOT_ASSEMBLABLE], total)),
             ),
             "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0)),
+            "carried": ((words.PAIR, words.INTERVAL), contacts.carried(rows)),
+            "reaction": (
+                (words.PAIR, words.OF_REACTION, words.INTERVAL),
+                contacts.reactions(rows),
+                {"units": rows[words.REACTION.name].attrs.get("units", "1")},
+            ),
+            "together": (
+                (words.COMBINATION, words.INTERVAL),
+                np.array([intervals.share_of(n, total) for _, n in together]).reshape(-1, len(words.ESTIMATE)),
+            ),
             "iterations": ((words.OF_ITERATIONS,), _iterations(rows)),
             "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
             **_checked(results),
@@ -89,6 +102,8 @@ def summarize(results: xr.DataTree) -> Summary:
             words.STATUS_MEANING: list(words.STATUS_MEANINGS),
             words.PART: parts,
             words.PAIR: rows[words.PAIR].values,
+            words.OF_REACTION: list(words.REACTION_STATISTICS),
+            words.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in together],
             words.OF_ITERATIONS: list(words.MIDDLES),
             words.EXTREME: list(words.EXTREMES),
             "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),

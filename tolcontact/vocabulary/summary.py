@@ -12,4 +12,7 @@ EVERY_STATISTIC = (*STATISTICS, SKEWNESS, KURTOSIS, *SHARES, *CAPABILITY)
 SHIFT, SPREAD_RATIO, VARIANCE_RATIO = "shift of the mean", "ratio of 6 sigma", "ratio of variance"
 CHANGES = (SHIFT, SPREAD_RATIO, VARIANCE_RATIO)
 EXTREMES = ("least", "largest")
+REACTION_PERCENTILES = (5, 50, 95)
+OF_REACTION, COMBINATION = "of_reaction", "combination"
+REACTION_STATISTICS = ("mean", *(f"{percent} %" for percent in REACTION_PERCENTILES))  # labels of `of_reaction`
 MIDDLES = ("median", "largest")  # labels of `of_iterations`

@@ -11,7 +11,7 @@ from tolcontact import vocabulary as words
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.report.notebook import results_html
-from tolcontact.statistics import Summary
+from tolcontact.statistics import Summary, touching
 from tolcontact.workflow.run import summarize
 
 
@@ -86,6 +86,10 @@ class Results:
     def __repr__(self) -> str:
         verbs = "summary(), field(part), realization(number), where_status(status), plot.histogram(measure)"
         return f"{self._results.attrs.get('title', 'results')}: {verbs}"
+
+    def touching(self) -> xr.Dataset:
+        """Where contact points touch, and how often (see tolcontact.statistics.touching)."""
+        return touching(self._results)
 
     def _repr_html_(self) -> str:
         return results_html(self._results, self.summary())

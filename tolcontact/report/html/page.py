@@ -18,7 +18,7 @@ from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
 from tolcontact.report.html.view import gaps_in_words, view_of
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells
+from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells, pair_columns, pair_rows
 from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
@@ -49,7 +49,7 @@ def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, pa
 def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
     """The report of a run, whose summary is given."""
     shown = shown_of(results)
-    scene = scene_of(results, shown)
+    scene = scene_of(results, summary, shown)
     values = {
         "title": summary.attrs["title"],
         "realizations": grouped(summary.attrs["realizations"]),
@@ -57,6 +57,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
         "overview": _overview(summary),
         "details": _details(summary),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
+        "pairs": {"columns": pair_columns(summary), "rows": pair_rows(summary)} if summary.sizes["pair"] else None,
         "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
         "missing": _missing(scene),
     }

@@ -1,6 +1,8 @@
 "use strict";
 // The report: fields and single realizations in the scene, and charts with plotly.
 
+const OF_CONTACT = ["touching", "reaction"];
+
 function drive(stage) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
   const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
@@ -9,12 +11,14 @@ function drive(stage) {
   byId("single").disabled = byId("play").disabled = !one.rows.length;
 
   function painted() {
-    const range = stage.paint(byId("field").value, Number(byId("component").value), state());
+    const name = byId("field").value, isOfContact = OF_CONTACT.includes(name);
+    const bodies = stage.paint(isOfContact ? "" : name, Number(byId("component").value), state());
+    const points = stage.paintContacts(isOfContact ? name : ""), range = isOfContact ? points : bodies;
     byId("bar").hidden = !range;
     if (!range) return;
     byId("low").textContent = figure(range.low);
     byId("high").textContent = figure(range.high);
-    byId("units").textContent = "mm";
+    byId("units").textContent = { touching: "of realizations", reaction: data.scene.reactionUnits }[name] || "mm";
     byId("colours").style.background = `linear-gradient(to right, ${range.map.join(",")})`;
   }
 

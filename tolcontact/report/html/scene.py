@@ -10,13 +10,27 @@ from tolcontact.report.html.coarse import allowed, coarser
 from tolcontact.report.html.packed import Packed, packed
 from tolcontact.report.html.shown import Shown
 from tolcontact.report.marks import Marks, marks_of
+from tolcontact.statistics import touching
 
 Drawn = dict[str, Any]
 
 
-def scene_of(results: xr.DataTree, shown: list[Shown]) -> Drawn:
+def scene_of(results: xr.DataTree, summary: xr.Dataset, shown: list[Shown]) -> Drawn:
     """Everything in the nominal assembly frame [mm]; what an archive does not have is left out."""
-    return {"parts": _parts(results), **drawn_marks(marks_of(results)), "realizations": _realizations(results, shown)}
+    drawn = {"parts": _parts(results), **drawn_marks(marks_of(results)), "realizations": _realizations(results, shown)}
+    _add_contact(drawn["contacts"], results, summary)
+    return {**drawn, "reactionUnits": summary["reaction"].attrs["units"]}
+
+
+def _add_contact(pairs: list[Drawn], results: xr.DataTree, summary: xr.Dataset) -> None:
+    """How often each contact point touches, and what its pair carries."""
+    found = touching(results) if pairs else None
+    for pair in pairs:
+        if found is not None and found.attrs["realizations"]:
+            own = found["pair"].values == pair["name"]
+            pair["touching"] = packed(found["touching"].sel(interval="estimate").values[own])
+        mean = float(summary["reaction"].sel(pair=pair["name"], of_reaction="mean", interval="estimate"))
+        pair["reaction"] = mean if np.isfinite(mean) else None
 
 
 def drawn_marks(marks: Marks) -> Drawn:

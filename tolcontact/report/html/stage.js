@@ -25,6 +25,7 @@ const TABLES = new Map([VIRIDIS, DIVERGING].map((map) => [map, table(map)]));
 const GREYS = ["#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0"];
 const FAULTY = "#e38a84";
 const RAW = 0, CORRECTED = 1, DIFFERENCE = 2;
+const TOUCHED = "#0a7d4f";
 const RED = "#d01c1c";
 const MANY = 30_000; // triangles
 
@@ -96,7 +97,7 @@ class Stage {
     this.pairs = this.data.contacts.map((pair) => {
       const geometry = new THREE.BufferGeometry();
       geometry.setAttribute("position", new THREE.BufferAttribute(unpacked(pair.points).values, 3));
-      const material = new THREE.PointsMaterial({ color: "#0a7d4f", size: 4, sizeAttenuation: false, depthTest: false });
+      const material = new THREE.PointsMaterial({ color: TOUCHED, size: 4, sizeAttenuation: false, depthTest: false });
       const points = new THREE.Points(geometry, material);
       points.matrixAutoUpdate = false;
       group.add(points);
@@ -214,6 +215,30 @@ class Stage {
     return known.length && high >= low ? { low, high, map } : null;
   }
 
+  /** Colour contact points by what is known of them, and return its range; without it in their own colour. */
+  paintContacts(name) {
+    const known = name ? this.data.contacts.map((pair) => this.ofPoints(pair, name)) : [];
+    const every = known.flatMap((values) => Array.from(values || [])).filter(Number.isFinite);
+    const high = name === "touching" ? 1 : Math.max(0, ...every), colour = new THREE.Color();
+    this.pairs.forEach((pair, k) => {
+      const geometry = pair.points.geometry, own = every.length && known[k];
+      if (own) {
+        const colours = Array.from(own).flatMap((value) => (Number.isFinite(value) ? TABLES.get(VIRIDIS)[Math.round((255 * value) / (high || 1))] : colour.set("#7f8894").toArray()));
+        geometry.setAttribute("color", new THREE.BufferAttribute(Float32Array.from(colours), 3));
+      }
+      Object.assign(pair.material, { vertexColors: Boolean(own), size: own ? 7 : 4, needsUpdate: true });
+      pair.material.color.set(own ? "#ffffff" : TOUCHED);
+    });
+    this.draw();
+    return every.length ? { low: 0, high, map: VIRIDIS } : null;
+  }
+
+  /** A value for each contact point of a pair; null if the archive does not tell. */
+  ofPoints(pair, name) {
+    if (name === "touching") return pair.touching ? unpacked(pair.touching).values : null;
+    return Number.isFinite(pair.reaction) ? new Float32Array(pair.points.shape[0]).fill(pair.reaction) : null;
+  }
+
   /** Move the parts as in one realization, exaggerated by a factor; back to nominal without one. */
   move(motions, number, state, factor, penetrating) {
     this.parts.forEach((part, k) => {
@@ -223,7 +248,7 @@ class Stage {
     this.pairs.forEach((pair, k) => {
       pair.points.matrix.copy(this.parts[pair.part].group.matrix);
       pair.points.matrixWorldNeedsUpdate = true;
-      pair.material.color.set(penetrating && penetrating[k] ? RED : "#0a7d4f");
+      if (!pair.material.vertexColors) pair.material.color.set(penetrating && penetrating[k] ? RED : TOUCHED);
     });
     this.draw();
   }

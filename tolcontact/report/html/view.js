@@ -53,7 +53,7 @@ function gaps(stage) {
   data.scene.contacts.forEach((pair, k) => {
     const values = unpacked(pair.gaps).values, points = stage.pairs[k].points, colour = new THREE.Color();
     const colours = Float32Array.from(Array.from(values).flatMap((gap) =>
-      colour.set(gap < -TOUCHING ? RED : gap > TOUCHING ? "#2563eb" : "#0a7d4f").toArray()));
+      colour.set(gap < -TOUCHING ? RED : gap > TOUCHING ? "#2563eb" : TOUCHED).toArray()));
     points.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
     Object.assign(points.material, { vertexColors: true, needsUpdate: true });
     points.material.color.set("#ffffff");

@@ -58,6 +58,9 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
     yield Text("\ncontact", style="bold")
     for line in contact_lines(summary, count):
         yield Padding(Text(line), (0, 0, 0, 2), expand=False)
+    if summary.sizes["pair"]:
+        yield Text()
+        yield FigureTable(pair_columns(summary), pair_rows(summary))
 
 
 def capability_text(summary: xr.Dataset) -> Group:
@@ -141,6 +144,21 @@ def _field_table(summary: xr.Dataset) -> FigureTable:
             extremes = [number(of.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), state, *extremes])
     return FigureTable(["part", "state", "least", "largest"], rows)
+
+
+def pair_columns(summary: xr.Dataset) -> list[str]:
+    """The heading of `pair_rows`."""
+    units = summary["reaction"].attrs["units"]
+    return ["contact pair", "carries", f"mean reaction, {units}", "95th percentile"]
+
+
+def pair_rows(summary: xr.Dataset) -> list[list[str]]:
+    """How often each pair carries, and what."""
+    rows = []
+    for pair in summary["pair"].values:
+        mean, *_, high = summary["reaction"].sel(pair=pair).values
+        rows.append([str(pair), percent(summary["carried"].sel(pair=pair).values), number(mean), number(high)])
+    return rows
 
 
 def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:

@@ -1,0 +1,73 @@
+"""Where and how often contact is, against closed forms and the rows themselves."""
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tolcontact.report import write_page
+from tolcontact.statistics import contacts, touching
+
+
+def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
+    results = tc.run(cases.one_dimensional(0), samples=4000, seed=1, solver="daqp", surfaces=0)
+    _, lower, upper = results.tolcontact.summary().carried.sel(pair="seat").values
+    assert lower < 0.5 < upper and upper - lower < 0.04
+    found = results.tolcontact.touching()
+    share = (results["status"].values[: contacts.AT_MOST] == tc.Status.RESOLVED).mean()
+    assert found.attrs["realizations"] == contacts.AT_MOST and (found["pair"] == "seat").all()
+    assert np.abs(found["touching"].sel(interval="estimate") - share).max() < 1e-12
+
+
+def test_figures_are_those_of_the_rows():
+    results = tc.run(cases.stack(), samples=400, seed=2, solver="daqp", surfaces=0)
+    summary = tc.summarize(results)
+    reaction, carries = results["reaction"].values, results["carrying"].values > 0
+    of = summary["reaction"].sel(interval="estimate")
+    assert of.sel(of_reaction="mean").values == pytest.approx(reaction.mean(axis=0))
+    assert of.sel(of_reaction="95 %").values == pytest.approx(np.percentile(reaction, 95, axis=0))
+    assert summary["carried"].sel(interval="estimate").values == pytest.approx(carries.mean(axis=0))
+    together = summary["together"].sel(interval="estimate")
+    assert float(together.sum()) == pytest.approx(1)
+    assert float(together.sel(combination="lower joint + upper joint")) == pytest.approx(carries.all(axis=1).mean())
+    if "none" in together["combination"]:
+        assert float(together.sel(combination="none")) == pytest.approx((~carries.any(axis=1)).mean())
+
+
+@pytest.mark.parametrize("name", ["lid", "cover", "door"])
+def test_points_touch_where_the_least_gap_is_closed(name):
+    """A pair whose least gap is closed has a point that touches, and no other has."""
+    results = tc.run(cases.MODELS / f"{name}.py", samples=40, seed=3, solver="daqp", surfaces=0)
+    found, held = touching(results), results["searched"].values == 0
+    assert found.attrs["realizations"] == held.sum()
+    closed = (results["gap_min"].values[held, 1] < contacts.TOUCHES).mean(axis=0)
+    for pair, share in zip(results["pair"].values, closed, strict=True):
+        own = found["touching"].sel(interval="estimate").values[found["pair"].values == pair]
+        known = own[np.isfinite(own)]
+        assert known.max(initial=0) <= share + 1e-12 and known.sum() >= share - 1e-12
+
+
+def test_archives_without_poses_say_nothing_of_points():
+    results = tc.run(cases.stack(), samples=30, solver="daqp", keep="measures", surfaces=0)
+    found = touching(results)
+    assert found.attrs["realizations"] == 0 and np.isnan(found["touching"]).all()
+
+
+@needs_browser
+def test_the_page_shows_where_contact_is(tmp_path, open_page):  # noqa: F811 (a fixture)
+    results = tc.run(cases.ra1(), samples=200, solver="daqp", surfaces=0)
+    write_page(results, tc.summarize(results), tmp_path / "ra1.html")
+    opened = open_page(tmp_path / "ra1.html")
+    opened.select_option("#field", "touching")
+    assert opened.locator("#high").inner_text() == "1" and opened.locator("#units").inner_text() == "of realizations"
+    drawn = opened.evaluate("Array.from(stage.pairs[0].points.geometry.getAttribute('color').array.slice(0, 3))")
+    share = touching(results)["touching"].sel(interval="estimate").values[0]
+    table = opened.evaluate("TABLES.get(VIRIDIS)")
+    assert drawn == pytest.approx(table[round(255 * share)], abs=0.01)
+    opened.select_option("#field", "reaction")
+    mean = float(tc.summarize(results)["reaction"].sel(of_reaction="mean", interval="estimate").values[0])
+    assert float(opened.locator("#high").inner_text()) == pytest.approx(mean, rel=1e-3)
+    assert data_of((tmp_path / "ra1.html").read_text())["scene"]["reactionUnits"] == opened.locator("#units").inner_text()
+    opened.select_option("#field", "sixSigma")
+    assert opened.evaluate("stage.pairs[0].material.vertexColors") is False

@@ -1,0 +1,88 @@
+"""Where and how often contact is: pairs that carry, what they carry, and points that touch."""
+
+from collections import Counter
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.realizations import finished, pieces
+from tolcontact.recomputed import ArchivedPair, NotKeptError
+from tolcontact.statistics import intervals
+from tolcontact.statistics.sample import Sample
+
+TOUCHES = 1e-4  # mm: a point with a smaller gap touches
+AT_MOST = 2048  # realizations that points are looked at in
+AT_ONCE = 500_000  # gaps that are computed at once
+COMBINATIONS = 10  # of pairs that carry together
+
+
+def carried(rows: xr.Dataset) -> np.ndarray:
+    """Share of realizations in which each pair carries, (pair, interval)."""
+    counts = np.sum([(piece[words.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
+    total = rows.sizes[words.REALIZATION]
+    return np.array([intervals.share_of(int(k), total) for k in counts]).reshape(-1, len(words.ESTIMATE))
+
+
+def reactions(rows: xr.Dataset) -> np.ndarray:
+    """Mean and percentiles of the reaction of each pair over all realizations, (pair, of_reaction, interval)."""
+    found = []
+    for pair in range(rows.sizes[words.PAIR]):
+        of = rows[[words.REACTION.name]].isel({words.PAIR: pair})
+        x = Sample(lambda of=of: (np.asarray(piece[words.REACTION.name].values) for piece in pieces(of)))  # type: ignore[misc]
+        found.append([intervals.mean(x), *intervals.percentiles(x, words.REACTION_PERCENTILES)])
+    return np.array(found).reshape(-1, 1 + len(words.REACTION_PERCENTILES), len(words.ESTIMATE))
+
+
+def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
+    """Which pairs carry together, and in how many realizations: the most frequent ones."""
+    names, counts = [str(name) for name in rows[words.PAIR].values], Counter[tuple[bool, ...]]()
+    for piece in pieces(rows):
+        found, times = np.unique(piece[words.CARRYING.name].values > 0, axis=0, return_counts=True)
+        counts.update({tuple(own.tolist()): int(n) for own, n in zip(found, times, strict=True)})
+    most = counts.most_common(COMBINATIONS)
+    return [(tuple(name for name, carries in zip(names, own, strict=True) if carries), n) for own, n in most]
+
+
+def touching(results: xr.DataTree) -> xr.Dataset:
+    """Share of realizations in which each contact point touches, corrected, with its interval, from the archive alone.
+
+    touching   (point, interval): gaps below 1e-4 mm, in the first 2048 realizations at most, those whose points are archived;
+               NaN for points without gaps of their own
+    pair       (point) name of its pair
+    point      (point, axis) of the moving part, nominal [mm]
+
+    The attribute `realizations` is their number; 0 if the archive has no poses (or, where they matter, no deviations).
+    """
+    rows = {str(name): of for name, of in results.to_dataset().data_vars.items()}
+    rows |= {str(name): of for name, of in results["sample"].to_dataset().data_vars.items()}
+    contact = results["contact"].to_dataset()
+    of_point, names = contact[words.PAIR_OF_POINT.name].values, results.to_dataset()[words.PAIR].values
+    some = slice(min(finished(results), AT_MOST))
+    searched = rows[words.SEARCHED.name].values[some] == 1 if words.SEARCHED.name in rows else np.zeros(some.stop, dtype=bool)
+    values = np.full((len(of_point), len(words.ESTIMATE)), np.nan)
+    count = int((~searched).sum())
+    try:
+        for number in range(len(names) if count else 0):
+            pair = ArchivedPair(results, number)
+            places = np.flatnonzero(of_point == number)[pair.places]
+            hits = np.zeros(len(places), dtype=int)
+            step = max(1, AT_ONCE // max(len(places), 1))
+            for start in range(0, some.stop, step):
+                part = slice(start, min(start + step, some.stop))
+                hits += (pair.gaps(rows, part)[:, -1] < TOUCHES)[~searched[part]].sum(axis=0)
+            values[places] = [intervals.share_of(int(k), count) for k in hits]
+    except NotKeptError:
+        count = 0
+    return xr.Dataset(
+        {
+            "touching": ((words.POINT, words.INTERVAL), values if count else np.full_like(values, np.nan), {"units": "1"}),
+            "point": ((words.POINT, words.AXIS), contact[words.MOVING_POINT.name].values, {"units": "mm"}),
+        },
+        coords={
+            "pair": (words.POINT, names[of_point].astype(str) if len(of_point) else np.zeros(0, dtype=str)),
+            words.AXIS: list(words.AXES),
+            words.INTERVAL: list(words.ESTIMATE),
+        },
+        attrs={"realizations": count},
+    )
