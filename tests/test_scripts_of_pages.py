@@ -17,11 +17,9 @@ RULES = {
         "no-var": "error",
         "prefer-const": "error",
         "eqeqeq": "error",
-        "no-unused-vars": ["error", {"vars": "local"}],
-    }
-    | {
+        "no-unused-vars": ["error", {"varsIgnorePattern": "^(figure|unpacked|COLOURS)$"}],  # shared; a page need not use them
         "no-shadow": "off",
-        "unicorn/consistent-function-scoping": "off",  # matters of taste
+        "unicorn/consistent-function-scoping": "off",
     },
 }
 
