@@ -9,7 +9,7 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
+from tests.test_report import browser, data_of, needs_browser, open_page, picture  # noqa: F401 (fixtures)
 from tolcontact.discretization import discretize, seen
 from tolcontact.discretization.faces import patch, triangles
 from tolcontact.discretization.shapes import shape
@@ -119,3 +119,16 @@ def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa:
         words = opened.locator("#said").inner_text().splitlines()[-1]
         found = [float(x) for x in re.search(r"point\((.*)\)", words)[1].split(", ")]
         assert found == pytest.approx([100, 0, 20] if own[1] < 1 else own, abs=0.3) and ("on it" in words) == (own[1] > 1)
+
+
+@needs_browser
+def test_features_are_named_where_they_are(tmp_path, open_page):  # noqa: F811
+    a = cases.model("lid")
+    nominal = discretize(a)
+    write_view(a, nominal, [], tmp_path / "lid.html")
+    named = {each["name"]: each["at"] for each in data_of((tmp_path / "lid.html").read_text())["scene"]["features"]}
+    assert named == {face.name: face.centre.tolist() for face in nominal.faces} and len(named) == 8
+    opened = open_page(tmp_path / "lid.html")
+    before = picture(opened)
+    opened.check("#features")
+    assert picture(opened) != before and opened.evaluate("stage.marks.features.children.length") == 4

@@ -23,12 +23,14 @@ class Marks:
     locators   at (3,), along (3,)
     contacts   part (its number), points (point, 3), gaps (point,), None where only an archive is known
     measures   points (point, 3), along (3,), or None
+    features   at (3,), where the face of a feature that contact or a locator is on turns about
     forces     at (3,), or None where only the geometry knows it, along (3,)
     """
 
     locators: list[Mark]
     contacts: list[Mark]
     measures: list[Mark]
+    features: list[Mark]
     forces: list[Mark]
 
 
@@ -36,7 +38,7 @@ def marks_of(results: xr.DataTree) -> Marks:
     """Those of an archive; what it does not have is left out."""
     document = json.loads(str(results["model"][words.DECLARATION.name].values))
     forces = [{"name": each["name"], "at": _at(document, each["at"]), "along": each["vector"]} for each in document["forces"]]
-    return Marks(_locators(results), list(_contacts(results)), list(_measures(document)), forces)
+    return Marks(_locators(results), list(_contacts(results)), list(_measures(document)), _features(results), forces)
 
 
 def marks_of_nominal(nominal: Nominal) -> Marks:
@@ -54,6 +56,7 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
             for measure in nominal.measures
             if measure.points
         ],
+        [{"name": face.name, "at": face.centre.tolist()} for face in nominal.faces],
         [
             {"name": force.name, "at": _position(nominal, force.at), "along": list(force.vector)}
             for force in nominal.assembly.forces
@@ -86,6 +89,14 @@ def _contacts(results: xr.DataTree) -> Iterator[Mark]:
     for number, name in enumerate(results.to_dataset()[words.PAIR].values):
         moving = int(contact[words.MOVING_PART.name].values[number])
         yield {"name": str(name), "part": moving, "points": points[pair_of_point == number], "gaps": None}
+
+
+def _features(results: xr.DataTree) -> list[Mark]:
+    contact = results["contact"].to_dataset()
+    if words.FACE_CENTRE.name not in contact:
+        return []
+    named = zip(contact[words.FEATURE_OF_FACE.name].values, contact[words.FACE_CENTRE.name].values, strict=True)
+    return [{"name": str(name), "at": at.tolist()} for name, at in named]
 
 
 def _measures(document: Mark) -> Iterator[Mark]:

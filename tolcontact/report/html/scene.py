@@ -42,6 +42,7 @@ def drawn_marks(marks: Marks) -> Drawn:
             for pair in marks.contacts
         ],
         "measures": marks.measures,
+        "features": marks.features,
         "forces": marks.forces,
     }
 

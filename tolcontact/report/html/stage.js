@@ -49,6 +49,7 @@ class Stage {
       forces: this.arrows(scene.forces.filter((force) => force.at), "#7a3fb0", 0.09),
       contacts: this.contacts(),
       points: this.points(),
+      features: this.features(),
     };
     this.axes();
     this.look();
@@ -133,6 +134,16 @@ class Stage {
       }
       group.add(this.label(measure.name, measure.points[0]));
     }
+    this.scene.add(group);
+    return group;
+  }
+
+  /** The names of features, where they are; not shown at first: there may be many. */
+  features() {
+    const group = new THREE.Group(), named = new Map(); // those at one place have one label
+    for (const { name, at } of this.data.features) named.set(String(at), { at, names: [...(named.get(String(at))?.names || []), name] });
+    for (const { at, names } of named.values()) group.add(this.label(names.join(", "), at));
+    group.visible = false;
     this.scene.add(group);
     return group;
   }
@@ -273,7 +284,7 @@ class Stage {
 
 /** What is shown, and cut: the same controls on every page. */
 function control(stage) {
-  ["locators", "contacts", "points", "forces"].forEach((id) =>
+  ["locators", "contacts", "points", "features", "forces"].forEach((id) =>
     byId(id).addEventListener("change", () => { stage.marks[id].visible = byId(id).checked; stage.draw(); }));
   const cut = () => stage.cut(byId("across").value, Number(byId("cut").value) / 1000);
   byId("across").addEventListener("change", cut);

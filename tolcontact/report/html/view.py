@@ -12,7 +12,7 @@ from tolcontact.report.marks import Marks, fixed_points, marks_of_nominal
 
 def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Drawn:
     """The scene; without a `nominal` assembly, which has faults, only the parts whose shapes are sound."""
-    marks = Marks([], [], [], []) if nominal is None else marks_of_nominal(nominal)
+    marks = Marks([], [], [], [], []) if nominal is None else marks_of_nominal(nominal)
     return {"parts": list(_parts(assembly, _faulty(assembly, faults))), **drawn_marks(marks)}
 
 
