@@ -131,4 +131,4 @@ def test_features_are_named_where_they_are(tmp_path, open_page):  # noqa: F811
     opened = open_page(tmp_path / "lid.html")
     before = picture(opened)
     opened.check("#features")
-    assert picture(opened) != before and opened.evaluate("stage.marks.features.children.length") == 4
+    assert picture(opened) != before and opened.evaluate("stage.marks.features.children.length") == 8

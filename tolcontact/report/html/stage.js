@@ -140,9 +140,8 @@ class Stage {
 
   /** The names of features, where they are; not shown at first: there may be many. */
   features() {
-    const group = new THREE.Group(), named = new Map(); // those at one place have one label
-    for (const { name, at } of this.data.features) named.set(String(at), { at, names: [...(named.get(String(at))?.names || []), name] });
-    for (const { at, names } of named.values()) group.add(this.label(names.join(", "), at));
+    const group = new THREE.Group();
+    for (const feature of this.data.features) group.add(this.label(feature.name, feature.at));
     group.visible = false;
     this.scene.add(group);
     return group;
@@ -234,7 +233,8 @@ class Stage {
     this.pairs.forEach((pair, k) => {
       const geometry = pair.points.geometry, own = every.length && known[k];
       if (own) {
-        const colours = Array.from(own).flatMap((value) => (Number.isFinite(value) ? TABLES.get(VIRIDIS)[Math.round((255 * value) / (high || 1))] : colour.set("#7f8894").toArray()));
+        const grey = colour.set("#7f8894").toArray(), table = TABLES.get(VIRIDIS);
+        const colours = Array.from(own).flatMap((value) => (Number.isFinite(value) ? table[Math.round((255 * value) / (high || 1))] : grey));
         geometry.setAttribute("color", new THREE.BufferAttribute(Float32Array.from(colours), 3));
       }
       Object.assign(pair.material, { vertexColors: Boolean(own), size: own ? 7 : 4, needsUpdate: true });
