@@ -258,6 +258,15 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
     assert field.shape == (2, len(vertices), 4) and np.ptp(field[0, :, 2]) < 1e-5  # it does not turn: all points go alike
 
 
+def test_a_plate_with_finely_divided_holes_is_drawn_with_fewer_triangles():
+    """Slivers between far corners and short edges, which the first simplification leaves as they are."""
+    ring = trimesh.creation.annulus(20, 2000, 10, sections=8000)
+    vertices, faces, nearest = coarse.coarser(np.asarray(ring.vertices), np.asarray(ring.faces), 3000)
+    assert len(faces) <= 3000 and nearest.max() < len(ring.vertices)
+    off = trimesh.Trimesh(vertices, faces, process=False)
+    assert off.area == pytest.approx(ring.area, rel=1e-3) and np.abs(off.bounds - ring.bounds).max() < 0.5
+
+
 def test_means_settle_within_students_interval(archive, page):
     (chart,) = data_of(page.read_text())["charts"]
     x = tc.open_archive(archive)["measured"].values[:, 1, 0]

@@ -22,7 +22,7 @@ ROOMS = {
     "h5py": ("archive/laid_out.py",),
     "typer": ("cli/",),
     "trimesh": ("discretization/",),
-    "igl": ("discretization/",),
+    "igl": ("discretization/", "report/html/coarse.py"),
     "cascadio": ("discretization/shape_files/worker.py",),
 }
 NOT_IN = {"xarray": ("declaration/", "discretization/", "variation/", "mechanics/", "compilation/", "contact/", "simulation/")}

@@ -11,6 +11,7 @@ from tolcontact import poses as pose
 from tolcontact.discretization.curvature import chord_height
 from tolcontact.discretization.edges import rim
 from tolcontact.discretization.surface import Surface
+from tolcontact.vocabulary import ROUNDED
 
 PROBES = 2000  # points of a face at least, beside the corners of its triangles
 DENSER = 4  # times as close as contact points, as far as MOST allows
@@ -47,7 +48,7 @@ class Side:
             depth[near] = self.face.depth(points[near])
             near = near[depth[near] > 0]
         if near.size and self._is_closed:
-            near = near[depth[near] > self._bulge]
+            near = near[depth[near] > max(self._bulge, ROUNDED)]  # what touches need not be looked for in the body
         if near.size and self._is_closed:
             turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[near]))
             depth[near[turns <= 0.5]] = 0
