@@ -49,7 +49,18 @@ from .method import Method
 from .simulation import simulate_blocks
 from .version import __version__
 from .vocabulary import Status
-from .workflow import build, check, check_population, compare, compare_runs, open_archive, run, summarize, write_model
+from .workflow import (
+    build,
+    check,
+    check_population,
+    compare,
+    compare_runs,
+    contributions,
+    open_archive,
+    run,
+    summarize,
+    write_model,
+)
 
 __all__ = [
     "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "Coaxiality", "ContactPair",
@@ -57,6 +68,6 @@ __all__ = [
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
-    "command_line", "compare", "compare_runs", "faces_in", "main", "model_of", "open_archive", "parts_from", "plot", "run",
-    "simulate_blocks", "summarize", "three_two_one", "write_model",
+    "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
+    "plot", "run", "simulate_blocks", "summarize", "three_two_one", "write_model",
 ]  # fmt: skip

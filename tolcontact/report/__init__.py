@@ -39,9 +39,16 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 
 from tolcontact.report.figures import grouped
 from tolcontact.report.html import write_comparison, write_page, write_view
-from tolcontact.report.text import capability_text, comparison_text, population_text, runs_text, summary_text
+from tolcontact.report.text import (
+    capability_text,
+    comparison_text,
+    contributions_text,
+    population_text,
+    runs_text,
+    summary_text,
+)
 
 __all__ = [
-    "capability_text", "comparison_text", "grouped", "population_text", "runs_text", "summary_text", "write_comparison",
-    "write_page", "write_view",
+    "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text", "summary_text",
+    "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

@@ -8,7 +8,9 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
+
+import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver
@@ -23,16 +25,32 @@ LARGE = 24  # bodies that are coupled; a whole block of more would take longer t
 T = TypeVar("T")
 
 
+@runtime_checkable
+class Sampler(Protocol):
+    """What gives deviations (realization, contributor) of realizations `start` to `stop`, as Draws do."""
+
+    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
+
+
 def simulate_blocks(
-    program: Program, *, samples: int, seed: int, start: int = 0, block: int | None = None, threads: int | None = None
+    program: Program,
+    *,
+    samples: int,
+    seed: int,
+    start: int = 0,
+    block: int | None = None,
+    threads: int | None = None,
+    draws: Sampler | None = None,
 ) -> Iterator[Block]:
     """Realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
 
-    The realization k is the same in any run.
+    The realization k is the same in any run. `draws` gives its deviations, instead of those of the program.
 
     At most two blocks for each of the `threads` (by default one for each processor) are in memory.
     """
-    return map_blocks(lambda done: done, program, samples=samples, seed=seed, start=start, block=block, threads=threads)
+    return map_blocks(
+        lambda done: done, program, samples=samples, seed=seed, start=start, block=block, threads=threads, draws=draws
+    )
 
 
 def map_blocks(
@@ -44,6 +62,7 @@ def map_blocks(
     start: int = 0,
     block: int | None = None,
     threads: int | None = None,
+    draws: Sampler | None = None,
 ) -> Iterator[T]:
     """What `function` makes of each block of `simulate_blocks`, in the thread that simulated it; in order."""
     threads, block = threads or processors(), block or block_rows(program)
@@ -53,7 +72,7 @@ def map_blocks(
     begun: deque[tuple[Future[T], list[ContactResolver]]] = deque()
 
     def simulate(first: int, resolvers: list[ContactResolver]) -> T:
-        deviations = program.draws(seed=seed, start=first, stop=min(first + block, samples))
+        deviations = (draws or program.draws)(seed=seed, start=first, stop=min(first + block, samples))
         return function(simulate_block(program, deviations, start=first, resolvers=resolvers))
 
     def finish_one() -> T:

@@ -29,6 +29,7 @@ distribution, because contact cuts distributions off.
 | share below, above and outside the limits, touched by contact, not assemblable | Clopper-Pearson |
 | Pp, Ppk by percentiles (ISO 22514-2) | places of three percentiles together, from the multinomial distribution |
 | skewness, kurtosis, Pp and Ppk as of a normal distribution | influence functions (delta method) |
+| Sobol' indices, share that linear sensitivities miss | influence functions of ratios of means |
 | change: shift of the mean | Student's t on the differences of the same draws |
 | change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
 

@@ -94,5 +94,6 @@ yields non-finite deviations is rejected."""
 
 from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, draw
+from tolcontact.variation.mixed import MixedDraws, independent_groups
 
-__all__ = ["Contributor", "Draws", "draw"]
+__all__ = ["Contributor", "Draws", "MixedDraws", "draw", "independent_groups"]

@@ -72,6 +72,18 @@ class Draws:
         self._check(deviations)
         return deviations
 
+    @property
+    def dependent(self) -> list[list[int]]:
+        """Columns that are not independent of each other, set by set: correlated, drawn together, or driven by one cause."""
+        assembly = self._assembly
+        found = [[self._column[label] for label in each.labels] for each in assembly.correlations]
+        found += [[self._column[label] for label in each.columns] for each in assembly.populations]
+        found += [[int(column) for column in each.columns] for each in self.contributors.together]
+        found += [[each.size, *(int(column) for column in each.columns)] for each in self.contributors.bonuses]
+        return found + [
+            [self._column[each.name], *(self._column[label] for label in each.drives)] for each in assembly.variables
+        ]
+
     def of(self, rows: np.ndarray, *, seed: int) -> np.ndarray:
         """Deviations (row, contributor) of some realizations, by their numbers (row,)."""
         found = np.empty((len(rows), len(self.contributors.every)))

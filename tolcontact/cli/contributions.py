@@ -1,0 +1,49 @@
+"""tolcontact contributions."""
+
+import functools
+from typing import Annotated
+
+import typer
+
+from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples, or_
+from tolcontact.cli.output import console, print_data
+from tolcontact.cli.progress import shown_progress
+from tolcontact.declaration.script import load_model
+from tolcontact.errors import OptionError
+from tolcontact.report import contributions_text
+from tolcontact.vocabulary import GROUPED_BY
+from tolcontact.workflow.contributions import contributions as contributions_of
+from tolcontact.workflow.run import DEFAULT_SOLVER
+
+
+@app.command(
+    epilog=examples("contributions model.py", "contributions model.py --by part", "contributions model.py --csv > shares.csv")
+)
+def contributions(
+    model: Model,
+    samples: Annotated[int, typer.Option(help="Number of base realizations; each is simulated again for every group.")] = 4096,
+    seed: Seed = 1,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = None,
+    objective: Objective = None,
+    by: Annotated[str, typer.Option(help=f"What is one group: {or_(GROUPED_BY)}.")] = "contributor",
+    as_json: Annotated[bool, typer.Option("--json", help="Print them as JSON.")] = False,
+    as_csv: Annotated[bool, typer.Option("--csv", help="Print the indices as CSV.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices.")] = False,
+) -> None:
+    """Print which contributors the variance of each measure comes from, without contact and with it."""
+    if as_json and as_csv:
+        raise OptionError("--json and --csv are given; choose one")
+    with shown_progress(model.stem, samples, quiet=quiet) as show:
+        found = contributions_of(
+            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
+            method=chosen(resolution=resolution, objective=objective), by=by, progress=lambda done, of: show(done, of),
+        )  # fmt: skip
+    if as_json:
+        print_data(found)
+    elif as_csv:
+        values = found[["first", "total"]].to_dataframe().unstack("interval")
+        values.columns = [" ".join(column) for column in values.columns]
+        typer.echo(values.to_csv(lineterminator="\n"), nl=False)
+    else:
+        console().print(contributions_text(found))

@@ -1,0 +1,48 @@
+"""Sobol' indices: what share of a measure's variance comes from which contributors, with contact as well as without.
+
+A measure f of independent groups of contributors has the indices
+
+    first order  S_i = Var(E[f | x_i]) / Var(f)          what fixing the group would remove on average
+    total        T_i = E[Var(f | all but x_i)] / Var(f)  what is left if all others are fixed
+
+With A and B two independent sets of draws, and A_i the set A with group i from B (Saltelli et al., 2010; Jansen, 1999)
+
+    S_i = mean(f(B) (f(A_i) - f(A))) / V,    T_i = mean((f(A) - f(A_i))^2) / 2 V,    V = mean(f(A)^2 + f(B)^2) / 2, f centred
+
+Each is a ratio of means over independent base realizations, so its interval is that of Student's t for its influence function.
+"""
+
+import numpy as np
+from scipy import special
+
+from tolcontact.statistics.intervals import CONFIDENCE, NOTHING, Estimate
+
+_UPPER = 0.5 + CONFIDENCE / 2
+CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
+
+
+def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
+    """First-order and total indices of each group, of values f (n, 2 + group): of A, of B, and of A with each group from B."""
+    middle = f[:, :2].mean()
+    A, B, mixed = f[:, 0] - middle, f[:, 1] - middle, f[:, 2:] - middle
+    v = (A**2 + B**2) / 2
+    if not np.isfinite(f).all() or not v.mean() > CONSTANT * middle**2:
+        return [NOTHING] * mixed.shape[1], [NOTHING] * mixed.shape[1]
+    first, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
+    return [ratio(u, v) for u in first.T], [ratio(u, v) for u in total.T]
+
+
+def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
+    """Share of the variance of f (n,) that a prediction (n,) misses; more than 1 if it is worse than none."""
+    f, off = f - f.mean(), f - linear
+    if not np.isfinite(f).all() or not (f**2).mean() > 0:
+        return NOTHING
+    return ratio((off - off.mean()) ** 2, f**2)
+
+
+def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
+    """Mean of u over mean of v, of the same realizations, with the interval of its influence function."""
+    n, below = len(u), v.mean()
+    estimate = u.mean() / below
+    half = special.stdtrit(n - 1, _UPPER) * np.sqrt((((u - estimate * v) / below) ** 2).sum() / n / (n - 1))
+    return Estimate(float(estimate), float(estimate - half), float(estimate + half))

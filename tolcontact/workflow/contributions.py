@@ -1,0 +1,131 @@
+"""Which contributors a measure's variance comes from, with contact and without."""
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
+from tolcontact.simulation import simulate_blocks
+from tolcontact.statistics.contributions import missed, sobol_indices
+from tolcontact.variation import MixedDraws, independent_groups
+from tolcontact.vocabulary import GROUPED_BY
+from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, build, check_counts
+
+SOME = 1 << 14  # realizations that spreads are estimated from
+SMALL = 1e-3  # of a standard deviation: steps of differences
+
+
+def contributions(
+    model: Model | Program,
+    *,
+    samples: int = 4096,
+    seed: int = 1,
+    solver: str = DEFAULT_SOLVER,
+    method: Choice | None = None,
+    by: str = "contributor",
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Sobol' indices of each measure (see tolcontact.statistics.contributions), beside the classical linear percentages.
+
+        first   (measure, state, group, interval)   share of variance by a group alone, with its 95 % interval
+        total   (measure, state, group, interval)   with all that it does together with others
+        linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2
+        missed  (measure, state, interval)          share of variance that a prediction by these sensitivities misses
+        by_status (status_meaning)                  number of realizations
+
+    `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn together,
+    driven by one cause) are one group whatever `by` is; those that do not vary are left out.
+    `samples` are base realizations: samples (2 + groups) are simulated. `progress` is called with how many are done, of all.
+    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    """
+    check_counts(samples=samples, seed=seed)
+    if by not in GROUPED_BY:
+        raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
+    program = model if isinstance(model, Program) else build(model, solver=solver, method=method)
+    some = program.draws(seed=seed, start=0, stop=SOME)
+    varies = np.ptp(some, axis=0) > 0
+    groups = {
+        name: columns[varies[columns]]
+        for name, columns in independent_groups(program.draws, _owners(program, by)).items()
+        if varies[columns].any()
+    }
+    if not groups:
+        raise OptionError(
+            f'nothing varies in "{program.nominal.assembly.name}"; give tolerances before asking what they contribute'
+        )
+    mixed = MixedDraws(program.draws, list(groups.values()))
+    values, statuses, A = _simulated(program, mixed, samples, seed, progress)
+    slopes = _sensitivities(program, some.std(axis=0))
+    first, total, linear, off = [], [], [], []
+    for measure in range(len(program.nominal.measures)):
+        indices = [sobol_indices(values[:, :, state, measure]) for state in range(len(words.STATES))]
+        first.append([own for own, _ in indices])
+        total.append([own for _, own in indices])
+        parts = np.array([(some[:, columns] @ slopes[measure, columns]).var() for columns in groups.values()])
+        linear.append(parts / parts.sum() if parts.sum() > 0 else np.full(len(parts), np.nan))
+        predicted = A @ slopes[measure]
+        off.append([missed(values[:, 0, state, measure], predicted) for state in range(len(words.STATES))])
+    found = {words.FIRST: first, words.TOTAL: total, words.LINEAR: linear, words.MISSED: off, "by_status": statuses}
+    return xr.Dataset(
+        {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.CONTRIBUTIONS},
+        coords={
+            words.MEASURE: [measure.name for measure in program.nominal.measures],
+            words.STATE: list(words.STATES),
+            words.GROUP: list(groups),
+            words.INTERVAL: list(words.ESTIMATE),
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+        },
+        attrs={
+            "title": f"contributions to the measures of {program.nominal.assembly.name}",
+            "base_realizations": samples,
+            "realizations": samples * mixed.mixtures,
+            "seed": seed,
+            "by": by,
+            "solver": program.plugin.name,
+            "resolution": program.method.resolution,
+            "objective": program.method.objective,
+        },
+    )
+
+
+def _owners(program: Program, by: str) -> list[str]:
+    """Whose each column of the deviations is: its own label's, or that of its feature or part."""
+    nominal, labels = program.nominal, list(program.nominal.contributors)
+    if by == "contributor":
+        return labels
+    # Locators belong to their part, which they place, also where features are asked for.
+    part_of = {label: part.name for part in nominal.parts for label in part.locators.labels}
+    for own in nominal.features:
+        part_of |= dict.fromkeys(own.labels, own.feature.part.name if by == "part" else own.label)
+    return [part_of.get(label, label) for label in labels]
+
+
+def _simulated(
+    program: Program, mixed: MixedDraws, samples: int, seed: int, progress: Callable[[int, int], None] | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measures (base, mixture, state, measure), statuses by meaning, and the first draws (base, column)."""
+    mixtures = mixed.mixtures
+    measured, A, statuses, done = [], [], np.zeros(len(words.STATUS_MEANINGS), dtype=int), 0
+    for block in simulate_blocks(program, samples=samples * mixtures, seed=seed, draws=mixed):
+        measured.append(block.measured.copy())
+        A.append(block.deviations[-block.start % mixtures :: mixtures].copy())
+        statuses += np.bincount(block.status, minlength=len(statuses))
+        done += len(block)
+        if progress:
+            progress(done, samples * mixtures)
+    values = np.concatenate(measured)
+    return values.reshape(samples, mixtures, *values.shape[1:]), statuses, np.concatenate(A)
+
+
+def _sensitivities(program: Program, spread: np.ndarray) -> np.ndarray:
+    """Derivatives (measure, column) of the raw measures at the nominal assembly, by central differences."""
+    steps = np.where(spread > 0, SMALL * spread, 1.0)
+    away = np.diag(steps)
+    seen = []
+    for deviations in (away, -away):
+        poses = program.place(deviations=deviations)["poses"].reshape(len(steps), len(program.nominal.parts), -1)
+        seen.append(program.observe(poses=poses, deviations=deviations)["measured"])
+    return np.asarray((seen[0] - seen[1]) / (2 * steps[:, None])).T
