@@ -58,6 +58,7 @@ from .workflow import (
     contributions,
     open_archive,
     run,
+    sensitivities,
     summarize,
     write_model,
 )
@@ -69,5 +70,5 @@ __all__ = [
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
-    "plot", "run", "simulate_blocks", "summarize", "three_two_one", "write_model",
+    "plot", "run", "sensitivities", "simulate_blocks", "summarize", "three_two_one", "write_model",
 ]  # fmt: skip

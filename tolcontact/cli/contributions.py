@@ -37,7 +37,7 @@ def contributions(
     with shown_progress(model.stem, samples, quiet=quiet) as show:
         found = contributions_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), by=by, progress=lambda done, of: show(done, of),
+            method=chosen(resolution=resolution, objective=objective), by=by, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

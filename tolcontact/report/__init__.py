@@ -45,10 +45,11 @@ from tolcontact.report.text import (
     contributions_text,
     population_text,
     runs_text,
+    sensitivities_text,
     summary_text,
 )
 
 __all__ = [
-    "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text", "summary_text",
-    "write_comparison", "write_page", "write_view",
+    "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text",
+    "sensitivities_text", "summary_text", "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

@@ -95,5 +95,6 @@ yields non-finite deviations is rejected."""
 from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, draw
 from tolcontact.variation.mixed import MixedDraws, independent_groups
+from tolcontact.variation.stepped import SteppedDraws
 
-__all__ = ["Contributor", "Draws", "MixedDraws", "draw", "independent_groups"]
+__all__ = ["Contributor", "Draws", "MixedDraws", "SteppedDraws", "draw", "independent_groups"]

@@ -5,6 +5,7 @@ from tolcontact.vocabulary.comparison import *  # noqa: F403
 from tolcontact.vocabulary.contributions import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.population import *  # noqa: F403
+from tolcontact.vocabulary.sensitivities import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surfaces import *  # noqa: F403
 from tolcontact.vocabulary.variable import Variable as Variable

@@ -58,7 +58,7 @@ def contributions(
         )
     mixed = MixedDraws(program.draws, list(groups.values()))
     values, statuses, A = _simulated(program, mixed, samples, seed, progress)
-    slopes = _sensitivities(program, some.std(axis=0))
+    slopes = nominal_sensitivities(program, some.std(axis=0))
     first, total, linear, off = [], [], [], []
     for measure in range(len(program.nominal.measures)):
         indices = [sobol_indices(values[:, :, state, measure]) for state in range(len(words.STATES))]
@@ -120,7 +120,7 @@ def _simulated(
     return values.reshape(samples, mixtures, *values.shape[1:]), statuses, np.concatenate(A)
 
 
-def _sensitivities(program: Program, spread: np.ndarray) -> np.ndarray:
+def nominal_sensitivities(program: Program, spread: np.ndarray) -> np.ndarray:
     """Derivatives (measure, column) of the raw measures at the nominal assembly, by central differences."""
     steps = np.where(spread > 0, SMALL * spread, 1.0)
     away = np.diag(steps)

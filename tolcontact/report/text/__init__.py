@@ -4,6 +4,10 @@ from tolcontact.report.text.comparison import comparison_text
 from tolcontact.report.text.contributions import contributions_text
 from tolcontact.report.text.population import population_text
 from tolcontact.report.text.runs import runs_text
+from tolcontact.report.text.sensitivities import sensitivities_text
 from tolcontact.report.text.summary import capability_text, summary_text
 
-__all__ = ["capability_text", "comparison_text", "contributions_text", "population_text", "runs_text", "summary_text"]
+__all__ = [
+    "capability_text", "comparison_text", "contributions_text", "population_text", "runs_text", "sensitivities_text",
+    "summary_text",
+]  # fmt: skip

@@ -1,0 +1,87 @@
+"""Derivatives through contact: closed forms, differences by hand, what jumps."""
+
+import io
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+from tests.test_ra1 import BASE, MEASURED, TOP, plane_weights
+from tolcontact.simulation import simulate_block
+from tolcontact.variation import SteppedDraws
+
+
+@pytest.fixture(scope="module")
+def of_ra1():
+    return tc.sensitivities(cases.model("ra1"), samples=400, solver="daqp").sel(measure="corner height")
+
+
+def test_without_contact_they_are_those_of_the_plane_through_the_locators(of_ra1):
+    for k, weight in enumerate(plane_weights(TOP, MEASURED), start=1):
+        assert float(of_ra1["nominal"].sel(contributor=f"top.A{k}")) == pytest.approx(weight, abs=1e-6)
+        estimate, _, _ = of_ra1["by_contact"].sel(contact="untouched", contributor=f"top.A{k}").values
+        assert estimate == pytest.approx(weight, abs=0.05)  # the second order of 10 mm on 50 mm
+    assert (of_ra1["nominal"].sel(contributor=[f"base.A{k}" for k in (1, 2, 3)]) == 0).all()
+
+
+def test_with_contact_they_are_those_of_the_plane_below(of_ra1):
+    """CASES C2: a top that touches follows the base alone."""
+    touched = of_ra1["by_contact"].sel(contact="touched")
+    for k, weight in enumerate(plane_weights(BASE, MEASURED), start=1):
+        assert float(touched.sel(contributor=f"base.A{k}", interval="estimate")) == pytest.approx(weight, abs=0.05)
+        assert abs(float(touched.sel(contributor=f"top.A{k}", interval="estimate"))) < 0.05
+    assert 0 < float(of_ra1["changing"].sel(contributor="top.A3", interval="upper")) < 0.05
+
+
+def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
+    """CASES C1: the derivative of max(0, g) is 0 or 1, each in half of the draws."""
+    found = tc.sensitivities(cases.one_dimensional(0), samples=2000, solver="daqp").isel(measure=0)
+    of = found.sel(contributor="block.Z")
+    estimate, lower, upper = of["sensitivity"].sel(state="corrected").values
+    assert lower < 0.5 < upper and upper - lower < 0.05 and estimate == pytest.approx(0.5, abs=0.03)
+    assert of["by_contact"].sel(interval="estimate").values == pytest.approx([1.0, 0.0], abs=1e-7)
+    assert float(of["spread"].sel(state="corrected")) == pytest.approx(0.5, abs=0.02)
+    assert float(of["sensitivity"].sel(state="raw", interval="estimate")) == pytest.approx(1, abs=1e-9)
+
+
+def test_they_are_differences_of_the_engine():
+    a = cases.model("lid")
+    program = tc.build(a, solver="daqp", method=a.method)
+    found = tc.sensitivities(program, samples=6, seed=4)
+    own = program.draws(seed=4, start=0, stop=6)
+    for label in found["contributor"].values[::9]:
+        column, step = list(program.nominal.contributors).index(label), float(found["step"].sel(contributor=label))
+        blocks = []
+        for sign in (1, -1):
+            moved = own.copy()
+            moved[:, column] += sign * step
+            blocks.append(simulate_block(program, moved).measured)
+        slopes = (blocks[0] - blocks[1]) / (2 * step)
+        expected = found["sensitivity"].sel(contributor=label, interval="estimate").transpose("state", "measure")
+        assert slopes.mean(axis=0) == pytest.approx(expected.values, abs=1e-4)
+
+
+def test_steps_do_not_depend_on_blocks():
+    draws = tc.build(cases.ra1(), solver="daqp").draws
+    stepped = SteppedDraws(draws, np.array([1, 4]), np.array([0.1, 0.2]))
+    whole = stepped(seed=2, start=0, stop=50)
+    assert np.array_equal(whole[13:31], stepped(seed=2, start=13, stop=31)) and stepped.together == 5
+    own, up1, up4, down1, down4 = whole.reshape(10, 5, -1).transpose(1, 0, 2)
+    assert np.array_equal(own, draws(seed=2, start=0, stop=10))
+    for moved, column, step in ((up1, 1, 0.1), (up4, 4, 0.2), (down1, 1, -0.1), (down4, 4, -0.2)):
+        assert (moved - own)[:, column] == pytest.approx(step) and np.abs(np.delete(moved - own, column, 1)).max() == 0
+
+
+def test_the_command_prints_a_table_json_and_csv(tmp_path):
+    options = ("sensitivities", cases.MODELS / "ra1.py", "--samples", "32", "--solver", "daqp")
+    done = call(tmp_path, *options)
+    assert done.returncode == 0 and "touched" in done.stdout, done.stderr
+    said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
+    assert said["attrs"]["simulated"] == 32 * 25
+    table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
+    assert set(table["contributor"]) >= {"top.A1", "base.C1"} and {"estimate", "lower", "upper"} <= set(table)
+    assert call(tmp_path, *options, "--csv", "--json").returncode == 2

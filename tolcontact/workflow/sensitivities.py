@@ -1,0 +1,122 @@
+"""How much each measure follows each contributor, through contact."""
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
+from tolcontact.simulation import simulate_blocks
+from tolcontact.statistics import intervals
+from tolcontact.statistics.intervals import NOTHING, Estimate
+from tolcontact.variation import SteppedDraws
+from tolcontact.workflow.contributions import SOME, nominal_sensitivities
+from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, build, check_counts
+
+STEP = 0.01  # of a contributor's standard deviation
+
+
+def sensitivities(
+    model: Model | Program,
+    *,
+    samples: int = 1000,
+    seed: int = 1,
+    solver: str = DEFAULT_SOLVER,
+    method: Choice | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """Derivatives of each measure by each contributor that varies, realization by realization, by differences on the draws.
+
+        nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it
+        sensitivity  (measure, state, contributor, interval)   mean over all realizations, with its 95 % interval
+        spread       (measure, state, contributor)             standard deviation over realizations
+        by_contact   (measure, contact, contributor, interval) mean, corrected, by contact, where carrying points stay
+        changing     (contributor, interval)                   share of realizations whose carrying points change meanwhile
+        step         (contributor)                             a hundredth of its standard deviation, up and down
+
+    A contributor steps alone, also where it is drawn together with others. Where the carrying points stay, a difference is the
+    derivative, but for its second order; where they change it is that of both sides, and of a jump between them, which the
+    linearized resolution may make. (2 contributors + 1) samples are simulated. The carrying points of a pair are counted only: one
+    that takes the place of another is not seen.
+    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    """
+    check_counts(samples=samples, seed=seed)
+    program = model if isinstance(model, Program) else build(model, solver=solver, method=method)
+    deviation = program.draws(seed=seed, start=0, stop=SOME).std(axis=0)
+    columns = np.flatnonzero(deviation > 0)
+    if not columns.size:
+        raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
+    stepped = SteppedDraws(program.draws, columns, STEP * deviation[columns])
+    measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, progress)
+    up, down = np.split(np.arange(1, stepped.together), 2)
+    slopes = (measured[:, up] - measured[:, down]) / (2 * STEP * deviation[columns])[:, None, None]
+    changes = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
+    smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, words.CORRECTED])
+    by_contact = [_means(smooth[touched == is_touched]) for is_touched in (False, True)]
+    found = {
+        "nominal": nominal_sensitivities(program, deviation)[:, columns],
+        "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(words.STATES))], axis=1),
+        "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
+        "by_contact": np.stack(by_contact, axis=1),
+        "changing": [intervals.share(column) for column in changes.T],
+        "step": STEP * deviation[columns],
+        "by_status": statuses,
+    }
+    return xr.Dataset(
+        {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.SENSITIVITIES},
+        coords={
+            words.MEASURE: [measure.name for measure in program.nominal.measures],
+            words.STATE: list(words.STATES),
+            words.CONTRIBUTOR: [program.nominal.contributors[k] for k in columns],
+            words.CONTACT: list(words.CONTACT_STATES),
+            words.INTERVAL: list(words.ESTIMATE),
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+            "measure_units": (words.MEASURE, [measure.units for measure in program.nominal.measures]),
+            "contributor_units": (words.CONTRIBUTOR, [program.draws.contributors.every[k].units for k in columns]),
+        },
+        attrs={
+            "title": f"sensitivities of the measures of {program.nominal.assembly.name}",
+            "realizations": samples,
+            "simulated": samples * stepped.together,
+            "seed": seed,
+            "solver": program.plugin.name,
+            "resolution": program.method.resolution,
+            "objective": program.method.objective,
+        },
+    )
+
+
+def _simulated(
+    program: Program, stepped: SteppedDraws, samples: int, seed: int, progress: Callable[[int, int], None] | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of each realization and its steps: measures (n, step, state, measure) and carrying points (n, step, pair); of the
+    realizations themselves whether contact touches them (n,), and statuses by meaning."""
+    together, done = stepped.together, 0
+    measured, carrying, status = [], [], []
+    for block in simulate_blocks(program, samples=samples * together, seed=seed, draws=stepped):
+        measured.append(block.measured.copy())
+        carrying.append(block.carrying.copy())
+        status.append(block.status.copy())
+        done += len(block)
+        if progress:
+            progress(done, samples * together)
+    values, points = np.concatenate(measured), np.concatenate(carrying)
+    own = np.concatenate(status)[::together]
+    return (
+        values.reshape(samples, together, *values.shape[1:]),
+        points.reshape(samples, together, -1),
+        own != words.Status.UNTOUCHED,
+        np.bincount(own, minlength=len(words.STATUS_MEANINGS)),
+    )
+
+
+def _means(slopes: np.ndarray) -> np.ndarray:
+    """Means (measure, contributor, interval) of those derivatives (n, contributor, measure) that are numbers."""
+
+    def of(x: np.ndarray) -> Estimate:
+        known = x[np.isfinite(x)]
+        return intervals.mean(known) if len(known) > 1 else NOTHING
+
+    return np.array([[of(column) for column in measure] for measure in slopes.transpose(2, 1, 0)])
