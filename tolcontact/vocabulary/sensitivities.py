@@ -16,7 +16,7 @@ SENSITIVITIES = (
         "f8",
         "mean derivative, corrected, where contact is or is not",
     ),
-    Variable("changing", (CONTRIBUTOR, INTERVAL), "f8", "share of realizations whose carrying points change in the step", "1"),
+    Variable("changing", (CONTRIBUTOR, INTERVAL), "f8", "share of realizations with a kink or a jump within the step", "1"),
     Variable("step", (CONTRIBUTOR,), "f8", "step of the differences, up and down"),
     Variable("by_status", (STATUS_MEANING,), "i8", "number of realizations", "1"),
 )

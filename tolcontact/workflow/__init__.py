@@ -68,7 +68,7 @@ True
 means, spreads, and what they are where contact moved parts and where not.
 
 >>> slopes = tc.sensitivities(assembly, samples=100, solver="daqp").sel(measure="height")
->>> bool(abs(slopes.by_contact.sel(contact="touched", interval="estimate")).max() < 1e-3)  # the block lies flat on the table
+>>> bool(abs(slopes.by_contact.sel(contact="touched", interval="estimate")).max() < 0.01)  # the block lies flat on the table
 True
 
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:

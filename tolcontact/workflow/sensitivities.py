@@ -16,6 +16,8 @@ from tolcontact.workflow.contributions import SOME, nominal_sensitivities
 from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, build, check_counts
 
 STEP = 0.01  # of a contributor's standard deviation
+KINK = 0.1  # of a derivative: if both sides differ by more, it is not one
+SLIGHT = 0.1  # of the largest nominal derivative of a measure: smaller ones may differ by a tenth of that
 
 
 def sensitivities(
@@ -32,14 +34,14 @@ def sensitivities(
         nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it
         sensitivity  (measure, state, contributor, interval)   mean over all realizations, with its 95 % interval
         spread       (measure, state, contributor)             standard deviation over realizations
-        by_contact   (measure, contact, contributor, interval) mean, corrected, by contact, where carrying points stay
-        changing     (contributor, interval)                   share of realizations whose carrying points change meanwhile
+        by_contact   (measure, contact, contributor, interval) mean, corrected, by contact, of those without
+        changing     (contributor, interval)                   share of realizations with a kink or a jump within the step
         step         (contributor)                             a hundredth of its standard deviation, up and down
 
-    A contributor steps alone, also where it is drawn together with others. Where the carrying points stay, a difference is the
-    derivative, but for its second order; where they change it is that of both sides, and of a jump between them, which the
-    linearized resolution may make. (2 contributors + 1) samples are simulated. The carrying points of a pair are counted only: one
-    that takes the place of another is not seen.
+    A contributor steps alone, also where it is drawn together with others. Where no carrying point comes or goes, and both
+    sides of the step agree within a tenth (or a hundredth of the largest nominal derivative), a difference is the derivative,
+    but for its second order. Elsewhere it is that of both sides, and of a jump between them, which the linearized resolution
+    may make, as may points that come into the objective "active points". (2 contributors + 1) samples are simulated.
     Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
@@ -51,12 +53,16 @@ def sensitivities(
     stepped = SteppedDraws(program.draws, columns, STEP * deviation[columns])
     measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, progress)
     up, down = np.split(np.arange(1, stepped.together), 2)
-    slopes = (measured[:, up] - measured[:, down]) / (2 * STEP * deviation[columns])[:, None, None]
-    changes = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
+    steps = (STEP * deviation[columns])[:, None, None]
+    ahead, behind = (measured[:, up] - measured[:, :1]) / steps, (measured[:, :1] - measured[:, down]) / steps
+    slopes = (ahead + behind) / 2
+    nominal = nominal_sensitivities(program, deviation)[:, columns]
+    moved = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
+    changes = moved | _kinked(ahead, behind, nominal)
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, words.CORRECTED])
     by_contact = [_means(smooth[touched == is_touched]) for is_touched in (False, True)]
     found = {
-        "nominal": nominal_sensitivities(program, deviation)[:, columns],
+        "nominal": nominal,
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(words.STATES))], axis=1),
         "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
         "by_contact": np.stack(by_contact, axis=1),
@@ -110,6 +116,13 @@ def _simulated(
         own != words.Status.UNTOUCHED,
         np.bincount(own, minlength=len(words.STATUS_MEANINGS)),
     )
+
+
+def _kinked(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray) -> np.ndarray:
+    """Whether a measure has a kink or jump within the step, (n, contributor); derivatives (n, contributor, state, measure)."""
+    floor = SLIGHT * np.abs(nominal).max(axis=1, initial=0)
+    size = np.maximum(np.maximum(np.abs(ahead), np.abs(behind)), floor)
+    return np.asarray((np.abs(ahead - behind) > KINK * size).any(axis=(2, 3)))
 
 
 def _means(slopes: np.ndarray) -> np.ndarray:

@@ -21,8 +21,8 @@ def sensitivities_text(found: xr.Dataset) -> Group:
 
 def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
     yield Text(f"{found.attrs['title']}: {grouped(found.attrs['realizations'])} realizations", style="bold")
-    yield Text("Mean derivatives, 95 % intervals: without and with contact, where the same points carry after")
-    yield Text("the step; and of all, with the jumps where others carry.")
+    yield Text("Mean derivatives, 95 % intervals: without contact and with it, where they are smooth; and of")
+    yield Text("all, with kinks and jumps, whose share is stated.")
     lost = int(found["by_status"].values[list(UNRESOLVED)].sum())
     if lost:
         yield Text(f"{grouped(lost)} realizations were not resolved; their last poses are included")
@@ -30,7 +30,7 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
         of = found.sel(measure=measure)
         yield Text(f"\n{measure} ({of['measure_units'].values} for a unit of each)", style="bold")
         rows, small = _rows(of)
-        yield FigureTable(["", "nominal", "untouched", "touched", "corrected", "spread", "changing"], rows)
+        yield FigureTable(["", "nominal", "untouched", "touched", "corrected", "spread", "kinks"], rows)
         if small:
             yield Text(f"and {small} that do next to nothing")
 
