@@ -62,15 +62,15 @@ def test_a_second_process_finds_it_compiled(installed):
 @pytest.mark.parametrize(
     ("kind", "left"),
     [
-        ("nbi", "nothing"), ("nbi", "all but a byte"), ("nbi", "garbage"),
-        ("nbc", "nothing"), ("nbc", "half"), ("nbc", "zeros"), ("nbc", "another pickle"),
+        ("nbi", "nothing"), ("nbi", "garbage"),
+        ("nbc", "nothing"), ("nbc", "half"), ("nbc", "another pickle"),
     ],
 )  # fmt: skip
 def test_a_damaged_file_is_replaced(kind, left, installed):
     file = cached(installed, kind)
     whole = file.read_bytes()
     file.write_bytes({
-        "nothing": b"", "half": whole[: len(whole) // 2], "all but a byte": whole[:-1], "zeros": bytes(len(whole)),
+        "nothing": b"", "half": whole[: len(whole) // 2], 
         "garbage": b"\x80\x05garbage" * 50, "another pickle": b"\x80\x04K\x05.",
     }[left])  # fmt: skip
     assert count(installed) == (0, 1)

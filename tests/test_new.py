@@ -12,9 +12,9 @@ def test_it_is_checked_and_run_as_it_is(name, tmp_path):
     path = tmp_path / f"{name.removesuffix('.py')}.py"
     assert (done.returncode, [*tmp_path.iterdir()]) == (0, [path]), done.stderr
     assert tc.build(path).nominal.assembly.name == path.stem
+    assert "NAME" not in path.read_text(encoding="utf-8")
     done = call(tmp_path, "run", path, "--samples", "100", "--surfaces", "8")
     assert done.returncode == 0 and "corner height (mm): displacement, limits -0.2 to 0.3" in done.stdout
-    assert "NAME" not in path.read_text(encoding="utf-8")
 
 
 def test_a_file_that_is_there_is_left_alone(tmp_path):

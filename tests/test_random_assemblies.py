@@ -65,7 +65,7 @@ def assemblies(draw) -> tc.Assembly:
     return a
 
 
-@settings(max_examples=150, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
+@settings(max_examples=110, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
 @given(
     assembly=assemblies(),
     solver=st.sampled_from(["qpoases", "daqp"]),
