@@ -70,7 +70,7 @@ def test_a_damaged_file_is_replaced(kind, left, installed):
     file = cached(installed, kind)
     whole = file.read_bytes()
     file.write_bytes({
-        "nothing": b"", "half": whole[: len(whole) // 2], 
+        "nothing": b"", "half": whole[: len(whole) // 2],
         "garbage": b"\x80\x05garbage" * 50, "another pickle": b"\x80\x04K\x05.",
     }[left])  # fmt: skip
     assert count(installed) == (0, 1)
