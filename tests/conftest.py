@@ -1,5 +1,7 @@
 """Fixtures of several test modules; and the shapes of arrays, which are checked in all tests but the slow ones."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -37,3 +39,11 @@ def shapes_are_checked(request):
     config.update("jaxtyping_disable", request.node.get_closest_marker("slow") is not None)
     yield
     config.update("jaxtyping_disable", False)
+
+
+@pytest.fixture(scope="session")
+def drawing():
+    """Bodies can be drawn here; where there is no OpenGL, not even in software, the process that tries it dies."""
+    script = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot(return_img=True)"
+    if subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=120, check=False).returncode:
+        pytest.skip("there is no OpenGL")

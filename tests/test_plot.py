@@ -31,7 +31,7 @@ def test_one_state_is_drawn_alone(results):
 
 @pytest.mark.parametrize("component", ["magnitude", "z"])
 @pytest.mark.parametrize("statistic", ["mean", "6 sigma"])
-def test_a_field_is_that_of_the_archive_on_one_scale_for_both_states(results, statistic, component):
+def test_a_field_is_that_of_the_archive_on_one_scale_for_both_states(results, statistic, component, drawing):
     plotter = tc.plot.field(results, statistic, component=component, state="raw")
     name = {"mean": "mean", "6 sigma": "six_sigma"}[statistic]
     drawn = [mesh for mesh in plotter.meshes if "field" in mesh.point_data and mesh.n_lines == 0]  # edges have it, too
@@ -48,7 +48,7 @@ def test_a_field_is_that_of_the_archive_on_one_scale_for_both_states(results, st
     plotter.close()
 
 
-def test_a_realization_is_drawn_where_its_poses_place_it(results):
+def test_a_realization_is_drawn_where_its_poses_place_it(results, drawing):
     plotter = tc.plot.assembly(results, realization=7, state="raw", marks=False)
     at = {"realization": 7, "state": "raw", "part": "top"}
     vertices = results["field/top"].vertices.values
@@ -57,7 +57,7 @@ def test_a_realization_is_drawn_where_its_poses_place_it(results):
     plotter.close()
 
 
-def test_results_and_models_have_the_same_marks(results):
+def test_results_and_models_have_the_same_marks(results, drawing):
     drawn = [tc.plot.assembly(of) for of in (results, cases.ra1())]
     sizes = [sorted(mesh.n_points for mesh in plotter.meshes) for plotter in drawn]
     assert sizes[0] == sizes[1] and 202 in sizes[0]
@@ -76,6 +76,6 @@ def test_results_and_models_have_the_same_marks(results):
         (lambda r: tc.plot.assembly(cases.ra1(), realization=1), "a declared model has none"),
     ],
 )
-def test_what_cannot_be_drawn_is_said(draw, said, results):
+def test_what_cannot_be_drawn_is_said(draw, said, results, drawing):
     with pytest.raises(tc.OptionError, match=said):
         draw(results)

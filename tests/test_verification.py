@@ -20,7 +20,7 @@ def test_known_answers_are_computed(problem):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::UserWarning:pdoc")
-def test_the_site_is_built(tmp_path):
+def test_the_site_is_built(tmp_path, drawing):
     some = [path for path in models() if path.stem in ("ra1", "clutch")]
     build(tmp_path, 50, some, [PROBLEMS[1]])
     assert len(models()) == 11

@@ -80,13 +80,22 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
 
 def _shared(summaries: Mapping[str, xr.Dataset]) -> list[str]:
     """Measures that all runs have, in the order of the first one."""
-    alike = [
-        set(zip(of["measure"].values, of["measure_units"].values, of["measure_quantity"].values, strict=True))
+    said = [
+        {
+            str(name): (units, quantity)
+            for name, units, quantity in zip(
+                of["measure"].values, of["measure_units"].values, of["measure_quantity"].values, strict=True
+            )
+        }
         for of in summaries.values()
     ]
-    first = next(iter(summaries.values()))
-    known = {name for name, _, _ in set.intersection(*alike)}
-    return [str(name) for name in first["measure"].values if name in known]
+
+    def is_alike(name: str) -> bool:
+        of_all = [own.get(name) for own in said]
+        units, quantities = ({own[k] for own in of_all if own is not None} for k in (0, 1))
+        return None not in of_all and len(units) == 1 and len(quantities - {""}) <= 1  # old archives do not say the quantity
+
+    return [name for name in said[0] if is_alike(name)]
 
 
 def _left_out(summaries: Mapping[str, xr.Dataset], shared: list[str]) -> str:

@@ -12,7 +12,7 @@ from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import OTHER_DRAWS, PPK, SAME_DRAWS, SAME_SEED, STATES
 
 VALUES = ("", "mean", "6 sigma", PPK, "outside")
-CHANGES = ("", "shift of mean", "6 sigma", "outside", "furthest")
+CHANGES = ("", "shift of mean", "6 sigma", "outside, points", "furthest")
 _DRAWS = {
     SAME_DRAWS: "the same draws; changes are from the same realizations",
     SAME_SEED: "the same seed, but other draws; changes are realization by realization",
