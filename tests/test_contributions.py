@@ -191,3 +191,15 @@ def test_a_model_in_which_nothing_varies_is_refused():
     a.measure("height", a.parts[0].point(0, 0, 10), along="z")
     with pytest.raises(tc.OptionError, match="nothing varies"):
         tc.contributions(a)
+
+
+def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
+    """The clutch's roller floats: without contact its angle does not vary."""
+    done = call(tmp_path, "contributions", cases.MODELS / "clutch.py", "--samples", "64", "--solver", "daqp")
+    assert done.returncode == 0 and "nan" not in done.stdout and "raw -, corrected" in done.stdout
+    shares = tc.contributions(cases.MODELS / "clutch.py", samples=2048, solver="daqp").isel(measure=0).sel(state="corrected")
+    # Root sum square of CASES C7, which is nearly linear: sensitivities times a sixth of the tolerances.
+    parts = np.array([11.910 * 0.1, 23.732 * 0.02, 11.821 * 0.025]) ** 2
+    for label, part in zip(("hub.flat.offset", "roller.barrel.size", "ring.bore.size"), parts / parts.sum(), strict=True):
+        estimate, lower, upper = shares["total"].sel(group=label).values
+        assert abs(estimate - part) < 1.7 * (upper - lower) / 2 + 0.01

@@ -48,6 +48,15 @@ def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
     assert float(of["sensitivity"].sel(state="raw", interval="estimate")) == pytest.approx(1, abs=1e-9)
 
 
+def test_a_clutch_follows_its_drawing_as_its_formula_says():
+    """CASES C7: (-11.910, -23.732, 11.821) degrees a mm; roller and ring vary in diameter. Means differ in the second order."""
+    found = tc.sensitivities(cases.model("clutch"), samples=200, solver="daqp").isel(measure=0).sel(state="corrected")
+    expected = {"hub.flat.offset": -11.910, "roller.barrel.size": -23.732 / 2, "ring.bore.size": 11.821 / 2}
+    for label, slope in expected.items():
+        estimate, lower, upper = found["sensitivity"].sel(contributor=label).values
+        assert abs(estimate - slope) < 0.01 * abs(slope) and upper - lower < 0.02 * abs(slope)
+
+
 def test_they_are_differences_of_the_engine():
     a = cases.model("lid")
     program = tc.build(a, solver="daqp", method=a.method)

@@ -34,8 +34,9 @@ def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
 
 def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
     """Share of the variance of f (n,) that a prediction (n,) misses; more than 1 if it is worse than none."""
-    f, off = f - f.mean(), f - linear
-    if not np.isfinite(f).all() or not (f**2).mean() > 0:
+    middle, off = f.mean(), f - linear
+    f = f - middle
+    if not np.isfinite(f).all() or not (f**2).mean() > CONSTANT * middle**2:
         return NOTHING
     return ratio((off - off.mean()) ** 2, f**2)
 

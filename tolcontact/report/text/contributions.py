@@ -1,5 +1,6 @@
 """Contributions for the terminal."""
 
+import math
 from collections.abc import Iterator
 
 import xarray as xr
@@ -47,5 +48,6 @@ def _rows(of: xr.Dataset) -> tuple[list[list[str]], int]:
             continue
         own = of.sel(group=group)
         shares = [percent(own[word].sel(state=state).values) for _, word, state in _COLUMNS]
-        rows.append([str(group), *shares, f"{100 * float(own['linear']):.1f} %"])
+        linear = float(own["linear"])
+        rows.append([str(group), *shares, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
     return rows, of.sizes["group"] - len(rows)
