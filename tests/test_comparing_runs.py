@@ -154,3 +154,10 @@ def test_archives_of_before_are_compared_with_those_of_today(runs, tmp_path):
     old = runs["one"].copy()
     old.dataset = old.to_dataset().drop_vars("measure_quantity")
     assert "thickness" in tc.compare_runs({"old": old, "new": runs["higher"]})["measure"].values
+
+
+def test_what_is_no_run_is_refused(runs, archive):
+    with pytest.raises(tc.OptionError, match="two runs or more"):
+        tc.compare_runs(archive)
+    with pytest.raises(tc.OptionError, match='run "b" is a int'):
+        tc.compare_runs({"a": runs["one"], "b": 3})

@@ -203,3 +203,11 @@ def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
     for label, part in zip(("hub.flat.offset", "roller.barrel.size", "ring.bore.size"), parts / parts.sum(), strict=True):
         estimate, lower, upper = shares["total"].sel(group=label).values
         assert abs(estimate - part) < 1.7 * (upper - lower) / 2 + 0.01
+
+
+def test_an_option_that_cannot_act_is_refused():
+    program = tc.build(cases.one_dimensional(0), solver="daqp")
+    for answer in (tc.contributions, tc.sensitivities):
+        with pytest.raises(tc.OptionError, match="a Program has its solver and method"):
+            answer(program, solver="daqp")
+        assert answer(program, samples=16).attrs["solver"] == "daqp"

@@ -94,3 +94,12 @@ def test_the_command_prints_a_table_json_and_csv(tmp_path):
     table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
     assert set(table["contributor"]) >= {"top.A1", "base.C1"} and {"estimate", "lower", "upper"} <= set(table)
     assert call(tmp_path, *options, "--csv", "--json").returncode == 2
+
+
+def test_what_does_nothing_has_no_kinks():
+    """Rounding of a solver is no kink: the lid's height above its base follows nothing."""
+    a = cases.one_dimensional(0)
+    a.measure("aside", a.parts[1].point(5, 5, 10), along="x")
+    found = tc.sensitivities(a, samples=200, solver="daqp")
+    assert float(found["changing"].sel(contributor="block.Z", interval="estimate")) < 0.05
+    assert np.abs(found["sensitivity"].sel(measure="aside").values).max() < 1e-6

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from tolcontact.declaration import Assembly
-from tolcontact.errors import TolcontactError, shown
+from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.version import __version__
 
@@ -55,6 +55,18 @@ Objective = Annotated[
     str | None,
     typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
+
+
+AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON.")]
+AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; results are printed.")]
+
+
+def only_one(**options: bool) -> None:
+    """Raise OptionError if several ways to print are asked for."""
+    asked = [f"--{word}" for word, given in options.items() if given]
+    if len(asked) > 1:
+        raise OptionError(f"{' and '.join(asked)} are given; choose one")
 
 
 def examples(*commands: str) -> str:

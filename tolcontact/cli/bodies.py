@@ -2,15 +2,12 @@
 
 import json
 from dataclasses import asdict
-from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import StepFile, app, examples
+from tolcontact.cli.app import AsJson, StepFile, app, examples
 from tolcontact.discretization import bodies_in
 from tolcontact.errors import shown
-
-AsJson = Annotated[bool, typer.Option("--json", help="Print them as JSON.")]
 
 
 @app.command(epilog=examples("bodies parts.stp"))

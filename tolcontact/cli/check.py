@@ -1,14 +1,19 @@
 """tolcontact check."""
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples
 from tolcontact.cli.output import console
-from tolcontact.cli.view import show
+from tolcontact.cli.view import temporary
+from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
-from tolcontact.report import population_text
+from tolcontact.discretization import Nominal
+from tolcontact.errors import ModelError, shown
+from tolcontact.report import population_text, write_view
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import DEFAULT_SOLVER, build
 
@@ -26,10 +31,15 @@ def check(
     view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with faults marked.")] = False,
 ) -> None:
     """Check a model, and these options, and list every fault; runs nothing."""
-    if view:
-        show(model, None)
     declared = load_model(model)
-    program = build(declared, solver=solver, method=chosen(resolution=resolution, objective=objective))
+    try:
+        program = build(declared, solver=solver, method=chosen(resolution=resolution, objective=objective))
+    except ModelError as error:
+        if view:
+            _look(declared, None, error.faults, temporary(model))
+        raise
+    if view:
+        _look(declared, program.nominal, (), temporary(model))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
@@ -39,3 +49,10 @@ def check(
     typer.echo("no faults found")
     if population is not None:
         console().print(population_text(check_population(declared, samples=population, seed=seed)))
+
+
+def _look(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
+    """Write the view of a model, and open it."""
+    write_view(model, nominal, faults, path)
+    typer.echo(f"page: {shown(str(path))}")
+    typer.launch(str(path))

@@ -9,7 +9,7 @@ import typer
 import xarray as xr
 
 from tolcontact.archive import open_archive, taken
-from tolcontact.cli.app import Samples, Seed, app, chosen, examples, or_
+from tolcontact.cli.app import AsJson, Samples, Seed, app, chosen, examples, or_
 from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
@@ -42,7 +42,7 @@ def compare(
     seed: Seed = 1,
     resolution: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(RESOLUTIONS)))] = None,
     objective: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(OBJECTIVES)))] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the comparison as JSON.")] = False,
+    as_json: AsJson = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Of archives: also write a page to look at.")] = None,
 ) -> None:

@@ -5,11 +5,24 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples, or_
+from tolcontact.cli.app import (
+    AsCsv,
+    AsJson,
+    Model,
+    Objective,
+    Quiet,
+    Resolution,
+    Seed,
+    Solver,
+    app,
+    chosen,
+    examples,
+    only_one,
+    or_,
+)
 from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
-from tolcontact.errors import OptionError
 from tolcontact.report import contributions_text
 from tolcontact.vocabulary import GROUPED_BY
 from tolcontact.workflow.contributions import contributions as contributions_of
@@ -27,13 +40,12 @@ def contributions(
     resolution: Resolution = None,
     objective: Objective = None,
     by: Annotated[str, typer.Option(help=f"What is one group: {or_(GROUPED_BY)}.")] = "contributor",
-    as_json: Annotated[bool, typer.Option("--json", help="Print them as JSON.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print the indices as CSV.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices.")] = False,
+    as_json: AsJson = False,
+    as_csv: AsCsv = False,
+    quiet: Quiet = False,
 ) -> None:
     """Print which contributors the variance of each measure comes from, without contact and with it."""
-    if as_json and as_csv:
-        raise OptionError("--json and --csv are given; choose one")
+    only_one(json=as_json, csv=as_csv)
     with shown_progress(model.stem, samples, quiet=quiet) as show:
         found = contributions_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,

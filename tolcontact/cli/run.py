@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Resolution, Samples, Seed, Solver, app, chosen, examples, or_
+from tolcontact.cli.app import Model, Objective, Quiet, Resolution, Samples, Seed, Solver, app, chosen, examples, or_
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.declaration.script import load_model
@@ -41,7 +41,7 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; the summary is printed.")] = False,
+    quiet: Quiet = False,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
 

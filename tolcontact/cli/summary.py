@@ -5,9 +5,8 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Archive, app, examples
+from tolcontact.cli.app import Archive, AsCsv, AsJson, app, examples, only_one
 from tolcontact.cli.output import console, print_data, print_summary
-from tolcontact.errors import OptionError
 from tolcontact.report import capability_text
 from tolcontact.workflow.run import summarize
 
@@ -15,14 +14,12 @@ from tolcontact.workflow.run import summarize
 @app.command(epilog=examples("summary run.nc", "summary run.nc --limits", "summary run.nc --csv > run.csv"))
 def summary(
     archive: Archive,
-    as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
-    as_csv: Annotated[bool, typer.Option("--csv", help="Print the estimates of the measures as CSV.")] = False,
+    as_json: AsJson = False,
+    as_csv: AsCsv = False,
     limits: Annotated[bool, typer.Option("--limits", help="Print only how measures keep within their limits.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
-    asked = [word for word, given in {"--json": as_json, "--csv": as_csv, "--limits": limits}.items() if given]
-    if len(asked) > 1:
-        raise OptionError(f"{' and '.join(asked)} are given; choose one")
+    only_one(json=as_json, csv=as_csv, limits=limits)
     with open_archive(archive) as results:
         if as_csv:
             values = summarize(results)["statistic_value"].to_dataset("interval").to_dataframe()

@@ -33,32 +33,30 @@ def view(
     """
     if out is not None:
         check_page(out)
-    show(what, out)
-
-
-def show(what: Path, out: Path | None) -> None:
-    """Write the page `out`; without it a temporary one, opened in the browser."""
-    path = out or Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{what.stem}.html"
+    path = out or temporary(what)
     if what.suffix.lower() == ".nc":
         with open_archive(what) as results:
             write_page(results, summarize(results), path)
+    elif what.suffix.lower() in STEP:
+        model = Assembly(what.stem)
+        parts_from(model, what)
+        write_view(model, None, [], path)
     else:
-        _write(what, path)
+        _write_model(load_model(what), path)
     typer.echo(f"page: {shown(str(path))}")
     if out is None:
         typer.launch(str(path))
 
 
-def _write(what: Path, path: Path) -> None:
-    if what.suffix.lower() in STEP:
-        model = Assembly(what.stem)
-        parts_from(model, what)
-        write_view(model, None, [], path)
-        return
-    model = load_model(what)
+def _write_model(model: Assembly, path: Path) -> None:
     try:
-        nominal, faults = discretize(model), ()
+        nominal = discretize(model)
     except ModelError as error:
         write_view(model, None, error.faults, path)
     else:
-        write_view(model, nominal, faults, path)
+        write_view(model, nominal, (), path)
+
+
+def temporary(of: Path) -> Path:
+    """Where a page is written that is only looked at."""
+    return Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{of.stem}.html"

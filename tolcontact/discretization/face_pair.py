@@ -34,7 +34,7 @@ class Side:
     normals: np.ndarray
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How deep `points` (point, 3) [mm] lie behind the face, in the body; 0 outside, and beside the face.
+        """How deep `points` (point, 3) [mm] lie behind the face, in the body; outside, and beside it, at most ROUNDED.
 
         Distance to the face [mm]. Of a body that is not closed whatever is behind the face is inside.
         """

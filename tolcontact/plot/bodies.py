@@ -47,13 +47,14 @@ def assembly(
     Nominal, or as in a `realization` of results and its `state`, where marks stay at their nominal places.
     Raises OptionError for a realization or a state that is not there, ModelError for a model with faults.
     """
-    plotter, is_own = plotter or _plotter(), plotter is None
+    is_own = plotter is None
+    plotter = _plotter() if is_own else plotter
     bodies, found = _declared(of) if isinstance(of, Assembly) else (list(_bodies(of)), marks_of(of))
     for number, body in enumerate(bodies):
         mesh = _mesh(body)
         if realization is not None:
             mesh.points = _moved(of, number, realization, state, body.vertices)
-        plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity, name=f"body {number}")
+        plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity)
         _add_edges(plotter, mesh)
     if marks:
         _add_marks(plotter, found, _size(bodies))
@@ -83,10 +84,10 @@ def field(
     if not np.isfinite(every).any():
         raise OptionError("the archive has no displacement fields of this kind; run again with --fields")
     is_signed = statistic == "mean" and component != "magnitude"
-    low, high = limits or ((-np.nanmax(abs(every)),) if is_signed else (np.nanmin(every),)) + (
-        np.nanmax(abs(every) if is_signed else every),
-    )
-    plotter, is_own = plotter or _plotter(), plotter is None
+    largest = np.nanmax(np.abs(every))
+    low, high = limits or ((-largest, largest) if is_signed else (np.nanmin(every), largest))
+    is_own = plotter is None
+    plotter = _plotter() if is_own else plotter
     title = f"{statistic} of displacement, {component} [mm]\n"
     for body, value in zip(_bodies(results), values, strict=True):
         mesh = _mesh(body)

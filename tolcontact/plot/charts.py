@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from tolcontact import vocabulary as words
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
-from tolcontact.vocabulary import BOUNDS, LOWER_LIMIT, MEASURE, MEASURE_UNITS, MEASURED, STATE, STATES, UPPER_LIMIT
+from tolcontact.statistics import limits
 
 try:
     import matplotlib.pyplot as plt
@@ -26,7 +27,7 @@ def histogram(
     results: xr.DataTree,
     measure: str | None = None,
     *,
-    states: Sequence[str] = STATES,
+    states: Sequence[str] = words.STATES,
     bins: int = BINS,
     axes: Axes | None = None,
 ) -> Axes:
@@ -35,16 +36,18 @@ def histogram(
     Heights are shares of all realizations in a bin, in %; both states have the same bins. Raises OptionError for a measure or a
     state that is not there, or a measure without numbers.
     """
-    of = _measure(results, measure)
-    unknown = [state for state in states if state not in STATES]
-    if unknown or not states:
-        raise OptionError(f"states are {list(states)}; expected some of: {', '.join(STATES)}")
-    values = {state: of.sel({STATE: state}).values for state in states}
+    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
+    place = _place(rows, measure)
+    of = rows.isel({words.MEASURE: place})
+    if not states or not set(states) <= set(words.STATES):
+        raise OptionError(f"states are {list(states)}; expected some of: {', '.join(words.STATES)}")
+    values = {state: of[words.MEASURED.name].sel({words.STATE: state}).values for state in states}
     every = np.concatenate(list(values.values()))
+    name, units = str(of[words.MEASURE].values), str(of[words.MEASURE_UNITS.name].values)
     if not np.isfinite(every).all():
-        raise OptionError(f'measure "{of[MEASURE].values}" has values that are no numbers; nothing can be drawn of it')
-    name, units = str(of[MEASURE].values), str(of[MEASURE_UNITS.name].values)
-    axes = axes or plt.figure(layout="constrained").add_subplot()
+        raise OptionError(f'measure "{name}" has values that are no numbers; nothing can be drawn of it')
+    if axes is None:
+        axes = plt.figure(layout="constrained").add_subplot()
     edges = np.histogram_bin_edges(every, bins)
     for state, x in values.items():
         weights = np.full(len(x), 100 / len(x))
@@ -54,8 +57,7 @@ def histogram(
             z = np.linspace(-SIGMAS, SIGMAS, 161)
             height = 100 * (edges[1] - edges[0]) / (sigma * math.sqrt(2 * math.pi))
             axes.plot(mean + sigma * z, height * np.exp(-(z**2) / 2), ":", color=COLOURS[state], label=f"normal, {state}")
-    for side in BOUNDS:
-        limit = float(of[f"limit_{side}"].values)
+    for limit in limits(rows)[place]:
         if math.isfinite(limit):
             axes.axvline(limit, color=LIMIT, label="_limit")
     axes.set(xlabel=f"{name} [{units}]", ylabel="% of realizations", title=results.attrs.get("title", ""))
@@ -63,17 +65,11 @@ def histogram(
     return axes
 
 
-def _measure(results: xr.DataTree, name: str | None) -> xr.DataArray:
-    """The values of a measure in finished realizations, with its units and limits."""
-    rows = results.to_dataset().isel(realization=slice(finished(results)))
-    names = [str(each) for each in rows[MEASURE].values]
+def _place(rows: xr.Dataset, name: str | None) -> int:
+    """Which of the measures is meant."""
+    names = [str(each) for each in rows[words.MEASURE].values]
     if name is None and len(names) == 1:
-        name = names[0]
+        return 0
     if name not in names:
         raise OptionError(f"measure is {name!r}; expected one of: {', '.join(names)}")
-    here = {MEASURE: names.index(name)}
-    limits = {
-        f"limit_{side}": float(rows[of.name].isel(here)) if of.name in rows else math.nan
-        for side, of in zip(BOUNDS, (LOWER_LIMIT, UPPER_LIMIT), strict=True)
-    }
-    return rows[MEASURED.name].isel(here).assign_coords({MEASURE_UNITS.name: rows[MEASURE_UNITS.name].isel(here), **limits})
+    return names.index(name)

@@ -13,11 +13,9 @@ Each is a ratio of means over independent base realizations, so its interval is 
 """
 
 import numpy as np
-from scipy import special
 
-from tolcontact.statistics.intervals import CONFIDENCE, NOTHING, Estimate
+from tolcontact.statistics.intervals import NOTHING, Estimate, by_influence
 
-_UPPER = 0.5 + CONFIDENCE / 2
 CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
 
 
@@ -43,7 +41,6 @@ def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
 
 def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
     """Mean of u over mean of v, of the same realizations, with the interval of its influence function."""
-    n, below = len(u), v.mean()
+    below = v.mean()
     estimate = u.mean() / below
-    half = special.stdtrit(n - 1, _UPPER) * np.sqrt((((u - estimate * v) / below) ** 2).sum() / n / (n - 1))
-    return Estimate(float(estimate), float(estimate - half), float(estimate + half))
+    return by_influence(estimate, (((u - estimate * v) / below) ** 2).sum(), len(u))

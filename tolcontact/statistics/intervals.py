@@ -35,8 +35,22 @@ def mean(x: np.ndarray | Sample) -> Estimate:
     """Mean, Student's t interval."""
     x = Sample.of(x)
     deviation = np.sqrt(_unbiased(x))
-    half = float(special.stdtrit(x.count - 1, _UPPER) * deviation / np.sqrt(x.count))
+    half = float(student(x.count - 1) * deviation / np.sqrt(x.count))
     return Estimate(x.mean, x.mean - half, x.mean + half)
+
+
+def student(freedom: float) -> float:
+    """How many standard errors a 95 % interval reaches to either side: Student's t."""
+    return float(special.stdtrit(freedom, _UPPER))
+
+
+def by_influence(estimate: float, squares: float, count: int) -> Estimate:
+    """An estimate whose influence function, what each of `count` realizations adds to it times `count`, has a sum of `squares`.
+
+    See Serfling, Approximation Theorems of Mathematical Statistics (1980), chapter 6.
+    """
+    half = student(count - 1) * math.sqrt(squares / count / (count - 1))
+    return Estimate(float(estimate), float(estimate - half), float(estimate + half))
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:

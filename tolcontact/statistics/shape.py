@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy import special
 
-from tolcontact.statistics.intervals import CONFIDENCE, NOTHING, Estimate, is_constant
+from tolcontact.statistics import intervals
+from tolcontact.statistics.intervals import NOTHING, Estimate, is_constant
 from tolcontact.statistics.sample import Sample
-
-_UPPER = 0.5 + CONFIDENCE / 2
 
 
 def skewness(x: np.ndarray | Sample) -> Estimate:
@@ -30,14 +28,10 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 
 
 def by_influence(x: Sample, estimate: float, influence: Callable[[np.ndarray], np.ndarray]) -> Estimate:
-    """An estimate with the interval that its influence function says, of standardized values: what each adds to it, times n.
-
-    See Serfling, Approximation Theorems of Mathematical Statistics (1980), chapter 6.
-    """
+    """An estimate with the interval that its influence function of standardized values says."""
     scale = np.sqrt(x.moments[0])
     squares = sum(float((influence((piece - x.mean) / scale) ** 2).sum()) for piece in x.pieces())
-    half = special.stdtrit(x.count - 1, _UPPER) * np.sqrt(squares / x.count / (x.count - 1))
-    return Estimate(float(estimate), float(estimate - half), float(estimate + half))
+    return intervals.by_influence(estimate, squares, x.count)
 
 
 def standardized(x: Sample) -> tuple[float, float]:

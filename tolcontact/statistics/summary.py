@@ -108,8 +108,8 @@ def summarize(results: xr.DataTree) -> Summary:
             words.EXTREME: list(words.EXTREMES),
             "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),
             **{
-                f"measure_{side}": (words.MEASURE, limits)
-                for side, limits in zip(("lower", "upper"), _limits(rows).T, strict=True)
+                f"measure_{side}": (words.MEASURE, of_side)
+                for side, of_side in zip(("lower", "upper"), limits(rows).T, strict=True)
             },
             "measure_quantity": (words.MEASURE, _quantities(rows)),
         },
@@ -212,7 +212,7 @@ def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
         *spreads,
         *intervals.percentiles(x, words.PERCENTILES),
         *shape,
-        *_within(x, *_limits(rows)[measure]),
+        *_within(x, *limits(rows)[measure]),
     ]
 
 
@@ -224,7 +224,7 @@ def _within(x: Sample, lower: float, upper: float) -> list[Estimate]:
     return [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
 
 
-def _limits(rows: xr.Dataset) -> np.ndarray:
+def limits(rows: xr.Dataset) -> np.ndarray:
     """Lower and upper limit of each measure (measure, 2); NaN where a side is open."""
     if words.LOWER_LIMIT.name in rows:
         return np.column_stack([rows[words.LOWER_LIMIT.name].values, rows[words.UPPER_LIMIT.name].values])

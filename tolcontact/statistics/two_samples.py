@@ -25,7 +25,7 @@ def shift(after: Sample, before: Sample, *, paired: bool) -> Estimate:
     if not total > 0:
         return Estimate(difference, difference, difference) if math.isfinite(difference) else NOTHING
     freedom = total**2 / sum(each**2 / (x.count - 1) for each, x in zip(own, (after, before), strict=True))
-    half = float(special.stdtrit(freedom, 0.5 + intervals.CONFIDENCE / 2)) * math.sqrt(total)
+    half = intervals.student(freedom) * math.sqrt(total)
     return Estimate(difference, difference - half, difference + half)
 
 

@@ -83,13 +83,13 @@ class Results:
         rows = np.flatnonzero(self._results[words.STATUS.name].values == int(names.get(str(status), status)))
         return self._results.isel({words.REALIZATION: rows})
 
-    def __repr__(self) -> str:
-        verbs = "summary(), field(part), realization(number), where_status(status), plot.histogram(measure)"
-        return f"{self._results.attrs.get('title', 'results')}: {verbs}"
-
     def touching(self) -> xr.Dataset:
         """Where contact points touch, and how often (see tolcontact.statistics.touching)."""
         return touching(self._results)
+
+    def __repr__(self) -> str:
+        verbs = "summary(), field(part), realization(number), where_status(status), touching(), plot.histogram(measure)"
+        return f"{self._results.attrs.get('title', 'results')}: {verbs}"
 
     def _repr_html_(self) -> str:
         return results_html(self._results, self.summary())

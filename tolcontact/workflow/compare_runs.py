@@ -16,12 +16,16 @@ def compare_runs(runs: Mapping[str, xr.DataTree] | Sequence[str | Path]) -> xr.D
 
     Raises ArchiveError for an archive that is missing or damaged, OptionError for fewer than two, or nothing in common.
     """
+    if isinstance(runs, str | Path):
+        runs = [runs]
     if not isinstance(runs, Mapping):
         with ExitStack() as stack:
             return compare_runs({name: stack.enter_context(open_archive(path)) for name, path in named(runs).items()})
     if len(runs) < 2:
         raise OptionError("a comparison is of two runs or more; name another one")
-    for run in runs.values():
+    for name, run in runs.items():
+        if not isinstance(run, xr.DataTree):
+            raise OptionError(f'run "{name}" is a {type(run).__name__}; expected what tc.run or tc.open_archive returns')
         check_rows(run)
     return statistics_of(runs)
 

@@ -12,7 +12,7 @@ from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics.contributions import missed, sobol_indices
 from tolcontact.variation import MixedDraws, independent_groups
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, build, check_counts
+from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
 SOME = 1 << 14  # realizations that spreads are estimated from
 SMALL = 1e-3  # of a standard deviation: steps of differences
@@ -23,7 +23,7 @@ def contributions(
     *,
     samples: int = 4096,
     seed: int = 1,
-    solver: str = DEFAULT_SOLVER,
+    solver: str | None = None,
     method: Choice | None = None,
     by: str = "contributor",
     progress: Callable[[int, int], None] | None = None,
@@ -44,7 +44,7 @@ def contributions(
     check_counts(samples=samples, seed=seed)
     if by not in GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
-    program = model if isinstance(model, Program) else build(model, solver=solver, method=method)
+    program = program_of(model, solver, method)
     some = program.draws(seed=seed, start=0, stop=SOME)
     varies = np.ptp(some, axis=0) > 0
     groups = {

@@ -40,6 +40,20 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
     return compile_program(discretize(assembly), solver, chosen(assembly, method))
 
 
+def program_of(model: Model | Program, solver: str | None, method: Choice | None) -> Program:
+    """The program of a model (see `build`), or the one that is given, which has its solver and method already."""
+    check_program(model, solver, method)
+    return model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
+
+
+def check_program(model: Model | Program, solver: str | None, method: Choice | None) -> None:
+    """Raise OptionError for a program with a solver or a method beside it: they could not act."""
+    if isinstance(model, Program) and not (solver is None and method is None):
+        raise OptionError(
+            "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
+        )
+
+
 def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
     """Every fault of a model; none if it can be built (see `build`)."""
     try:
@@ -108,13 +122,10 @@ def run(
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
     if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
         raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
-    if isinstance(model, Program) and not (solver is None and method is None):
-        raise OptionError(
-            "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
-        )
+    check_program(model, solver, method)
 
     def write(path: Path) -> None:
-        program = model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
+        program = program_of(model, solver, method)
         asked = Run(seed, samples, keep, surfaces, str(fields))
         of_fields = DisplacementFields(program.nominal, asked.fields)
         with (

@@ -13,11 +13,11 @@ from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import NOTHING, Estimate
 from tolcontact.variation import SteppedDraws
 from tolcontact.workflow.contributions import SOME, nominal_sensitivities
-from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, build, check_counts
+from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
 STEP = 0.01  # of a contributor's standard deviation
 KINK = 0.1  # of a derivative: if both sides differ by more, it is not one
-SLIGHT = 0.1  # of the largest nominal derivative of a measure: smaller ones may differ by a tenth of that
+SLIGHT = 0.1  # of the largest derivative of a measure: smaller ones may differ by a tenth of that
 
 
 def sensitivities(
@@ -25,7 +25,7 @@ def sensitivities(
     *,
     samples: int = 1000,
     seed: int = 1,
-    solver: str = DEFAULT_SOLVER,
+    solver: str | None = None,
     method: Choice | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
@@ -34,18 +34,18 @@ def sensitivities(
         nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it
         sensitivity  (measure, state, contributor, interval)   mean over all realizations, with its 95 % interval
         spread       (measure, state, contributor)             standard deviation over realizations
-        by_contact   (measure, contact, contributor, interval) mean, corrected, by contact, of those without
         changing     (contributor, interval)                   share of realizations with a kink or a jump within the step
+        by_contact   (measure, contact, contributor, interval) mean, corrected, of the others: those untouched, those touched
         step         (contributor)                             a hundredth of its standard deviation, up and down
 
     A contributor steps alone, also where it is drawn together with others. Where no carrying point comes or goes, and both
-    sides of the step agree within a tenth (or a hundredth of the largest nominal derivative), a difference is the derivative,
+    sides of the step agree within a tenth (or a hundredth of the largest derivative of all), a difference is the derivative,
     but for its second order. Elsewhere it is that of both sides, and of a jump between them, which the linearized resolution
     may make, as may points that come into the objective "active points". (2 contributors + 1) samples are simulated.
     Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
-    program = model if isinstance(model, Program) else build(model, solver=solver, method=method)
+    program = program_of(model, solver, method)
     deviation = program.draws(seed=seed, start=0, stop=SOME).std(axis=0)
     columns = np.flatnonzero(deviation > 0)
     if not columns.size:
@@ -58,7 +58,7 @@ def sensitivities(
     slopes = (ahead + behind) / 2
     nominal = nominal_sensitivities(program, deviation)[:, columns]
     moved = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
-    changes = moved | _kinked(ahead, behind, nominal)
+    changes = moved | _kinked(ahead, behind, np.abs(nominal))
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, words.CORRECTED])
     by_contact = [_means(smooth[touched == is_touched]) for is_touched in (False, True)]
     found = {
@@ -119,10 +119,15 @@ def _simulated(
 
 
 def _kinked(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray) -> np.ndarray:
-    """Whether a measure has a kink or jump within the step, (n, contributor); derivatives (n, contributor, state, measure)."""
-    floor = SLIGHT * np.abs(nominal).max(axis=1, initial=0)
-    size = np.maximum(np.maximum(np.abs(ahead), np.abs(behind)), floor)
-    return np.asarray((np.abs(ahead - behind) > KINK * size).any(axis=(2, 3)))
+    """Whether a measure has a kink or jump within the step, (n, contributor).
+
+    Derivatives are (n, contributor, state, measure), nominal ones (measure, contributor). Contributors that do next to nothing
+    have none: what they seem to do is what the solver leaves.
+    """
+    size = np.maximum(np.abs(ahead), np.abs(behind))
+    usual = np.median(size.max(axis=2), axis=0).T  # (measure, contributor), which no jump makes large
+    floor = SLIGHT * np.maximum(nominal, usual).max(axis=1, initial=0)
+    return np.asarray((np.abs(ahead - behind) > KINK * np.maximum(size, floor)).any(axis=(2, 3)))
 
 
 def _means(slopes: np.ndarray) -> np.ndarray:

@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy import special
 
 from tolcontact import vocabulary as words
 from tolcontact.realizations import pieces
 from tolcontact.report.html.packed import packed
+from tolcontact.statistics import intervals
 
 BINS = 60
 POINTS = 2000  # realizations that are shown as points
-UPPER = 0.975  # quantile that bounds 95 % from above
 STEPS = 40  # numbers of realizations at which estimates are shown
 FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
 
@@ -111,7 +110,7 @@ def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
         for n in steps[(steps > count) & (steps <= count + len(x))]:
             first, second = (sums + cumulated[:, n - count - 1]) / n
             s = float(np.sqrt(max(second - first**2, 0) * n / (n - 1)))
-            found.append([int(n), middle + first, special.stdtrit(n - 1, UPPER) * s / np.sqrt(n)])
+            found.append([int(n), middle + first, intervals.student(n - 1) * s / np.sqrt(n)])
         sums, count = sums + cumulated[:, -1], count + len(x)
     return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 3))}
 
