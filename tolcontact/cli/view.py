@@ -10,13 +10,12 @@ from tolcontact.archive import open_archive
 from tolcontact.cli.app import app, examples
 from tolcontact.cli.output import check_page
 from tolcontact.declaration import Assembly
+from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize, parts_from
 from tolcontact.errors import ModelError, shown
 from tolcontact.report import write_page, write_view
 from tolcontact.workflow.run import summarize
-
-STEP = (".stp", ".step", ".p21")  # that the reader takes for STEP files
 
 
 @app.command(epilog=examples("view model.py", "view parts.stp", "view model.py --out page.html"))
