@@ -94,7 +94,9 @@ yields non-finite deviations is rejected."""
 
 from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, draw
+from tolcontact.variation.given import GivenDraws
 from tolcontact.variation.mixed import MixedDraws, independent_groups
+from tolcontact.variation.region import Region
 from tolcontact.variation.stepped import SteppedDraws
 
-__all__ = ["Contributor", "Draws", "MixedDraws", "SteppedDraws", "draw", "independent_groups"]
+__all__ = ["Contributor", "Draws", "GivenDraws", "MixedDraws", "Region", "SteppedDraws", "draw", "independent_groups"]

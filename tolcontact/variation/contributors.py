@@ -88,6 +88,25 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
+class Zone:
+    """What a drawing allows: no row of `rows` @ (components - middle) is longer than half of the width, and its bonus.
+
+    columns     of the deviations: the components
+    rows        (point, entry, component)
+    middle      (component,) of a zone that is disposed unevenly
+    size        column of the feature's size, if the zone grows with its departure from `limit`, to the side `growth` (1, -1)
+    """
+
+    columns: np.ndarray
+    rows: np.ndarray
+    middle: np.ndarray
+    width: float
+    size: int | None = None
+    limit: float = 0.0
+    growth: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
 class Bonus:
     """Components that fill the zone which the size of their feature leaves: those of the nominal zone times its growth.
 
@@ -106,6 +125,7 @@ class Contributors:
     def __init__(self, nominal: Nominal) -> None:
         self.together: list[Together] = []
         self.bonuses: list[Bonus] = []
+        self.zones: list[Zone] = []
         locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
         self.every = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
         self._nominal = nominal
@@ -132,6 +152,7 @@ class Contributors:
             self._check_room(own, layer, rows[..., : len(known)], known, width)
             known = np.concatenate([known, np.full(count, s / tolerance.cp)])
             mean = _mean(own, layer, s)
+            self.zones.append(_zone(own, layer, rows, own.first + np.arange(rows.shape[-1])))
             if tolerance.rule in JOINT:
                 self.together.append(Together(tolerance.rule, columns, _joint(tolerance.rule, rows, s, width)))
             if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
@@ -178,11 +199,29 @@ class Contributors:
 def _mean(own: NominalFeature, layer: Layer, s: float) -> np.ndarray:
     """Means (component,) of the added components: of an uneven profile, and what `cpk` says, along the first."""
     tolerance, mean = layer.tolerance, np.zeros(layer.added.shape[1])
-    if tolerance.outside is not None and own.geometry.is_plane:
-        mean += (tolerance.outside - tolerance.width / 2) * layer.added[0]
+    if own.geometry.is_plane:
+        mean += _uneven(layer) * layer.added[0]
     if tolerance.cpk is not None and mean.size:
         mean[0] += 3 * s * (1 - tolerance.cpk / tolerance.cp)
     return mean
+
+
+def _uneven(layer: Layer) -> float:
+    """How far a zone lies outside of the nominal feature [mm], of an uneven profile."""
+    tolerance = layer.tolerance
+    return 0.0 if tolerance.outside is None else tolerance.outside - tolerance.width / 2
+
+
+def _zone(own: NominalFeature, layer: Layer, rows: np.ndarray, columns: np.ndarray) -> Zone:
+    """What a layer allows of the components that it and the narrower ones have."""
+    tolerance, middle = layer.tolerance, np.zeros(len(columns))
+    if own.geometry.is_plane:
+        middle[-layer.added.shape[1] :] = _uneven(layer) * layer.added[0]
+    if own.feature.size is None or not tolerance.material or tolerance.bonus == "none":
+        return Zone(columns, rows, middle, tolerance.width)
+    is_lower = _counts_from_lower(own, tolerance)
+    limit = own.feature.size.lower if is_lower else own.feature.size.upper
+    return Zone(columns, rows, middle, tolerance.width, own.size_column, limit, 1.0 if is_lower else -1.0)
 
 
 def _growth(own: NominalFeature, tolerance: GeometricTolerance, width: float) -> Callable[[np.ndarray], np.ndarray]:
@@ -199,8 +238,12 @@ def bonus(own: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) 
     limits = own.feature.size
     if limits is None or not tolerance.material:
         return np.zeros_like(size)
-    from_lower = own.geometry.is_inner == (tolerance.material == "M")
-    return np.maximum(size - limits.lower if from_lower else limits.upper - size, 0.0)
+    return np.maximum(size - limits.lower if _counts_from_lower(own, tolerance) else limits.upper - size, 0.0)
+
+
+def _counts_from_lower(own: NominalFeature, tolerance: GeometricTolerance) -> bool:
+    """Whether a zone grows with what the size is above its lower limit, or below its upper one."""
+    return own.geometry.is_inner == (tolerance.material == "M")
 
 
 def _joint(rule: str, rows: np.ndarray, s: float, width: float) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:

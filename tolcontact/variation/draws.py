@@ -84,6 +84,21 @@ class Draws:
             [self._column[each.name], *(self._column[label] for label in each.drives)] for each in assembly.variables
         ]
 
+    @property
+    def driven(self) -> np.ndarray:
+        """How much a deviation of 1 of each column adds to others (column, column): what shared causes drive."""
+        found = np.zeros((len(self._column), len(self._column)))
+        for variable in self._assembly.variables:
+            for label, factor in variable.drives.items():
+                found[self._column[variable.name], self._column[label]] += factor
+        return found
+
+    @property
+    def populations(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Columns of measured parts, and their rows (row, column)."""
+        every = self._assembly.populations
+        return [(np.array([self._column[label] for label in each.columns]), each.values) for each in every]
+
     def of(self, rows: np.ndarray, *, seed: int) -> np.ndarray:
         """Deviations (row, contributor) of some realizations, by their numbers (row,)."""
         found = np.empty((len(rows), len(self.contributors.every)))

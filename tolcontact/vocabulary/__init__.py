@@ -10,3 +10,4 @@ from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surfaces import *  # noqa: F403
 from tolcontact.vocabulary.variable import Variable as Variable
 from tolcontact.vocabulary.variation import *  # noqa: F403
+from tolcontact.vocabulary.worst_case import *  # noqa: F403

@@ -71,6 +71,14 @@ means, spreads, and what they are where contact moved parts and where not.
 >>> bool(abs(slopes.by_contact.sel(contact="touched", interval="estimate")).max() < 0.01)  # the block lies flat on the table
 True
 
+`tc.worst_case` searches all that the drawings allow for the least and the largest value of each measure, with the combination
+of deviations that gives them, and bounds them: no pose free of penetration lies beyond, to first order. Where contact alone
+does not hold a part, as on a table from above, there is no such bound.
+
+>>> worst = tc.worst_case(assembly, samples=256, solver="daqp").sel(measure="height")
+>>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
+(True, -0.0)
+
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
 
 >>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
@@ -101,9 +109,10 @@ from tolcontact.workflow.contributions import contributions
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.sensitivities import sensitivities
+from tolcontact.workflow.worst_case import worst_case
 from tolcontact.workflow.written import write_model
 
 __all__ = [
     "accessor", "build", "check", "check_population", "compare", "compare_runs", "contributions", "open_archive", "run",
-    "sensitivities", "summarize", "write_model",
+    "sensitivities", "summarize", "worst_case", "write_model",
 ]  # fmt: skip

@@ -9,13 +9,13 @@ from tolcontact import vocabulary as words
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.linear_model import linear_model
 from tolcontact.statistics.contributions import missed, sobol_indices
 from tolcontact.variation import MixedDraws, independent_groups
 from tolcontact.vocabulary import GROUPED_BY
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
 SOME = 1 << 14  # realizations that spreads are estimated from
-SMALL = 1e-3  # of a standard deviation: steps of differences
 
 
 def contributions(
@@ -58,7 +58,7 @@ def contributions(
         )
     mixed = MixedDraws(program.draws, list(groups.values()))
     values, statuses, A = _simulated(program, mixed, samples, seed, progress)
-    slopes = nominal_sensitivities(program, some.std(axis=0))
+    slopes = linear_model(program).by_deviations
     first, total, linear, off = [], [], [], []
     for measure in range(len(program.nominal.measures)):
         indices = [sobol_indices(values[:, :, state, measure]) for state in range(len(words.STATES))]
@@ -118,14 +118,3 @@ def _simulated(
             progress(done, samples * mixtures)
     values = np.concatenate(measured)
     return values.reshape(samples, mixtures, *values.shape[1:]), statuses, np.concatenate(A)
-
-
-def nominal_sensitivities(program: Program, spread: np.ndarray) -> np.ndarray:
-    """Derivatives (measure, column) of the raw measures at the nominal assembly, by central differences."""
-    steps = np.where(spread > 0, SMALL * spread, 1.0)
-    away = np.diag(steps)
-    seen = []
-    for deviations in (away, -away):
-        poses = program.place(deviations=deviations)["poses"].reshape(len(steps), len(program.nominal.parts), -1)
-        seen.append(program.observe(poses=poses, deviations=deviations)["measured"])
-    return np.asarray((seen[0] - seen[1]) / (2 * steps[:, None])).T

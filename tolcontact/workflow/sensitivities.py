@@ -9,10 +9,11 @@ from tolcontact import vocabulary as words
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.linear_model import linear_model
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import NOTHING, Estimate
 from tolcontact.variation import SteppedDraws
-from tolcontact.workflow.contributions import SOME, nominal_sensitivities
+from tolcontact.workflow.contributions import SOME
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
 STEP = 0.01  # of a contributor's standard deviation
@@ -56,7 +57,7 @@ def sensitivities(
     steps = (STEP * deviation[columns])[:, None, None]
     ahead, behind = (measured[:, up] - measured[:, :1]) / steps, (measured[:, :1] - measured[:, down]) / steps
     slopes = (ahead + behind) / 2
-    nominal = nominal_sensitivities(program, deviation)[:, columns]
+    nominal = linear_model(program).by_deviations[:, columns]
     moved = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
     changes = moved | _kinked(ahead, behind, np.abs(nominal))
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, words.CORRECTED])

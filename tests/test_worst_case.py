@@ -1,0 +1,229 @@
+"""Worst cases: documented answers, closed forms, bounds that searches reach, and the region of what drawings allow."""
+
+import importlib
+import io
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+import trimesh
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tests.cases.fasteners import fasteners
+from tests.helpers import call
+from tolcontact.variation import Region
+
+module = importlib.import_module("tolcontact.workflow.worst_case")
+
+
+@pytest.fixture
+def few_searches(monkeypatch):
+    """Two for each value, which end at coarse steps: where far ends are the answer, that is enough."""
+    monkeypatch.setattr(module, "SEARCHES", 2)
+    monkeypatch.setattr(importlib.import_module("tolcontact.workflow.extreme_search"), "FINEST", 0.1)
+
+
+def values(found, measure=0, state="corrected", of="worst"):
+    return found[of].isel(measure=measure).sel(state=state).values
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("few_searches")
+@pytest.mark.parametrize(
+    ("is_fixed", "pull", "end", "with_float", "without"),
+    [(True, -3, 0, 47, 48.5), (True, 3, 1, 53, 51.5), (False, -3, 0, 46, 48), (False, 3, 1, 54, 52)],
+)
+def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float, without):
+    """CASES C4. Forces decide where the float goes; the bound is that of any float."""
+    found = tc.worst_case(fasteners(is_fixed, pull), samples=32, solver="daqp")
+    assert values(found)[end] == pytest.approx(with_float, abs=2e-6)
+    assert values(found, measure=1)[end] == pytest.approx(without, abs=2e-6)
+    assert values(found, 1, "raw", "bound") == pytest.approx([100 - without, without][:: 1 if end else -1], abs=1e-6)
+    if is_fixed:
+        assert values(found, of="bound") == pytest.approx([47, 53], abs=1e-6)
+
+
+def test_a_clutch_has_the_worst_cases_of_its_formula():
+    """CASES C7."""
+    found = tc.worst_case(cases.model("clutch"), samples=32, solver="daqp")
+    assert values(found) == pytest.approx([5.9574, 7.9385], abs=1e-4)
+    last = found.deviations.isel(measure=0).sel(state="corrected", end="largest")
+    labels = ["hub.flat.offset", "roller.barrel.size", "ring.bore.size"]
+    assert last.sel(contributor=labels).values == pytest.approx([-0.05, -0.02, 0.025], abs=1e-9)
+    assert (found.unseen.sel(state="corrected") < 0.02).all() and not np.isfinite(values(found, of="bound")).any()
+
+
+def small_ra1(**method):
+    a = tc.Assembly("small", method=tc.Method(**method))
+    base = a.part("base", tc.Box(100, 50, 10))
+    top = a.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    for part, side in ((base, "-y"), (top, "+y")):
+        scheme = tc.three_two_one(part.face("-z"), part.face(side), part.face("-x"), inset=5)
+        a.locate(part, scheme, tolerance=0.02)
+    a.contact("interface", moving=top.face("-z"), reference=base.face("+z"))
+    a.measure("corner height", top.point(50, 0, 10), along="z")
+    return a
+
+
+@pytest.mark.parametrize("resolution", ["linearized", "exact"])
+def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(resolution):
+    """Two methods that share no code: searches on the engine, and a mixed-integer program; 2e-5 mm are of second order."""
+    found = tc.worst_case(small_ra1(objective="all points", resolution=resolution), samples=512, solver="daqp")
+    assert values(found) == pytest.approx(values(found, of="bound"), abs=3e-5)
+    assert values(found, state="raw") == pytest.approx(values(found, state="raw", of="bound"), abs=1e-5)
+    assert values(found)[1] - values(found)[0] > 0.03
+
+
+def test_contact_alone_keeps_no_part_down():
+    found = tc.worst_case(small_ra1(), samples=512, solver="daqp")
+    least, largest = values(found, of="bound")
+    assert values(found)[0] == pytest.approx(least, abs=3e-5) and math.isinf(largest)
+    assert values(found)[1] > values(found, of="random")[1] and values(found)[0] < values(found, of="random")[0]
+
+
+def test_what_is_found_is_what_the_engine_says_of_the_combination():
+    program = tc.build(small_ra1(), solver="daqp")
+    found = tc.worst_case(program, samples=64)
+    assert tc.worst_case(program, samples=64).equals(found)
+    for state in (0, 1):
+        own = found.deviations.isel(measure=0, state=state).values
+        measured = module.Evaluation(program, Region(program.draws, seed=1))(own)
+        assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
+
+
+def varied():
+    """A plate with zones of all kinds, a cause that drives a locator, and measured parts."""
+    a = tc.Assembly("varied")
+    plate = a.part("plate", tc.Box(100, 50, 10))
+    plate.feature("under", plate.face("-z"), datum="A")
+    plate.feature("top", plate.face("+z"), tc.Profile(0.3, "A", outside=0.3), tc.Parallelism(0.1, "A"))
+    a.locate(
+        plate,
+        [
+            tc.Locator("A1", (5, 5, 0), "z", 0.2),
+            tc.Locator("A2", (95, 5, 0), "z", stats.uniform(-1, 3)),
+            tc.Locator("A3", (50, 45, 0), "z", stats.norm(0, 0.1)),
+            tc.Locator("B1", (5, 0, 5), "y", tc.Tolerance(0.4, shift=1)),
+            tc.Locator("B2", (95, 0, 5), "y", 0.2),
+            tc.Locator("C1", (0, 25, 5), "x", 0),
+        ],
+    )
+    a.variable("heat", 10, drives={"plate.A1": 0.01}, units="K")
+    a.measure("corner", plate.point(100, 50, 10), along="z")
+    return a
+
+
+def region(a):
+    return Region(tc.build(a, solver="daqp").draws, seed=1), list(tc.build(a).nominal.contributors)
+
+
+def test_every_contributor_has_the_range_of_its_drawing():
+    found, labels = region(varied())
+    of = dict(zip(labels, zip(found.lower, found.upper, strict=True), strict=True))
+    assert of["plate.A1"] == (-0.1, 0.1) and of["plate.A2"] == (-1, 2)
+    assert of["plate.A3"] == pytest.approx((-0.3, 0.3)) and of["plate.B1"] == pytest.approx((0.8, 1.2))
+    assert of["plate.C1"] == (0, 0) and of["heat"] == (-5, 5)
+    own = found.middle[None].copy()
+    own[0, labels.index("heat")] = 5
+    assert found.deviations(own)[0, labels.index("plate.A1")] == pytest.approx(found.middle[0] + 0.05)
+
+
+def test_an_uneven_zone_is_where_the_drawing_has_it_and_a_tilt_is_within_its_own():
+    found, labels = region(varied())
+    top = [k for k, label in enumerate(labels) if label.startswith("plate.top")]
+    offset = next(k for k in top if "offset" in labels[k])
+    ends = []
+    for sign in (1, -1):
+        direction = np.zeros(len(labels))
+        direction[offset] = sign
+        ends.append(found.exactly_farthest(direction)[offset])
+    assert ends == pytest.approx([0.3, 0.0], abs=1e-6)  # all of the 0.3 is outside, none inside
+    tilted = found.exactly_farthest(np.isin(np.arange(len(labels)), top) * 1.0)
+    tilts = [tilted[k] for k in top if k != offset]
+    assert sum(map(abs, tilts)) == pytest.approx(0.05, abs=1e-6)  # half of the parallelism, at the corner
+
+
+def test_a_zone_grows_with_the_size_that_it_is_left():
+    a = tc.Assembly("ring")
+    ring = a.part("ring", tc.Mesh(trimesh.creation.annulus(5, 20, 10, sections=64)), fixed=True)
+    ring.feature("under", ring.face("-z"), datum="A")
+    ring.feature("rim", ring.face(tc.Cylinder(radius=20)), datum="B")
+    hole = ring.feature(
+        "hole",
+        ring.face(tc.Cylinder(radius=5)),
+        tc.Size(10, 0.2, -0.2),
+        tc.Position(0.1, "A|B", material="M", rule="translation"),
+    )
+    a.measure("place", hole.axis(0), along="x")
+    found, labels = region(a)
+    size = labels.index("ring.hole.size")
+    shifts = [labels.index(f"ring.hole.shift {axis}") for axis in "xy"]
+    direction = np.zeros(len(labels))
+    direction[shifts] = 0.6, 0.8
+    far = found.exactly_farthest(direction)
+    assert far[size] == pytest.approx(0.2)  # an inner feature has its least material where it is largest
+    assert far @ direction == pytest.approx((0.1 + 0.4) / 2, abs=1e-8)
+    direction[size] = -10
+    far = found.exactly_farthest(direction)
+    assert far[size] == pytest.approx(-0.2) and far[shifts] @ (0.6, 0.8) == pytest.approx(0.1 / 2, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["lid", "hinge", "clutch"])
+def test_steps_end_where_the_region_ends(name):
+    found, labels = region(cases.model(name))
+    rng = np.random.default_rng(2)
+    inside = found.scattered(rng, 400)
+    assert found.is_inside(inside).all()
+    steps = rng.standard_normal(inside.shape) * (found.upper - found.lower)
+    reach = found.reach(inside, steps)[:, None]
+    assert found.is_inside(inside + reach * steps).all()
+    stopped = reach[:, 0] < 0.99
+    assert not found.is_inside(inside + (reach + 0.01) * steps)[stopped].any() and stopped.mean() > 0.9
+    planes, ends = found.planes()
+    assert (inside @ planes.T <= ends + 1e-9).all()
+    goal = rng.standard_normal(len(labels))
+    assert found.exactly_farthest(goal) @ goal >= (inside @ goal).max() - 1e-9
+
+
+@pytest.mark.usefixtures("few_searches")
+def test_measured_parts_are_one_of_their_rows():
+    a = cases.one_dimensional(6)
+    a.population(pd.DataFrame({"z": [-1.0, 0.25, 2.0]}), {"block.Z": "z"})
+    found = tc.worst_case(a, samples=16, solver="daqp")
+    assert set(np.unique(found.deviations.sel(contributor="block.Z"))) <= {-1.0, 0.25, 2.0}
+    assert found.worst.sel(state="raw").values.ravel() == pytest.approx([-1, 2], abs=1e-9)
+
+
+@pytest.mark.usefixtures("few_searches")
+def test_what_cannot_be_assembled_does_not_count():
+    a = cases.square_pins()
+    found = tc.worst_case(a, samples=32, solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    assert int(found.by_status.sel(status_meaning="not_assemblable")) > 0
+    assert np.isfinite(found.worst.values).all()
+
+
+def test_nothing_that_varies_is_refused():
+    a = tc.Assembly("still")
+    part = a.part("part", tc.Box(1, 2, 3), fixed=True)
+    a.measure("corner", part.point(0, 0, 0), along="x")
+    with pytest.raises(tc.OptionError, match="nothing varies"):
+        tc.worst_case(a)
+    with pytest.raises(tc.OptionError, match="samples is 1"):
+        tc.worst_case(a, samples=1)
+
+
+@pytest.mark.usefixtures("few_searches")
+def test_the_command_prints_a_table_json_and_csv(tmp_path):
+    options = ("worst", cases.MODELS / "clutch.py", "--samples", "16", "--solver", "daqp")
+    done = call(tmp_path, *options)
+    assert done.returncode == 0 and "7.93847" in done.stdout and "+0.025" in done.stdout, done.stderr
+    assert max(map(len, done.stdout.splitlines())) <= 100
+    said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
+    assert said["data_vars"]["worst"]["data"][0][1] == pytest.approx([5.95736, 7.93847], abs=1e-4)
+    table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
+    assert {"measure", "state", "end", "worst", "bound", "random"} <= set(table)
+    assert call(tmp_path, *options, "--csv", "--json").returncode == 2

@@ -1,0 +1,102 @@
+"""The least and the largest value that each measure can have, with the combination of deviations that gives it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
+from tolcontact.simulation.linear_model import linear_model
+from tolcontact.variation import Region
+from tolcontact.workflow.extreme_search import Evaluation, Searcher, Searches
+from tolcontact.workflow.farthest_pose import farthest_poses
+from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+
+SEARCHES = 12  # for each value
+SAME = 1e-4  # of a measure's spread: ends that differ by less are one
+
+
+def worst_case(
+    model: Model | Program,
+    *,
+    samples: int = 4096,
+    seed: int = 1,
+    solver: str | None = None,
+    method: Choice | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> xr.Dataset:
+    """The least and the largest value of each measure over all that drawings allow (see tolcontact.variation.region).
+
+        worst       (measure, state, end)               found by searches on the engine, nonlinear and with contact
+        deviations  (measure, state, end, contributor)  the combination that gives it
+        bound       (measure, state, end)               beyond which no pose free of penetration lies, in the linear model; see
+                                                        tolcontact.workflow.farthest_pose. Infinite: contact alone holds nothing
+        random      (measure, state, end)               the best of `samples` random combinations
+        ends        (measure, state, end)               number of different values that searches ended at
+        unseen      (measure, state, end)               expected share of starts whose end no search has seen
+        by_status   (status_meaning)                    number of realizations, of all that were simulated
+
+    With contact a measure is neither smooth nor concave, and the linearized resolution jumps: a search finds what it finds.
+    Each begins at one of the best random combinations, goes on along single contributors, random directions, and to the far
+    end of the region in the direction of its slopes, with steps that shrink (a generating set search; Kolda, Lewis, Torczon,
+    2003). `unseen` is the estimate w (w + 1) / (n (n - 1)) of w ends of n searches (Boender, Rinnooy Kan, 1987).
+    Only certified realizations count. `progress` is called with the number of searches that ended, and of all.
+    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    """
+    check_counts(samples=samples, seed=seed)
+    program = program_of(model, solver, method)
+    region = Region(program.draws, seed=seed)
+    if not region.varies.size:
+        raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
+    rng, evaluate, linear = np.random.default_rng(seed), Evaluation(program, region), linear_model(program)
+    slopes = region.slopes(linear.by_deviations)
+    along = [region.exactly_farthest(sense * row) for row in slopes for sense in words.SENSES]
+    starts = np.vstack([region.middle, *along, region.scattered(rng, samples)])
+    seen = evaluate(starts)
+    if not np.isfinite(seen[:, words.CORRECTED]).any():
+        raise OptionError(f'"{program.nominal.assembly.name}" cannot be resolved for any of {len(starts)} combinations tried')
+    spread = np.nanmax(seen, axis=(0, 1)) - np.nanmin(seen, axis=(0, 1))
+    searches, searcher = Searches.begun(starts, seen, SEARCHES), Searcher(region, evaluate, spread, rng)
+    searcher.search(searches, progress)
+    worth = searches.value.reshape(-1, SEARCHES)
+    best = searches.take(worth.argmax(axis=1) + SEARCHES * np.arange(len(worth)))
+    searcher.finish(best)
+    shape = (len(program.nominal.measures), len(words.STATES), len(words.ENDS))
+    ends = np.array([_different(row, SAME * spread[of]) for row, of in zip(worth, best.measure, strict=True)])
+    found = {
+        "worst": (best.sense * best.value).reshape(shape),
+        "deviations": region.deviations(best.own).reshape(*shape, -1),
+        "bound": farthest_poses(program, region, linear),
+        "random": np.stack([np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)], axis=-1).swapaxes(0, 1),
+        "ends": ends.reshape(shape),
+        "unseen": np.minimum(1.0, ends * (ends + 1) / (SEARCHES * (SEARCHES - 1))).reshape(shape),
+        "by_status": evaluate.statuses,
+    }
+    return xr.Dataset(
+        {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.WORST_CASE},
+        coords={
+            words.MEASURE: [measure.name for measure in program.nominal.measures],
+            words.STATE: list(words.STATES),
+            words.END: list(words.ENDS),
+            words.CONTRIBUTOR: list(program.nominal.contributors),
+            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+            "measure_units": (words.MEASURE, [measure.units for measure in program.nominal.measures]),
+            "contributor_units": (words.CONTRIBUTOR, [each.units for each in program.draws.contributors.every]),
+        },
+        attrs={
+            "title": f"worst cases of the measures of {program.nominal.assembly.name}",
+            "random_combinations": samples,
+            "searches": SEARCHES,
+            "seed": seed,
+            "solver": program.plugin.name,
+            "resolution": program.method.resolution,
+            "objective": program.method.objective,
+        },
+    )
+
+
+def _different(values: np.ndarray, same: float) -> int:
+    """How many values (n,) differ by more than `same` from the next smaller one."""
+    return 1 + int((np.diff(np.sort(values)) > same).sum())
