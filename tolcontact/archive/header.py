@@ -29,6 +29,7 @@ class Run(NamedTuple):
 
     keep       what is archived of each realization: one of `KEPT`
     surfaces   number of realizations that will be checked against the surfaces
+    plan       the sampling plan: one of `PLANS`
     fields     of how many realizations the magnitude of displacement fields is: a number, "some", "all" or "none"
     """
 
@@ -37,6 +38,7 @@ class Run(NamedTuple):
     keep: str
     surfaces: int
     fields: str
+    plan: str = words.MONTE_CARLO
 
 
 def run_settings(program: Program, run: Run) -> dict[str, Any]:
@@ -58,7 +60,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "near_turn": method.near_turn,
         "near_travel": method.near_travel,
         "method_from": _whose(program),
-        "sampler": "monte-carlo",
+        "sampler": run.plan,
         "seed": np.int64(run.seed),
         "samples": np.int64(run.samples),
         "kept": run.keep,

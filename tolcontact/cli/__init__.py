@@ -32,6 +32,8 @@ netCDF with `--out`.
 | `--solver` | QP solver, see `tolcontact.compilation` |
 | `--resolution`, `--objective` | replace the model's own choice, see `tolcontact.contact` and `tolcontact.mechanics` |
 | `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
+| `--plan` | how contributors are drawn: `monte-carlo`, `latin hypercube` or `sobol`, see `tolcontact.variation` |
+| `--until "gap: 6 sigma +-1 %"` | go on until the interval of a corrected measure is so narrow: `mean +-0.01`, `ppm +-20 %` |
 | `--keep measures`, `poses` or `all` | what is archived of each realization |
 | `--fields` | how many realizations the magnitudes of displacement fields cover: a number, `some`, `all` or `none` |
 | `--quiet` | no progress, no notices |

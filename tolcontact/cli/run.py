@@ -12,7 +12,7 @@ from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.report import write_page
-from tolcontact.vocabulary import KEPT
+from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
 
@@ -37,6 +37,11 @@ def run(
         str,
         typer.Option(metavar="some|all|N|none", help="Number of realizations that magnitudes of displacement fields cover."),
     ] = "some",
+    plan: Annotated[str, typer.Option(help=f"How contributors are drawn: {or_(PLANS)}.")] = MONTE_CARLO,
+    until: Annotated[
+        str | None,
+        typer.Option(metavar="TEXT", help='Go on until an interval is so narrow: "MEASURE: 6 sigma +-1 %", "...: ppm +-20 %".'),
+    ] = None,
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
@@ -61,7 +66,7 @@ def run(
 
         results = run_model(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces,
+            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until,
             fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip
     with results:

@@ -27,19 +27,19 @@ PLACES = 33  # how many order statistics around each percentile are read, at mos
 
 def below(x: Sample, limit: float) -> Estimate:
     """Share of values below the lower limit, exact interval; none if that side is open."""
-    return share(Sample(lambda: (piece < limit for piece in x.pieces()))) if np.isfinite(limit) else NOTHING
+    return share(x.map(lambda piece: piece < limit)) if np.isfinite(limit) else NOTHING
 
 
 def above(x: Sample, limit: float) -> Estimate:
     """Share of values above the upper limit, exact interval; none if that side is open."""
-    return share(Sample(lambda: (piece > limit for piece in x.pieces()))) if np.isfinite(limit) else NOTHING
+    return share(x.map(lambda piece: piece > limit)) if np.isfinite(limit) else NOTHING
 
 
 def outside(x: Sample, lower: float, upper: float) -> Estimate:
     """Share of values beyond the limits, exact interval; none without limits."""
     if not (np.isfinite(lower) or np.isfinite(upper)):
         return NOTHING
-    return share(Sample(lambda: ((piece < lower) | (piece > upper) for piece in x.pieces())))
+    return share(x.map(lambda piece: (piece < lower) | (piece > upper)))
 
 
 def by_percentiles(x: Sample, lower: float, upper: float) -> tuple[Estimate, Estimate]:

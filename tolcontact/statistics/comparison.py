@@ -11,7 +11,7 @@ from tolcontact.errors import OptionError
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.intervals import NOTHING, Estimate
-from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary import summarize
 
 DRAWS = ("seed", "sampler")  # attributes: what the numbers of a realization follow from
@@ -146,7 +146,7 @@ class _Change:
         return np.array([[self._furthest(measure, state) for measure in measures] for state in words.STATES])
 
     def _samples(self, measure: str, state: str) -> list[Sample]:
-        return [_sample(rows, measure, state) for rows in self.rows]
+        return [measured_sample(rows, rows[words.MEASURE].values.tolist().index(measure), state) for rows in self.rows]
 
     def _of(self, measure: str, state: str) -> list[Estimate]:
         after, before = self._samples(measure, state)
@@ -166,15 +166,9 @@ class _Change:
         return float(max(np.abs(a - b).max() for a, b in zip(after.pieces(), before.pieces(), strict=True)))
 
 
-def _sample(rows: xr.Dataset, measure: str, state: str) -> Sample:
-    place = {words.MEASURE: rows[words.MEASURE].values.tolist().index(measure), words.STATE: words.STATES.index(state)}
-    of = rows.isel(place)
-    return Sample(lambda: (np.asarray(piece[words.MEASURED.name].values) for piece in pieces(of)))
-
-
 def _outside(x: Sample, of: xr.Dataset) -> Sample | None:
     """Which values are beyond a run's own limits; nothing without limits."""
     lower, upper = float(of["measure_lower"]), float(of["measure_upper"])
     if not (np.isfinite(lower) or np.isfinite(upper)):
         return None
-    return Sample(lambda: ((piece < lower) | (piece > upper) for piece in x.pieces()))
+    return x.map(lambda piece: (piece < lower) | (piece > upper))

@@ -35,7 +35,7 @@ def mean(x: np.ndarray | Sample) -> Estimate:
     """Mean, Student's t interval."""
     x = Sample.of(x)
     deviation = np.sqrt(_unbiased(x))
-    half = float(student(x.count - 1) * deviation / np.sqrt(x.count))
+    half = float(student(x.count - 1) * deviation / np.sqrt(x.count)) * x.widening
     return Estimate(x.mean, x.mean - half, x.mean + half)
 
 
@@ -56,8 +56,11 @@ def by_influence(estimate: float, squares: float, count: int) -> Estimate:
 def variance(x: np.ndarray | Sample) -> Estimate:
     """Variance; Bonett's interval (2006), on the log scale with the standard error that the fourth moment gives."""
     x = Sample.of(x)
-    estimate, lower, upper = of_moments(x.count, *x.moments)
-    return Estimate(float(estimate), float(lower), float(upper))
+    estimate, lower, upper = (float(value) for value in of_moments(x.count, *x.moments))
+    widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
+    if widening == 1.0 or not estimate > 0:
+        return Estimate(estimate, lower, upper)
+    return Estimate(estimate, estimate * (lower / estimate) ** widening, estimate * (upper / estimate) ** widening)
 
 
 def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimate:
@@ -79,6 +82,10 @@ def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estim
     x = Sample.of(x)
     ranks = [_ranks(x.count, percent / 100) for percent in percents]
     values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
+    widenings = [_below(x, own).widening for own in values[:, 2]]
+    if any(widening != 1.0 for widening in widenings):
+        ranks = [_spread(group, widening) for group, widening in zip(ranks, widenings, strict=True)]
+        values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
     found = []
     for (below, above, _, _, share), (low, high, one, next_) in zip(ranks, values, strict=True):
         lower, upper = low if below >= 0 else -np.inf, high if above < x.count else np.inf
@@ -95,10 +102,12 @@ def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
 def share(hits: np.ndarray | Sample) -> Estimate:
     """Share of True in a sample of booleans, exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
-    return share_of(sum(int(piece.sum()) for piece in hits.pieces()), hits.count)
+    widening = hits.map(lambda piece: piece.astype(float)).widening
+    k, n = sum(int(piece.sum()) for piece in hits.pieces()), hits.count
+    return share_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else share_of(k, n)
 
 
-def share_of(k: int, n: int) -> Estimate:
+def share_of(k: float, n: float) -> Estimate:
     """`share` of `k` hits among `n`."""
     lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
     upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
@@ -116,7 +125,11 @@ def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> E
     influence2 = sum((((a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs) ** 2).sum() for a, b in pairs)
     # The correction for small samples is Bonett's for one variance.
     n = after.count
-    factor = np.exp(_Z * n / (n - _Z) * np.sqrt((influence2 / n + 3 / n) / (n - 1)))
+    together = Sample(lambda: (
+        (a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs
+        for a, b in zip(after.pieces(), before.pieces(), strict=True)
+    ), after.together)  # fmt: skip
+    factor = np.exp(together.widening * _Z * n / (n - _Z) * np.sqrt((influence2 / n + 3 / n) / (n - 1)))
     return Estimate(ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor))
 
 
@@ -147,6 +160,24 @@ def _ranks(n: int, p: float) -> tuple[int, int, int, int, float]:
     place = (n - 1) * p
     one = int(np.floor(place))
     return lower, upper, one, min(one + 1, n - 1), place - one
+
+
+def _below(x: Sample, value: float) -> Sample:
+    """1 for each number that is not above a value, 0 for the others."""
+    return x.map(lambda piece: (piece <= value).astype(float))
+
+
+def _spread(ranks: tuple[int, int, int, int, float], widening: float) -> tuple[int, int, int, int, float]:
+    """Ranks with the interval's bounds nearer, or farther."""
+    lower, upper, one, next_, share = ranks
+    place = one + share
+    return (
+        int(np.floor(place - widening * (place - lower))),
+        int(np.ceil(place + widening * (upper - place))),
+        one,
+        next_,
+        share,
+    )
 
 
 def _binomial_quantile(q: float, n: int, p: float) -> int:

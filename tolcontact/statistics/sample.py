@@ -4,16 +4,25 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
+import xarray as xr
+from scipy import special
+
+from tolcontact import vocabulary as words
+from tolcontact.realizations import pieces
 
 AT_ONCE = 1 << 18  # values that are sorted in memory
 DIGIT = 16  # bits
+LEAST_REPLICATES = 16
 
 
 class Sample:
-    """Numbers, one for each realization. `pieces` gives them in arrays, from the first one each time that it is called."""
+    """Numbers, one for each realization. `pieces` gives them in arrays, from the first one each time that it is called.
 
-    def __init__(self, pieces: Callable[[], Iterable[np.ndarray]]) -> None:
-        self.pieces = pieces
+    `together` realizations after each other are a replicate, independent of all others; 1 if each of them is.
+    """
+
+    def __init__(self, pieces: Callable[[], Iterable[np.ndarray]], together: int = 1) -> None:
+        self.pieces, self.together = pieces, together
 
     @classmethod
     def of(cls, x: "np.ndarray | Sample") -> "Sample":
@@ -21,7 +30,32 @@ class Sample:
         return x if isinstance(x, Sample) else cls(lambda: [x])
 
     def __sub__(self, other: "Sample") -> "Sample":
-        return Sample(lambda: (a - b for a, b in zip(self.pieces(), other.pieces(), strict=True)))
+        return Sample(lambda: (a - b for a, b in zip(self.pieces(), other.pieces(), strict=True)), self.together)
+
+    def map(self, function: Callable[[np.ndarray], np.ndarray]) -> "Sample":
+        """What a function of single numbers makes of them."""
+        return Sample(lambda: (function(piece) for piece in self.pieces()), self.together)
+
+    @property
+    def widening(self) -> float:
+        """By how much an interval of the mean for independent realizations is too narrow (1 if they are, less if too wide).
+
+        The root of the design effect (Kish, 1965): the variance of means of replicates, over what it were if realizations were
+        independent; with Student's t for that many replicates. Below LEAST replicates 1: their spread is not known well.
+        """
+        if self.together == 1:
+            return 1.0
+        replicates = self.count // self.together
+        if replicates < LEAST_REPLICATES or not self.moments[0] > 0:
+            return 1.0
+        sums, place = np.zeros(replicates), 0
+        for piece in self.pieces():
+            own = (place + np.arange(len(piece))) // self.together
+            sums += np.bincount(own, piece - self.mean, minlength=replicates)[:replicates]
+            place += len(piece)
+        variance = (sums / self.together).var(ddof=1)
+        shared = float(special.stdtrit(replicates - 1, 0.975) / special.ndtri(0.975))
+        return float(shared * np.sqrt(variance * self.together / self.moments[0]))
 
     @cached_property
     def count(self) -> int:
@@ -67,6 +101,15 @@ class Sample:
                 rest[k] -= ends[begins, digit - 1] if digit else 0
                 found[k] = (found[k] << np.uint64(DIGIT)) | np.uint64(digit)
         return _values(found)
+
+
+def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
+    """The values of a measure, by number, in a state; read from the rows of an archive as often as needed."""
+    of = rows[[words.MEASURED.name]].sel({words.STATE: state}).isel({words.MEASURE: measure})
+    is_planned = rows.attrs.get("sampler", words.MONTE_CARLO) != words.MONTE_CARLO
+    return Sample(
+        lambda: (np.asarray(piece[words.MEASURED.name].values) for piece in pieces(of)), words.REPLICATE if is_planned else 1
+    )
 
 
 _SIGN = np.uint64(1 << 63)

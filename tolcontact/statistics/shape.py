@@ -30,8 +30,9 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
 def by_influence(x: Sample, estimate: float, influence: Callable[[np.ndarray], np.ndarray]) -> Estimate:
     """An estimate with the interval that its influence function of standardized values says."""
     scale = np.sqrt(x.moments[0])
-    squares = sum(float((influence((piece - x.mean) / scale) ** 2).sum()) for piece in x.pieces())
-    return intervals.by_influence(estimate, squares, x.count)
+    of = x.map(lambda piece: influence((piece - x.mean) / scale))
+    squares = sum(float((piece**2).sum()) for piece in of.pieces())
+    return intervals.by_influence(estimate, squares * of.widening**2, x.count)
 
 
 def standardized(x: Sample) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from tolcontact.readable import picture_of
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import capability, contacts, intervals
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.shape import kurtosis, skewness
 
 LEAST = 2
@@ -55,7 +55,7 @@ def summarize(results: xr.DataTree) -> Summary:
         raise ArchiveError(f"{done} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
     measures = range(rows.sizes[words.MEASURE])
-    samples = [[_sample(rows, words.MEASURED.name, state, measure) for state in words.STATES] for measure in measures]
+    samples = [[measured_sample(rows, measure, state) for state in words.STATES] for measure in measures]
     values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
     changes = np.array([_change(raw, corrected) for raw, corrected in samples])
     by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
@@ -124,6 +124,14 @@ def summarize(results: xr.DataTree) -> Summary:
     )
 
 
+def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
+    """One of the statistics of `summarize`, of a corrected measure."""
+    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
+    number = rows[words.MEASURE].values.tolist().index(measure)
+    x = measured_sample(rows, number, words.STATES[words.CORRECTED])
+    return _of_sample(x, rows, number)[words.EVERY_STATISTIC.index(statistic)]
+
+
 def in_conflict(rows: xr.Dataset) -> np.ndarray:
     """Which pairs contradict each other if no pose is free of penetration, (realization, pair) bool.
 
@@ -132,11 +140,6 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     gap = rows[words.GAP_MIN.name].sel({words.STATE: "corrected"}).transpose(words.REALIZATION, words.PAIR).values
     stuck = rows[words.STATUS.name].values == words.Status.NOT_ASSEMBLABLE
     return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
-
-
-def _sample(rows: xr.Dataset, name: str, state: str, measure: int) -> Sample:
-    of = rows[[name]].sel({words.STATE: state}).isel({words.MEASURE: measure})
-    return Sample(lambda: (np.asarray(piece[name].values) for piece in pieces(of)))
 
 
 def _penetration(rows: xr.Dataset) -> np.ndarray:

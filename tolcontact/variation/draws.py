@@ -4,6 +4,7 @@ The draw of a contributor in realization k depends on the seed, the contributor'
 labels of the others, too): not on blocks, or on the order of declarations.
 """
 
+import copy
 from collections.abc import Callable
 
 import numpy as np
@@ -13,7 +14,9 @@ from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.variation.contributors import Contributors
-from tolcontact.variation.uniforms import STREAM, uniform
+from tolcontact.variation.plans import Numbers, Plan
+from tolcontact.variation.uniforms import STREAM
+from tolcontact.vocabulary import MONTE_CARLO
 
 SURELY = 1e-16  # the least distance of a number from 0 and 1
 
@@ -38,7 +41,19 @@ class Draws:
                 )
         if faults:
             raise ModelError(self._assembly.name, faults)
+        self._plan = Plan(MONTE_CARLO, [])
         self._factors = [np.linalg.cholesky(np.array(each.matrix)) for each in self._assembly.correlations]
+
+    def planned(self, name: str) -> "Draws":
+        """The same contributors, drawn by a sampling plan (see plans)."""
+        other = copy.copy(self)
+        other._plan = Plan(name, [*self._column, *self._rows_drawn])
+        return other
+
+    @property
+    def plan(self) -> str:
+        """The name of its sampling plan."""
+        return self._plan.name
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
         """Deviations (realization, contributor) of realizations `start` to `stop`, in mm or the units of the contributor.
@@ -47,20 +62,21 @@ class Draws:
         """
         every, labels = self.contributors.every, list(self._column)
         deviations = np.empty((stop - start, len(every)))
-        correlated = self._correlated(seed, start, stop)
+        numbers = self._plan.numbers(seed, start, stop)
+        correlated = self._correlated(numbers)
         for column, each in enumerate(every):
-            u = correlated[column] if column in correlated else uniform(seed, each.label, start, stop)
+            u = correlated[column] if column in correlated else numbers(each.label)
             deviations[:, column] = each.drawn(u)
         for together in self.contributors.together:
             own = [labels[column] for column in together.columns]
 
             def anew(attempt: int, own: list[str] = own) -> np.ndarray:
                 said = [f"{label} #{attempt}" if attempt else label for label in own]
-                return np.stack([uniform(seed, label, start, stop) for label in said], axis=1)
+                return np.stack([numbers(label) for label in said], axis=1)
 
             deviations[:, together.columns] = together.draw(anew)
-        for number, population in enumerate(self._assembly.populations):
-            rows = uniform(seed, f"population {number + 1}: {', '.join(population.columns)}", start, stop)
+        for label, population in zip(self._rows_drawn, self._assembly.populations, strict=True):
+            rows = numbers(label)
             drawn = population.values[(rows * len(population.values)).astype(int)]
             deviations[:, [self._column[label] for label in population.columns]] = drawn
         sizes = {bonus.size for bonus in self.contributors.bonuses}
@@ -71,6 +87,11 @@ class Draws:
         self._drive(deviations, lambda column: column not in sizes)
         self._check(deviations)
         return deviations
+
+    @property
+    def _rows_drawn(self) -> list[str]:
+        """What the numbers that choose the rows of measured parts are called."""
+        return [f"population {k}: {', '.join(each.columns)}" for k, each in enumerate(self._assembly.populations, start=1)]
 
     @property
     def dependent(self) -> list[list[int]]:
@@ -115,11 +136,11 @@ class Draws:
                 if drives(self._column[label]):
                     deviations[:, self._column[label]] += factor * deviations[:, self._column[variable.name]]
 
-    def _correlated(self, seed: int, start: int, stop: int) -> dict[int, np.ndarray]:
+    def _correlated(self, numbers: Numbers) -> dict[int, np.ndarray]:
         """Uniform numbers (realization,) of correlated contributors by their column: a Gaussian copula."""
         found = {}
         for correlation, factor in zip(self._assembly.correlations, self._factors, strict=True):
-            normal = np.stack([ndtri(uniform(seed, label, start, stop)) for label in correlation.labels], axis=1)
+            normal = np.stack([ndtri(numbers(label)) for label in correlation.labels], axis=1)
             mixed = sum(normal[:, k, None] * factor[:, k] for k in range(len(factor)))  # in a fixed order, whatever the block
             for label, u in zip(correlation.labels, ndtr(mixed).T, strict=True):
                 found[self._column[label]] = u.clip(SURELY, 1 - SURELY)

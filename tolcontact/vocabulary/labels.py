@@ -20,6 +20,8 @@ BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated togethe
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
 SOLVER, RUN, STATUS_MEANING, EXTENT = "solver", "run", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
+MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
+REPLICATE = 256  # realizations that the last two draw together, independent of all others
 KEPT = ("measures", "poses", "all")
 FIELD_CHOICES = ("some", "all", "none")  # besides a number
 

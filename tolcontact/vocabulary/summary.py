@@ -6,6 +6,7 @@ PERCENTILES = (0.135, 5, 50, 95, 99.865)
 STATISTICS = ("mean", "standard deviation", "6 sigma", "variance", *(f"{percent:g} %" for percent in PERCENTILES))
 SKEWNESS, KURTOSIS = "skewness", "kurtosis"
 BELOW, ABOVE, OUTSIDE = "below limit", "above limit", "outside limits"
+PPM = "ppm"  # a short word for the share outside of the limits
 PP, PPK, PP_NORMAL, PPK_NORMAL = "Pp", "Ppk", "Pp as normal", "Ppk as normal"
 SHARES, CAPABILITY = (BELOW, ABOVE, OUTSIDE), (PP, PPK, PP_NORMAL, PPK_NORMAL)
 EVERY_STATISTIC = (*STATISTICS, SKEWNESS, KURTOSIS, *SHARES, *CAPABILITY)

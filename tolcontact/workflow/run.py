@@ -20,8 +20,9 @@ from tolcontact.simulation import Block, map_blocks
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import BlockSums, DisplacementFields, Summary
 from tolcontact.statistics import summarize as statistics_of
-from tolcontact.vocabulary import FIELD_CHOICES, KEPT
+from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.forecast import announce
+from tolcontact.workflow.until import Target
 
 DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
@@ -101,6 +102,8 @@ def run(
     keep: str = "all",
     surfaces: int = SURFACES,
     fields: int | str = "some",
+    plan: str = MONTE_CARLO,
+    until: str | None = None,
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
@@ -111,6 +114,10 @@ def run(
     status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
     `fields` is the number of realizations, the first ones, that the magnitudes of displacement fields cover, "all", "none", or
     "some": 16 384, and fewer where a part has many vertices. Their components are always exact, over all realizations.
+    `plan` is how contributors are drawn: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two
+    draw 256 realizations together; from 16 such replicates on, intervals are theirs, and narrower.
+    `until` says how narrow an interval has to become, such as "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm
+    +-20 %", of corrected measures: `samples` are the first ones, and as many more follow as it takes.
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
@@ -122,19 +129,28 @@ def run(
         raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
     if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
         raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
+    if plan not in PLANS:
+        raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
     check_program(model, solver, method)
+    target = None if until is None else Target.of(until)
 
     def write(path: Path) -> None:
         program = program_of(model, solver, method)
-        asked = Run(seed, samples, keep, surfaces, str(fields))
-        of_fields = DisplacementFields(program.nominal, asked.fields)
-        with (
-            ArchiveWriter.resume(path, program, asked)
-            if resume and path.exists()
-            else ArchiveWriter(path, program, asked, of_fields.sizes)
-        ) as writer:
-            announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-            _simulate(program, writer, of_fields, seed, progress)
+        program = replace(program, draws=program.draws.planned(plan))
+        if target:
+            target.check(program)
+        asked, goes_on = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
+        while True:
+            of_fields = DisplacementFields(program.nominal, asked.fields)
+            with (
+                ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, of_fields.sizes)
+            ) as writer:
+                announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
+                _simulate(program, writer, of_fields, seed, progress)
+            more = target.next(path, program) if target else None
+            if more is None:
+                return
+            asked, goes_on = asked._replace(samples=more), True
 
     if out is None:
         for word, value in {"overwrite": overwrite, "resume": resume}.items():

@@ -1,0 +1,168 @@
+"""Sampling plans: what they promise of the numbers, honest intervals from replicates, and runs that go on until they know."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import ndtri
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+from tolcontact.statistics import intervals
+from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.shape import skewness
+from tolcontact.variation.plans import Plan
+from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, PLANS, REPLICATE, SOBOL
+
+STRATIFIED = [LATIN_HYPERCUBE, SOBOL]
+LABELS = ["part.A1", "part.A2", "part.A3"]
+
+
+@pytest.mark.parametrize("name", STRATIFIED)
+def test_each_replicate_fills_all_classes_of_each_contributor_once(name):
+    numbers = Plan(name, LABELS).numbers(7, 0, 5 * REPLICATE)
+    for label in LABELS:
+        classes = np.floor(numbers(label).reshape(5, REPLICATE) * REPLICATE)
+        assert (np.sort(classes, axis=1) == np.arange(REPLICATE)).all()
+    firsts = [numbers(label).reshape(5, REPLICATE)[:, 0] for label in LABELS]
+    assert len(np.unique(firsts)) == 15  # replicates and contributors differ
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_a_number_depends_on_seed_label_and_realization_alone(name):
+    everything = Plan(name, LABELS).numbers(5, 0, 3000)
+    for start, stop in ((0, 1), (7, 20), (255, 257), (256, 512), (1000, 2901)):
+        some = Plan(name, LABELS[::-1]).numbers(5, start, stop)
+        assert all((some(label) == everything(label)[start:stop]).all() for label in [*LABELS, "beside"])
+    assert (Plan(name, LABELS).numbers(6, 0, 100)("part.A1") != everything("part.A1")[:100]).all()
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_single_numbers_are_uniform_and_contributors_independent(name):
+    numbers = Plan(name, LABELS).numbers(3, 0, 40 * REPLICATE)
+    x = np.column_stack([numbers(label) for label in LABELS])
+    assert 0 < x.min() and x.max() < 1
+    for column in x[::7].T:
+        assert stats.kstest(column, "uniform").pvalue > 1e-3
+    assert np.abs(np.corrcoef(x.T) - np.eye(3)).max() < 4 / np.sqrt(len(x))
+
+
+def clipped(name, seed, count):
+    """max(0, sum of three), whose standard deviation is 1."""
+    numbers = Plan(name, LABELS).numbers(seed, 0, count)
+    return np.maximum(0.0, sum(ndtri(numbers(label)) for label in LABELS) / np.sqrt(3))
+
+
+MEAN, SECOND = 1 / np.sqrt(2 * np.pi), 0.5
+SIGMA = np.sqrt(SECOND - MEAN**2)
+THIRD = 2 / np.sqrt(2 * np.pi)  # E max(0, z)^3
+SKEW = (THIRD - 3 * MEAN * SECOND + 2 * MEAN**3) / SIGMA**3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STRATIFIED)
+def test_intervals_of_replicates_cover(name):
+    """500 runs of 20 replicates; two standard errors of a coverage of 95 % are 2 %."""
+    repeats, hits, widths = 500, dict.fromkeys(("mean", "6 sigma", "share", "95 %", "skewness"), 0), []
+    truths = {"mean": MEAN, "6 sigma": 6 * SIGMA, "share": stats.norm.sf(1), "95 %": stats.norm.ppf(0.95), "skewness": SKEW}
+    for seed in range(repeats):
+        values = clipped(name, seed, 20 * REPLICATE)
+        x = Sample(lambda values=values: [values[:3000], values[3000:]], REPLICATE)
+        found = {
+            "mean": intervals.mean(x),
+            "6 sigma": intervals.standard_deviation(x, times=6),
+            "share": intervals.share(x.map(lambda piece: piece > 1)),
+            "95 %": intervals.percentile(x, 95),
+            "skewness": skewness(x),
+        }
+        for word, (estimate, lower, upper) in found.items():
+            assert lower <= estimate <= upper
+            hits[word] += lower <= truths[word] <= upper
+        plain = intervals.mean(values)
+        widths.append((found["mean"].upper - found["mean"].lower) / (plain.upper - plain.lower))
+    assert all(0.93 * repeats <= count <= 0.98 * repeats for count in hits.values()), hits
+    assert np.median(widths) < 0.6
+
+
+def test_few_replicates_have_the_intervals_of_independent_realizations():
+    x = clipped(SOBOL, 1, 15 * REPLICATE)
+    assert intervals.mean(Sample(lambda: [x], REPLICATE)) == intervals.mean(x)
+    assert intervals.mean(Sample(lambda: [x], 1)) == intervals.mean(x)
+    nothing = Sample(lambda: [np.zeros(20 * REPLICATE, dtype=bool)], REPLICATE)
+    assert intervals.share(nothing) == intervals.share_of(0, 20 * REPLICATE)
+
+
+@pytest.mark.parametrize("name", STRATIFIED)
+def test_a_run_by_a_plan_is_narrower_and_its_archive_says_so(name, tmp_path):
+    options = {"samples": 4096, "seed": 2, "solver": "daqp", "fields": "none", "surfaces": 4}
+    plain = tc.summarize(tc.run(cases.ra1(), **options))
+    with tc.run(cases.ra1(), plan=name, out=tmp_path / "a.nc", **options) as results:
+        assert results.attrs["sampler"] == name
+        found = tc.summarize(results)
+        kept = results["sample"].deviation.values
+    widths = [
+        np.diff(each.statistic_value.sel(statistic="mean", interval=["lower", "upper"]).values[0])[:, 0]
+        for each in (plain, found)
+    ]
+    assert (widths[1] < [0.5 * widths[0][0], 0.95 * widths[0][1]]).all()
+    assert np.array_equal(kept, tc.build(cases.ra1()).draws.planned(name)(seed=2, start=0, stop=4096))
+    with pytest.raises(tc.ArchiveError, match="sampler"):
+        tc.run(cases.ra1(), out=tmp_path / "a.nc", resume=True, **options)
+    with tc.run(cases.ra1(), plan=name, out=tmp_path / "a.nc", resume=True, **options | {"samples": 8192}) as longer:
+        assert np.array_equal(longer["sample"].deviation.values[:4096], kept) and longer.sizes["realization"] == 8192
+
+
+def test_a_run_goes_on_until_an_interval_is_narrow_enough(tmp_path):
+    options = {"samples": 300, "solver": "daqp", "fields": "none", "surfaces": 4}
+    results = tc.run(cases.ra1(), until="corner height: 6 sigma +-2 %", **options)
+    estimate, lower, upper = tc.summarize(results).statistic_value.sel(state="corrected", statistic="6 sigma").values[0]
+    assert (upper - lower) / 2 <= 0.02 * estimate
+    assert 300 < results.sizes["realization"] < 20_000
+    whole = tc.run(cases.ra1(), **options | {"samples": results.sizes["realization"]})
+    assert np.array_equal(whole.measured, results.measured)  # the same realizations as without stages
+    enough = tc.run(cases.ra1(), until="corner height: mean ±1", out=tmp_path / "a.nc", **options)
+    assert enough.sizes["realization"] == 300
+    of_plan = tc.run(cases.ra1(), until="corner height: 6 sigma +-2 %", plan=SOBOL, **options)
+    assert of_plan.sizes["realization"] <= results.sizes["realization"]
+
+
+def test_what_cannot_be_reached_is_said(tmp_path, caplog):
+    options = {"samples": 64, "solver": "daqp", "fields": "none", "surfaces": 0}
+    results = tc.run(cases.ra1(), until="corner height: mean +-1e-9", **options)
+    assert results.sizes["realization"] == 64 and "it takes more than 100000000" in caplog.text
+    free = cases.one_dimensional(0)
+    assert tc.run(free, until="height: ppm +-20 %", **options).sizes["realization"] == 64 and "limits" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"plan": "halton"}, "plan is 'halton'"),
+        ({"until": "corner height"}, "until is 'corner height'"),
+        ({"until": "corner height: mean +-0"}, "until is"),
+        ({"until": "corner height: width +-1 %"}, '"width"; expected one of: ppm, mean'),
+        ({"until": "height: mean +-1 %"}, 'the measure "height"; expected one of: corner height'),
+        ({"until": 3}, "until is 3"),
+    ],
+)
+def test_wrong_plans_and_targets_are_refused(options, said, tmp_path):
+    with pytest.raises(tc.OptionError) as refused:
+        tc.run(cases.ra1(), out=tmp_path / "a.nc", **options)
+    assert said in str(refused.value) and not list(tmp_path.iterdir())
+
+
+def test_a_measure_may_have_a_colon_in_its_name():
+    a = cases.one_dimensional(0)
+    a.measure("gap: left", a.parts[1].point(5, 5, 10), along="z")
+    assert tc.run(a, samples=64, solver="daqp", until="gap: left: mean +-10").sizes["realization"] == 64
+
+
+def test_the_command_has_plans_and_targets(tmp_path):
+    done = call(
+        tmp_path, "run", cases.MODELS / "ra1.py", "--samples", "512", "--solver", "daqp", "--plan", "latin hypercube",
+        "--until", "corner height: mean +-0.03", "--out", "a.nc",
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    with tc.open_archive(tmp_path / "a.nc") as results:
+        assert results.attrs["sampler"] == LATIN_HYPERCUBE != MONTE_CARLO and results.sizes["realization"] > 512
+    assert call(tmp_path, "run", cases.MODELS / "ra1.py", "--plan", "sobel").returncode == 2
