@@ -60,6 +60,7 @@ from .workflow import (
     run,
     sensitivities,
     summarize,
+    tails,
     worst_case,
     write_model,
 )
@@ -71,5 +72,5 @@ __all__ = [
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
-    "plot", "run", "sensitivities", "simulate_blocks", "summarize", "three_two_one", "worst_case", "write_model",
+    "plot", "run", "sensitivities", "simulate_blocks", "summarize", "tails", "three_two_one", "worst_case", "write_model",
 ]  # fmt: skip

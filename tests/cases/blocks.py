@@ -127,11 +127,12 @@ def block_on_six(width: float, one_sided: int = 0) -> tc.Assembly:
     return a
 
 
-def square_pins() -> tc.Assembly:
+def square_pins(varies: str = "both") -> tc.Assembly:
     """CASES C6: a plate with two square pins, free to slide along x only; each face of pins and slots is off and askew.
 
     A face is a part of its own. Off by u with sigma t/6 and askew by gamma with sigma t/30 is the same as two independent
-    deviations with sigma t/6 sqrt(2) at y = -5 and +5. A push along x finds its rest where both pins fit.
+    deviations with sigma t/6 sqrt(2) at y = -5 and +5. A push along x finds its rest where both pins fit. Of "translations"
+    or "rotations" alone both deviations are driven by one cause.
     """
     t = 0.16
     a = tc.Assembly("C6")
@@ -150,7 +151,9 @@ def square_pins() -> tc.Assembly:
     def wall(name, x, on=None):
         part = a.part(name, tc.Box(1, 10, 10), at=(x, -5, 0), fixed=True)
         held = {"Z1": ((0, 0, 0), "z"), "Z2": ((1, 0, 0), "z"), "Z3": ((0, 10, 0), "z"), "Y": ((0, 0, 0), "y")}
-        varying = [tc.Locator(f"X{y}", (0, y, 0), "x", np.sqrt(2) * t) for y in (0, 10)]
+        varying = [tc.Locator(f"X{y}", (0, y, 0), "x", np.sqrt(2) * t if varies == "both" else 0) for y in (0, 10)]
+        if varies != "both":
+            a.variable(f"{name} off", t, drives={f"{name}.X0": 1, f"{name}.X10": 1 if varies == "translations" else -1})
         a.locate(part, [*(tc.Locator(key, p, along, 0) for key, (p, along) in held.items()), *varying], on=on)
         return part
 

@@ -14,6 +14,7 @@
     tolcontact contributions MODEL.py [--by part]        what the variance of each measure comes from, with contact and without
     tolcontact sensitivities MODEL.py                    how much each measure follows each contributor, through contact
     tolcontact worst MODEL.py                            the least and the largest value of each measure, and what gives it
+    tolcontact tails MODEL.py                            how often measures are outside their limits, where that is rare
     tolcontact compare A.nc B.nc [--report FILE.html]    runs side by side, from the same draws or not
     tolcontact view MODEL.py | FILE.stp                  look at it before any run: faces with the words that choose them
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
@@ -54,10 +55,24 @@ netCDF with `--out`.
 (True, 0)
 """
 
-from tolcontact.cli import bodies, check, compare, contributions, faces, new, report, run, sensitivities, summary, view, worst
+from tolcontact.cli import (
+    bodies,
+    check,
+    compare,
+    contributions,
+    faces,
+    new,
+    report,
+    run,
+    sensitivities,
+    summary,
+    tails,
+    view,
+    worst,
+)
 from tolcontact.cli.app import command_line, main
 
 __all__ = [
     "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "report", "run", "sensitivities",
-    "summary", "view", "worst",
+    "summary", "tails", "view", "worst",
 ]  # fmt: skip

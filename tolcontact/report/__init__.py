@@ -47,10 +47,11 @@ from tolcontact.report.text import (
     runs_text,
     sensitivities_text,
     summary_text,
+    tails_text,
     worst_case_text,
 )
 
 __all__ = [
     "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text",
-    "sensitivities_text", "summary_text", "worst_case_text", "write_comparison", "write_page", "write_view",
+    "sensitivities_text", "summary_text", "tails_text", "worst_case_text", "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

@@ -60,9 +60,20 @@ class Draws:
 
         Raises ModelError for a distribution that yields non-finite deviations.
         """
+        return self.made_of(self._plan.numbers(seed, start, stop), stop - start)
+
+    @property
+    def varying(self) -> list[str]:
+        """Labels of the numbers that deviations are made of, but for contributors that do not vary, or were measured."""
+        measured = {label for population in self._assembly.populations for label in population.columns}
+        some = np.array([0.1, 0.5, 0.9])
+        drawn = [each.label for each in self.contributors.every if np.ptp(each.drawn(some)) > 0 and each.label not in measured]
+        return drawn + self._rows_drawn
+
+    def made_of(self, numbers: Numbers, count: int) -> np.ndarray:
+        """Deviations (count, contributor) of numbers between 0 and 1 for each label."""
         every, labels = self.contributors.every, list(self._column)
-        deviations = np.empty((stop - start, len(every)))
-        numbers = self._plan.numbers(seed, start, stop)
+        deviations = np.empty((count, len(every)))
         correlated = self._correlated(numbers)
         for column, each in enumerate(every):
             u = correlated[column] if column in correlated else numbers(each.label)

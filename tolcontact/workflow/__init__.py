@@ -79,6 +79,17 @@ does not hold a part, as on a table from above, there is no such bound.
 >>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
 (True, -0.0)
 
+`tc.tails` estimates what is too rare to be counted, that a measure is outside its limits or parts do not go together, by
+subset simulation: some ten thousand realizations tell probabilities of 1e-6 or less within a few tenths of them.
+
+>>> far = tc.Assembly("far")
+>>> bar = far.part("bar", tc.Box(50, 25, 10))
+>>> location = far.locate(bar, tc.three_two_one(bar.face("-z"), bar.face("-y"), bar.face("-x")), tolerance=0.6)
+>>> end = far.measure("end", bar.point(50, 12.5, 10), along="x", limits=(None, 0.5))
+>>> _, lower, upper = tc.tails(far, samples=20_000).probability.sel(event="end outside limits").values
+>>> bool(0 < lower < upper < 1e-3)
+True
+
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
 
 >>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
@@ -109,10 +120,11 @@ from tolcontact.workflow.contributions import contributions
 from tolcontact.workflow.population import check_population
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.sensitivities import sensitivities
+from tolcontact.workflow.tails import tails
 from tolcontact.workflow.worst_case import worst_case
 from tolcontact.workflow.written import write_model
 
 __all__ = [
     "accessor", "build", "check", "check_population", "compare", "compare_runs", "contributions", "open_archive", "run",
-    "sensitivities", "summarize", "worst_case", "write_model",
+    "sensitivities", "summarize", "tails", "worst_case", "write_model",
 ]  # fmt: skip

@@ -6,9 +6,10 @@ from tolcontact.report.text.population import population_text
 from tolcontact.report.text.runs import runs_text
 from tolcontact.report.text.sensitivities import sensitivities_text
 from tolcontact.report.text.summary import capability_text, summary_text
+from tolcontact.report.text.tails import tails_text
 from tolcontact.report.text.worst_case import worst_case_text
 
 __all__ = [
     "capability_text", "comparison_text", "contributions_text", "population_text", "runs_text", "sensitivities_text",
-    "summary_text", "worst_case_text",
+    "summary_text", "tails_text", "worst_case_text",
 ]  # fmt: skip

@@ -1,0 +1,146 @@
+"""Rare events: known probabilities, intervals that cover, and what leads to them."""
+
+import importlib
+import io
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import SEATED, call
+from tolcontact.statistics.tails import tail_probability
+from tolcontact.variation.uniforms import uniform
+
+module = importlib.import_module("tolcontact.workflow.tails")
+
+TWELVE = np.ones(12) / np.sqrt(12)
+TAILS = {
+    "plane": (lambda u: u @ TWELVE - 4.5, 12, stats.norm.sf(4.5)),
+    "two sides": (lambda u: np.abs(u[:, 0]) - 4, 12, 2 * stats.norm.sf(4)),
+    "corner": (lambda u: np.minimum(u[:, 0] - 2, u[:, 1] - 2.5), 6, stats.norm.sf(2) * stats.norm.sf(2.5)),
+    "steps": (lambda u: np.floor(2 * (u @ TWELVE - 4)) + 0.5, 12, stats.norm.sf(4)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TAILS)
+def test_intervals_cover_known_tails(name):
+    """500 estimates from 40 000 realizations each; two standard errors of a coverage of 95 % are 2 %."""
+    score, dimensions, truth = TAILS[name]
+    found = np.array(
+        [tail_probability(score, dimensions, samples=40_000, rng=np.random.default_rng(seed)) for seed in range(500)]
+    )
+    covered = ((found[:, 1] <= truth) & (truth <= found[:, 2])).mean()
+    assert 0.92 <= covered <= 0.98
+    error = found[:, 0].std() / np.sqrt(500)
+    assert abs(found[:, 0].mean() - truth) < 3 * error + 0.02 * truth
+    assert np.median(found[:, 2] - found[:, 1]) / 2 < 0.35 * truth
+
+
+def test_what_is_not_rare_is_counted():
+    rng = np.random.default_rng(1)
+    _, lower, upper = tail_probability(lambda u: u[:, 0] + 0.5, 3, samples=20_000, rng=rng)
+    assert lower < stats.norm.cdf(0.5) < upper and upper - lower < 0.02
+
+
+def test_what_is_never_seen_is_at_most_what_no_hit_says():
+    rng = np.random.default_rng(1)
+    estimate, lower, upper = tail_probability(lambda u: np.full(len(u), -1.0), 3, samples=20_000, rng=rng)
+    assert (estimate, lower) == (0, 0) and 1e-4 < upper < 1e-3
+
+
+def limited(limit):
+    """CASES C1, whose corrected height is max(0, g), g ~ N(0, 1), above nominal."""
+    a = cases.one_dimensional(0)
+    a.measure("kept", a.parts[1].point(5, 5, 10), along="z", limits=(None, limit))
+    return a
+
+
+def test_a_limit_far_out_is_exceeded_as_often_as_the_closed_form_says():
+    found = tc.tails(limited(4.5), samples=40_000, solver="daqp")
+    assert found.event.values.tolist() == ["kept outside limits"]
+    estimate, lower, upper = found.probability.values[0]
+    assert lower < stats.norm.sf(4.5) < upper and upper - lower < estimate
+    assert int(found.simulated[0]) == int(found.by_status.sum()) < 60_000
+    assert found.equals(tc.tails(limited(4.5), samples=40_000, solver="daqp"))
+
+
+def test_ra1_as_a_run_counts_it():
+    """An event that a run of 200 000 realizations still sees."""
+    a = cases.ra1()
+    a.measure("far", a.parts[1].point(50, 0, 10), along="z", limits=(None, 9.5))
+    counted = tc.summarize(tc.run(a, samples=200_000, seed=5, solver="daqp", keep="measures", fields="none", surfaces=0))
+    _, low, high = counted.statistic_value.sel(measure="far", state="corrected", statistic="above limit").values
+    found = tc.tails(a, samples=40_000, solver="daqp")
+    _, lower, upper = found.probability.sel(event="far outside limits").values
+    assert lower < high and low < upper and 0 < high < 1e-3
+
+
+def test_parts_are_led_to_where_they_do_not_go_together():
+    """CASES C6, rotations alone: the least inflation of all deviations at which parts do not go together, by looking at all."""
+    program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
+    engine = module._Engine(program, done=0, total=1, progress=None)
+    score, looks = module._not_assemblable(engine)
+    u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
+    every = np.stack([score_of(engine, factor * u) for factor in module.INFLATIONS])
+    assert (every[1:] >= every[:-1]).all()  # what does not go together does not with larger deviations either
+    assert score(u) == pytest.approx(0.5 - np.where(every.any(axis=0), every.argmax(axis=0), len(every)))
+    assert looks == 3 and 2**looks == len(module.INFLATIONS) + 1
+    of_run = program.draws(seed=1, start=0, stop=24)
+    again = program.draws.made_of(lambda label: uniform(1, label, 0, 24), 24)
+    assert np.array_equal(again, of_run)
+
+
+def score_of(engine, u):
+    return np.concatenate([block.status == tc.Status.NOT_ASSEMBLABLE for block in engine(u)])
+
+
+def test_what_has_no_rare_event_is_refused():
+    with pytest.raises(tc.OptionError, match="no measure has limits"):
+        tc.tails(cases.one_dimensional(0))
+    with pytest.raises(tc.OptionError, match="samples is 100;"):
+        tc.tails(limited(4), samples=100)
+    still = tc.Assembly("still")
+    part = still.part("part", tc.Box(1, 2, 3), fixed=True)
+    still.measure("corner", part.point(0, 0, 0), along="x", tolerance=1)
+    with pytest.raises(tc.OptionError, match="nothing varies"):
+        tc.tails(still)
+
+
+def test_what_is_drawn_anew_cannot_be_followed():
+    a = tc.Assembly("anew")
+    plate = a.part("plate", tc.Box(100, 50, 10), fixed=True)
+    plate.feature("under", plate.face("-z"), datum="A")
+    top = plate.feature("top", plate.face("+z"), tc.Profile(0.3, "A", rule="uniform"))
+    a.measure("corner", top.point(100, 50, 10), along="z", tolerance=0.3)
+    with pytest.raises(tc.OptionError, match="is drawn anew"):
+        tc.tails(a)
+
+
+def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
+    a = limited(2.5)
+    a.population(pd.DataFrame({"z": np.linspace(-3, 3, 200)}), {"block.Z": "z"})
+    _, lower, upper = tc.tails(a, samples=8000, solver="daqp").probability.values[0]
+    assert lower <= (np.linspace(-3, 3, 200) > 2.5).mean() <= upper
+
+
+def test_the_command_prints_a_table_json_and_csv(tmp_path):
+    model = tmp_path / "model.py"
+    model.write_text(
+        "import tolcontact as tc\n\n\ndef assembly():\n    a = tc.Assembly('m')\n    b = a.part('b', tc.Box(10, 10, 10))\n"
+        "    a.locate(b, tc.three_two_one(b.face('-z'), b.face('-y'), b.face('-x')), tolerance=0.6)\n"
+        "    a.measure('h', b.point(5, 5, 10), along='z', tolerance=0.8)\n    return a\n"
+    )
+    options = ("tails", model, "--samples", "4000")
+    done = call(tmp_path, *options)
+    assert done.returncode == 0 and "h outside limits" in done.stdout and "ppm" in done.stdout, done.stderr
+    said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
+    assert said["coords"]["event"]["data"] == ["h outside limits"]
+    table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
+    assert {"event", "estimate", "lower", "upper"} <= set(table)
+    assert call(tmp_path, *options, "--csv", "--json").returncode == 2
+    assert call(tmp_path, "tails", model, "--samples", "10").returncode == 2
