@@ -51,7 +51,7 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
-| ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case` |
+| ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
 | warnings | `ContactWarning`, `UnitsWarning` |

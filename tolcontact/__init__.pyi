@@ -50,6 +50,7 @@ from .simulation import simulate_blocks
 from .version import __version__
 from .vocabulary import Status
 from .workflow import (
+    allocate,
     build,
     check,
     check_population,
@@ -70,7 +71,7 @@ __all__ = [
     "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
-    "TotalRunout", "UnitsWarning", "Variable", "__version__", "bodies_in", "build", "check", "check_population",
+    "TotalRunout", "UnitsWarning", "Variable", "__version__", "allocate", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
     "plot", "run", "sensitivities", "simulate_blocks", "summarize", "tails", "three_two_one", "worst_case", "write_model",
 ]  # fmt: skip

@@ -15,6 +15,7 @@
     tolcontact sensitivities MODEL.py                    how much each measure follows each contributor, through contact
     tolcontact worst MODEL.py                            the least and the largest value of each measure, and what gives it
     tolcontact tails MODEL.py                            how often measures are outside their limits, where that is rare
+    tolcontact allocate MODEL.py --require "gap: ppm 1000"   ranges at least cost, and which to tighten first
     tolcontact compare A.nc B.nc [--report FILE.html]    runs side by side, from the same draws or not
     tolcontact view MODEL.py | FILE.stp                  look at it before any run: faces with the words that choose them
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
@@ -56,6 +57,7 @@ netCDF with `--out`.
 """
 
 from tolcontact.cli import (
+    allocate,
     bodies,
     check,
     compare,
@@ -73,6 +75,6 @@ from tolcontact.cli import (
 from tolcontact.cli.app import command_line, main
 
 __all__ = [
-    "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "report", "run", "sensitivities",
-    "summary", "tails", "view", "worst",
+    "allocate", "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "report", "run",
+    "sensitivities", "summary", "tails", "view", "worst",
 ]  # fmt: skip

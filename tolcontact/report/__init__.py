@@ -40,6 +40,7 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 from tolcontact.report.figures import grouped
 from tolcontact.report.html import write_comparison, write_page, write_view
 from tolcontact.report.text import (
+    allocation_text,
     capability_text,
     comparison_text,
     contributions_text,
@@ -52,6 +53,6 @@ from tolcontact.report.text import (
 )
 
 __all__ = [
-    "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text",
+    "allocation_text", "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text",
     "sensitivities_text", "summary_text", "tails_text", "worst_case_text", "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

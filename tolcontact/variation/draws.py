@@ -42,12 +42,20 @@ class Draws:
         if faults:
             raise ModelError(self._assembly.name, faults)
         self._plan = Plan(MONTE_CARLO, [])
+        self._scale = np.ones(len(self.contributors.every))
+        self._middle = np.array([each.tolerance.shift if each.tolerance else 0.0 for each in self.contributors.every])
         self._factors = [np.linalg.cholesky(np.array(each.matrix)) for each in self._assembly.correlations]
 
     def planned(self, name: str) -> "Draws":
         """The same contributors, drawn by a sampling plan (see plans)."""
         other = copy.copy(self)
         other._plan = Plan(name, [*self._column, *self._rows_drawn])
+        return other
+
+    def scaled(self, factors: np.ndarray) -> "Draws":
+        """The same numbers with zones that are so many times as wide (contributor,), each about its middle."""
+        other = copy.copy(self)
+        other._scale = factors
         return other
 
     @property
@@ -86,6 +94,8 @@ class Draws:
                 return np.stack([numbers(label) for label in said], axis=1)
 
             deviations[:, together.columns] = together.draw(anew)
+        if not (self._scale == 1.0).all():
+            deviations = self._middle + self._scale * (deviations - self._middle)
         for label, population in zip(self._rows_drawn, self._assembly.populations, strict=True):
             rows = numbers(label)
             drawn = population.values[(rows * len(population.values)).astype(int)]

@@ -90,6 +90,13 @@ subset simulation: some ten thousand realizations tell probabilities of 1e-6 or 
 >>> bool(0 < lower < upper < 1e-3)
 True
 
+`tc.allocate` widens and narrows ranges until what is required of measures, a share outside of their limits or a Ppk, is kept at
+least cost, and says which range to tighten first.
+
+>>> given = tc.allocate(far, "end: ppm 20000", by="part", samples=1024)
+>>> bool(given.cost.sum("group").sel(stage="after") < given.cost.sum("group").sel(stage="before"))
+True
+
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
 
 >>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
@@ -114,6 +121,7 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 
 from tolcontact.archive import open_archive
 from tolcontact.workflow import accessor
+from tolcontact.workflow.allocate import allocate
 from tolcontact.workflow.compare import compare
 from tolcontact.workflow.compare_runs import compare_runs
 from tolcontact.workflow.contributions import contributions
@@ -125,6 +133,6 @@ from tolcontact.workflow.worst_case import worst_case
 from tolcontact.workflow.written import write_model
 
 __all__ = [
-    "accessor", "build", "check", "check_population", "compare", "compare_runs", "contributions", "open_archive", "run",
-    "sensitivities", "summarize", "tails", "worst_case", "write_model",
+    "accessor", "allocate", "build", "check", "check_population", "compare", "compare_runs", "contributions",
+    "open_archive", "run", "sensitivities", "summarize", "tails", "worst_case", "write_model",
 ]  # fmt: skip

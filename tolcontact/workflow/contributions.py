@@ -49,7 +49,7 @@ def contributions(
     varies = np.ptp(some, axis=0) > 0
     groups = {
         name: columns[varies[columns]]
-        for name, columns in independent_groups(program.draws, _owners(program, by)).items()
+        for name, columns in independent_groups(program.draws, owners(program, by)).items()
         if varies[columns].any()
     }
     if not groups:
@@ -91,7 +91,7 @@ def contributions(
     )
 
 
-def _owners(program: Program, by: str) -> list[str]:
+def owners(program: Program, by: str) -> list[str]:
     """Whose each column of the deviations is: its own label's, or that of its feature or part."""
     nominal, labels = program.nominal, list(program.nominal.contributors)
     if by == "contributor":

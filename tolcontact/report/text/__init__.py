@@ -1,5 +1,6 @@
 """Results as text for a terminal, or a pipe."""
 
+from tolcontact.report.text.allocation import allocation_text
 from tolcontact.report.text.comparison import comparison_text
 from tolcontact.report.text.contributions import contributions_text
 from tolcontact.report.text.population import population_text
@@ -10,6 +11,6 @@ from tolcontact.report.text.tails import tails_text
 from tolcontact.report.text.worst_case import worst_case_text
 
 __all__ = [
-    "capability_text", "comparison_text", "contributions_text", "population_text", "runs_text", "sensitivities_text",
-    "summary_text", "tails_text", "worst_case_text",
+    "allocation_text", "capability_text", "comparison_text", "contributions_text", "population_text", "runs_text",
+    "sensitivities_text", "summary_text", "tails_text", "worst_case_text",
 ]  # fmt: skip

@@ -1,0 +1,148 @@
+"""Allocation: closed forms where measures are sums, RA1 with contact, what is refused."""
+
+import io
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import norm
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+
+
+def pile(*ranges, tolerance=1.0):
+    """Blocks on each other whose heights add up: the top is the sum of independent deviations."""
+    a = tc.Assembly("pile")
+    below = None
+    for k, width in enumerate(ranges):
+        part = a.part(f"p{k}", tc.Box(10, 10, 10), at=(0, 0, 10 * k))
+        a.locate(part, cases.translating(width), on=below)
+        below = part
+    a.measure("top", below.point(5, 5, 10), along="z", tolerance=tolerance)
+    return a
+
+
+def test_ranges_of_a_sum_are_those_of_lagrange():
+    """min sum c / r with sum (r T / 6)^2 = s^2: r^3 is proportional to c / T^2."""
+    widths, costs = np.array([0.6, 0.3, 0.9]), np.array([1.0, 4.0, 2.0])
+    names = [f"p{k}.Z" for k in range(3)]
+    found = tc.allocate(
+        pile(*widths), "top: ppm 2700", costs=dict(zip(names, costs.tolist(), strict=True)), samples=32_768, solver="daqp"
+    )
+    r = (costs / widths**2) ** (1 / 3)
+    r *= (1 / norm.isf(0.00135) / 2) / np.sqrt(((r * widths / 6) ** 2).sum())  # limits are three standard deviations away
+    assert found.factor.sel(group=names).values == pytest.approx(r, rel=0.12)
+    assert float(found.cost.sel(stage="after").sum()) == pytest.approx((costs / r).sum(), rel=0.03)
+    estimate, lower, upper = found.kept.sel(stage="after").values[0]
+    assert estimate <= 0.0027 and lower < 0.0027 and upper > 0.0018
+    assert found.range.sel(group=names, stage="after").values == pytest.approx(widths * found.factor.sel(group=names).values)
+
+
+def test_effects_are_those_of_the_sum():
+    widths = np.array([0.6, 0.3, 0.9])
+    found = tc.allocate(pile(*widths), "top: Ppk 0.5", samples=16_384, solver="daqp")
+    usual, narrow = np.sqrt((widths**2).sum()), np.sqrt((widths**2).sum() - 0.19 * widths**2)
+    effects = found.effect.isel(measure=0).sel(of_effect="6 sigma")
+    for k, truth in enumerate(narrow - usual):
+        estimate, lower, upper = effects.sel(group=f"p{k}.Z").values
+        assert abs(estimate - truth) < 1.6 * (upper - lower) / 2 and upper - lower < 0.1 * usual  # three standard errors
+
+
+@pytest.mark.slow
+def test_ra1_costs_less_and_keeps_what_is_required_in_a_run_of_its_own():
+    a = cases.ra1()
+    a.measure("wide", a.parts[1].point(50, 0, 10), along="z", tolerance=12)
+    found = tc.allocate(a, "wide: ppm 10000", solver="daqp", samples=4096)
+    before, after = found.cost.sum("group").values
+    assert before == 12 and after < 6.5
+    assert float(found.kept.sel(stage="after", interval="estimate")[0]) <= 0.01
+    # Verified once more, with ranges written into a model, and another seed.
+    b = tc.Assembly("allocated")
+    base = b.part("base", tc.Box(100, 50, 10))
+    top = b.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    for part, side in ((base, "-y"), (top, "+y")):
+        scheme = tc.three_two_one(part.face("-z"), part.face(side), part.face("-x"), inset=5)
+        labels = ("A1", "A2", "A3", "B1", "B2", "C1")
+        widths = found.range.sel(group=[f"{part.name}.{label}" for label in labels], stage="after").values
+        b.locate(part, [tc.Locator(*each) for each in located(part, scheme, labels, widths)])
+    b.contact("interface", moving=top.face("-z"), reference=base.face("+z"), points=202)
+    b.measure("wide", top.point(50, 0, 10), along="z", tolerance=12)
+    seen = tc.summarize(tc.run(b, samples=40_000, seed=77, solver="daqp", keep="measures", fields="none", surfaces=0))
+    _, lower, _ = seen.statistic_value.sel(measure="wide", state="corrected", statistic="outside limits").values
+    assert lower < 0.0105
+    effects = found.effect.sel(measure="wide", of_effect="6 sigma", interval="estimate")
+    assert str(effects.group[int(effects.argmin())].values) == "base.A2"  # as its total Sobol' index says
+
+
+def located(part, scheme, labels, widths):
+    """The locators of a scheme, one by one."""
+    a = tc.Assembly("of the scheme")
+    own = a.part(part.name, part.geometry, at=part.at)
+    side = "-y" if part.name == "base" else "+y"
+    a.locate(own, tc.three_two_one(own.face("-z"), own.face(side), own.face("-x"), inset=5), tolerance=1)
+    a.measure("m", own.point(0, 0, 0), along="x")
+    locators = tc.build(a).nominal.locators
+    for k, (label, width) in enumerate(zip(labels, widths, strict=True)):
+        yield label, tuple(locators.points[k] - part.at), tuple(locators.directions[k]), float(width)
+
+
+def test_scaled_draws_are_draws_of_other_ranges():
+    one, other = (tc.build(pile(*widths)).draws for widths in ((0.6, 0.3), (1.2, 0.15)))
+    names = [each.label for each in one.contributors.every]
+    scale = np.array([{"p0.Z": 2.0, "p1.Z": 0.5}.get(name, 1.0) for name in names])
+    assert np.array_equal(one.scaled(scale)(seed=3, start=0, stop=50), other(seed=3, start=0, stop=50))
+
+
+def test_groups_without_a_cost_keep_their_ranges_and_a_cost_may_be_a_curve():
+    found = tc.allocate(
+        pile(0.6, 0.3, 0.9), "top: Ppk 0.9", costs={"p2": lambda factor: 5 / factor**2}, by="part", samples=8192, solver="daqp"
+    )
+    assert found.factor.sel(group=["p0", "p1"]).values.tolist() == [1.0, 1.0]
+    assert found.cost.sel(group="p2").values == pytest.approx([5, 5 / float(found.factor.sel(group="p2")) ** 2])
+    assert float(found.factor.sel(group="p2")) != 1
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"require": "top"}, "require is 'top'"),
+        ({"require": "bottom: ppm 1000"}, 'the measure "bottom"; expected one of: top'),
+        ({"require": "top: ppm 10"}, "expected samples=1000000 or more"),
+        ({"require": []}, "require is empty"),
+        ({"require": "top: Ppk 1", "by": "colour"}, "by is 'colour'"),
+        ({"require": "top: Ppk 1", "costs": {"p9.Z": 1}}, 'costs has "p9.Z"; expected some of: p0.Z'),
+        ({"require": "top: Ppk 1", "costs": {"p0.Z": -1}}, 'cost of "p0.Z" is -1'),
+        ({"require": "top: Ppk 1", "costs": {}}, "costs is empty"),
+    ],
+)
+def test_what_cannot_be_allocated_is_refused(options, said):
+    with pytest.raises(tc.OptionError) as refused:
+        tc.allocate(pile(0.6, 0.3), **options)
+    assert said in str(refused.value)
+
+
+def test_a_measure_without_limits_and_a_model_without_ranges_are_refused():
+    with pytest.raises(tc.OptionError, match="which has no limits"):
+        tc.allocate(pile(0.6, 0.3, tolerance=None), "top: Ppk 1")
+    with pytest.raises(tc.OptionError, match="has no range to allocate"):
+        tc.allocate(pile(0, norm(0, 0.1)), "top: Ppk 1")
+
+
+def test_the_command_prints_tables_json_and_csv(tmp_path):
+    model = tmp_path / "model.py"
+    model.write_text(
+        "import tolcontact as tc\n\n\ndef assembly():\n    a = tc.Assembly('m')\n    b = a.part('b', tc.Box(10, 10, 10))\n"
+        "    a.locate(b, tc.three_two_one(b.face('-z'), b.face('-y'), b.face('-x')), tolerance=0.6)\n"
+        "    a.measure('h', b.point(5, 5, 10), along='z', tolerance=0.8)\n    return a\n"
+    )
+    options = ("allocate", model, "--require", "h: ppm 5000", "--samples", "2048", "--cost", "b.A1=1", "--cost", "b.A2=2")
+    done = call(tmp_path, *options)
+    assert done.returncode == 0 and "h: ppm 5000" in done.stdout and "b.A2" in done.stdout, done.stderr
+    said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
+    assert said["coords"]["requirement"]["data"] == ["h: ppm 5000"]
+    table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))
+    assert {"group", "range before", "range after", "cost after"} <= set(table)
+    assert call(tmp_path, *options, "--cost", "b.A3").returncode == 2
