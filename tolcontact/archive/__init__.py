@@ -116,6 +116,7 @@ arguments are numbers.
 >>> folder.cleanup()
 """
 
+from tolcontact.archive.analyses import check_room_for, keep
 from tolcontact.archive.header import Run
 from tolcontact.archive.reader import model_of, open_archive, opened
 from tolcontact.archive.room import bytes_of_rows, size_in_words
@@ -128,7 +129,9 @@ __all__ = [
     "ArchiveWriter",
     "Run",
     "bytes_of_rows",
+    "check_room_for",
     "check_rows",
+    "keep",
     "model_of",
     "open_archive",
     "opened",

@@ -22,15 +22,7 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
         raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
     if not there.dimensions[words.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
-    if _comparable(str(there["model"][words.DECLARATION.name][...])) != _comparable(declaration(program)):
-        raise ArchiveError(f'"{path}" contains another model than the one to be resumed; write to a new file')
-    for part in program.nominal.parts:
-        if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
-            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
-    for variable, values in contact_values(program.nominal).items():
-        stored = there["contact"].variables.get(variable.name)
-        if stored is None or not (variable.kind is str or _same(stored, values)):  # texts are in the declaration
-            raise ArchiveError(f'"{path}": its contact points differ (it was written by {there.versions}); write to a new file')
+    check_same_model(there, path, program)
     for word, value in settings.items():
         was = getattr(there, word, None)
         if word != "samples" and was != value:
@@ -40,6 +32,19 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
     room = len(there["surface"].dimensions[words.CHECKED])
     if room != surfaces:
         raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
+
+
+def check_same_model(there: netCDF4.Dataset, path: Path, program: Program) -> None:
+    """Raise ArchiveError if the archive `there`, in the file `path`, is of another model."""
+    if _comparable(str(there["model"][words.DECLARATION.name][...])) != _comparable(declaration(program)):
+        raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
+    for part in program.nominal.parts:
+        if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
+            raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
+    for variable, values in contact_values(program.nominal).items():
+        stored = there["contact"].variables.get(variable.name)
+        if stored is None or not (variable.kind is str or _same(stored, values)):  # texts are in the declaration
+            raise ArchiveError(f'"{path}": its contact points differ (it was written by {there.versions}); write to a new file')
 
 
 def _comparable(declared: str) -> Any:

@@ -51,7 +51,7 @@ class ArchiveWriter:
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
         check_room(path, program.nominal, kept_rows(run.keep), run.samples)
-        with _replacing(path) as part, _opened(part, "w") as file:
+        with replacing(path) as part, opened_locked(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, words.FIRST_ROWS))
         self._go_on(path, program.nominal)
@@ -64,12 +64,12 @@ class ArchiveWriter:
         """
         inspect(path)
         writer = cls.__new__(cls)
-        with _replacing(path) as part:
+        with replacing(path) as part:
             # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
             shutil.copyfile(path, part)
             with opened(part) as results:
                 check_rows(results)
-            with _opened(part, "r+") as file:
+            with opened_locked(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
                 rows = last_checkpoint(file, path, [own.name for own in program.nominal.parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[words.REALIZATION])
@@ -89,7 +89,7 @@ class ArchiveWriter:
         self._path, self._parts, self._pairs = path, [part.name for part in nominal.parts], len(nominal.pairs)
         with _refusals_told(path):
             self._values = LaidOut(path)
-            with _opened(path, "r") as file:
+            with opened_locked(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[words.REALIZATION]), int(file.block_rows)
                 self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[words.CHECKED])
         self.kept = [variable for variable in words.BY_REALIZATION if self._values.has(_group_of(variable), variable)]
@@ -98,7 +98,7 @@ class ArchiveWriter:
 
     def take_up(self) -> list[np.ndarray]:
         """Go back to the last checkpoint: its sums of the fields, (state, number) for each part; none if there is none."""
-        with _opened(self._path, "r") as file:
+        with opened_locked(self._path, "r") as file:
             self.rows, self._place, sums = last_checkpoint(file, self._path, self._parts)
         self._since = time.monotonic()
         return sums
@@ -125,9 +125,9 @@ class ArchiveWriter:
     def _make_room_for_all(self) -> None:
         self._values.close()
         try:
-            with _replacing(self._path) as part:
+            with replacing(self._path) as part:
                 shutil.copyfile(self._path, part)
-                with _opened(part, "r+") as file:
+                with opened_locked(part, "r+") as file:
                     lay_out_rows(file, self._length, self.samples)
             self._length = self.samples
         finally:  # a run may be stopped here, and still writes its fields
@@ -161,12 +161,12 @@ class ArchiveWriter:
 
     def chosen(self, seed: int) -> np.ndarray:
         """Numbers (row,) of the realizations that are to be checked against the surfaces."""
-        with _opened(self._path, "r") as file:
+        with opened_locked(self._path, "r") as file:
             return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
         """Corrected poses (row, part, 12) of some rows; None if they are not kept."""
-        with _opened(self._path, "r") as file:
+        with opened_locked(self._path, "r") as file:
             return archived_poses(file, rows)
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
@@ -180,7 +180,7 @@ class ArchiveWriter:
 
 
 @contextlib.contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path) -> Iterator[Path]:
     """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
     part = path.with_name(f".{path.name}.part")
     try:
@@ -207,7 +207,7 @@ def _group_of(variable: words.Variable) -> str:
 
 
 @contextlib.contextmanager
-def _opened(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
+def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
     """A file for the netCDF library, which does not bear that another thread, in which garbage is collected, closes a file."""
     with _XARRAYS_LOCK, netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them

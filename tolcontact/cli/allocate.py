@@ -8,6 +8,7 @@ import typer
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
+    Into,
     Model,
     Objective,
     Quiet,
@@ -56,6 +57,7 @@ def allocate(
     objective: Objective = None,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
+    into: Into = None,
     quiet: Quiet = False,
 ) -> None:
     """Print tolerance ranges at least cost for what is required, and which to tighten first."""
@@ -63,7 +65,8 @@ def allocate(
     with shown_progress(model.stem, VERIFICATIONS, quiet=quiet) as show:
         found = allocate_model(
             functools.partial(load_model, model), require, costs=dict(map(_cost, cost)) if cost else None, by=by,
-            samples=samples, seed=seed, solver=solver, method=chosen(resolution=resolution, objective=objective), progress=show,
+            samples=samples, seed=seed, solver=solver, method=chosen(resolution=resolution, objective=objective),
+            into=into, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

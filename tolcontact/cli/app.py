@@ -59,6 +59,7 @@ Objective = Annotated[
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
+Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Keep it in an archive of the same model, too.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; results are printed.")]
 
 

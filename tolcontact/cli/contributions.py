@@ -8,6 +8,7 @@ import typer
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
+    Into,
     Model,
     Objective,
     Quiet,
@@ -42,6 +43,7 @@ def contributions(
     by: Annotated[str, typer.Option(help=f"What is one group: {or_(GROUPED_BY)}.")] = "contributor",
     as_json: AsJson = False,
     as_csv: AsCsv = False,
+    into: Into = None,
     quiet: Quiet = False,
 ) -> None:
     """Print which contributors the variance of each measure comes from, without contact and with it."""
@@ -49,7 +51,7 @@ def contributions(
     with shown_progress(model.stem, samples, quiet=quiet) as show:
         found = contributions_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), by=by, progress=show,
+            method=chosen(resolution=resolution, objective=objective), by=by, into=into, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

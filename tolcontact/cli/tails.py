@@ -8,6 +8,7 @@ import typer
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
+    Into,
     Model,
     Objective,
     Quiet,
@@ -37,6 +38,7 @@ def tails(
     objective: Objective = None,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
+    into: Into = None,
     quiet: Quiet = False,
 ) -> None:
     """Print how often measures are outside their limits, or parts do not go together, where that is rare."""
@@ -44,7 +46,7 @@ def tails(
     with shown_progress(model.stem, samples, quiet=quiet) as show:
         found = tails_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), progress=show,
+            method=chosen(resolution=resolution, objective=objective), into=into, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

@@ -8,6 +8,7 @@ import typer
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
+    Into,
     Model,
     Objective,
     Quiet,
@@ -37,6 +38,7 @@ def worst(
     objective: Objective = None,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
+    into: Into = None,
     quiet: Quiet = False,
 ) -> None:
     """Print the least and the largest value of each measure that drawings allow, and what gives it."""
@@ -44,7 +46,7 @@ def worst(
     with shown_progress(model.stem, 0, quiet=quiet) as show:
         found = worst_case(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), progress=show,
+            method=chosen(resolution=resolution, objective=objective), into=into, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

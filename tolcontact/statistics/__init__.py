@@ -73,6 +73,10 @@ each point.
 from tolcontact.statistics.comparison import compare_runs
 from tolcontact.statistics.contacts import touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
+from tolcontact.statistics.kept import kept_analysis
 from tolcontact.statistics.summary import Summary, estimate_of, limits, summarize
 
-__all__ = ["BlockSums", "DisplacementFields", "Summary", "compare_runs", "estimate_of", "limits", "summarize", "touching"]
+__all__ = [
+    "BlockSums", "DisplacementFields", "Summary", "compare_runs", "estimate_of", "kept_analysis", "limits", "summarize",
+    "touching",
+]  # fmt: skip

@@ -1,6 +1,7 @@
 """Every name of archives, summaries and comparisons, once, with its units."""
 
 from tolcontact.vocabulary.allocation import *  # noqa: F403
+from tolcontact.vocabulary.analyses import *  # noqa: F403
 from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)
 from tolcontact.vocabulary.comparison import *  # noqa: F403
 from tolcontact.vocabulary.contributions import *  # noqa: F403

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import xarray as xr
 from scipy.optimize import Bounds, minimize
 
 from tolcontact import vocabulary as words
+from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
@@ -39,6 +41,7 @@ def allocate(
     seed: int = 1,
     solver: str | None = None,
     method: Choice | None = None,
+    into: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Ranges at least cost with which measures keep what is required, contact resolved.
@@ -60,12 +63,16 @@ def allocate(
     ranges that agrees with it in value and slopes, on the same draws, and solves that with scipy's SLSQP within a region that
     shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run does not keep what is
     required, the aim is tightened by what it was missed by, and the search goes on.
-    Raises ModelError, OptionError for options that cannot be used, or a model in which no range varies.
+    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
+    statistics/allocation; the report shows it.
+    Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which no range varies.
     """
     check_counts(samples=samples, seed=seed)
     if by not in words.GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(words.GROUPED_BY)}")
     program = program_of(model, solver, method)
+    if into is not None:
+        check_room_for(into, words.OF_ALLOCATION, program)
     required = [Requirement.of_text(text, program) for text in ([require] if isinstance(require, str) else require)]
     if not required:
         raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
@@ -86,7 +93,7 @@ def allocate(
         "required": [each.value for each in required],
         "effect": _effects(engine, program),
     }
-    return xr.Dataset(
+    answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.ALLOCATION},
         coords={
             words.GROUP: list(groups),
@@ -108,6 +115,9 @@ def allocate(
             "objective": program.method.objective,
         },
     )
+    if into is not None:
+        keep(into, words.OF_ALLOCATION, answer, program)
+    return answer
 
 
 class _Engine:

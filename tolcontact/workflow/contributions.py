@@ -1,11 +1,13 @@
 """Which contributors a measure's variance comes from, with contact and without."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
@@ -26,6 +28,7 @@ def contributions(
     solver: str | None = None,
     method: Choice | None = None,
     by: str = "contributor",
+    into: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Sobol' indices of each measure (see tolcontact.statistics.contributions), beside the classical linear percentages.
@@ -39,12 +42,16 @@ def contributions(
     `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn together,
     driven by one cause) are one group whatever `by` is; those that do not vary are left out.
     `samples` are base realizations: samples (2 + groups) are simulated. `progress` is called with how many are done, of all.
-    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
+    statistics/contributions; the report shows it.
+    Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
     if by not in GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
     program = program_of(model, solver, method)
+    if into is not None:
+        check_room_for(into, words.OF_CONTRIBUTIONS, program)
     some = program.draws(seed=seed, start=0, stop=SOME)
     varies = np.ptp(some, axis=0) > 0
     groups = {
@@ -69,7 +76,7 @@ def contributions(
         predicted = A @ slopes[measure]
         off.append([missed(values[:, 0, state, measure], predicted) for state in range(len(words.STATES))])
     found = {words.FIRST: first, words.TOTAL: total, words.LINEAR: linear, words.MISSED: off, "by_status": statuses}
-    return xr.Dataset(
+    answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.CONTRIBUTIONS},
         coords={
             words.MEASURE: [measure.name for measure in program.nominal.measures],
@@ -89,6 +96,9 @@ def contributions(
             "objective": program.method.objective,
         },
     )
+    if into is not None:
+        keep(into, words.OF_CONTRIBUTIONS, answer, program)
+    return answer
 
 
 def owners(program: Program, by: str) -> list[str]:

@@ -1,11 +1,13 @@
 """How much each measure follows each contributor, through contact."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
@@ -28,6 +30,7 @@ def sensitivities(
     seed: int = 1,
     solver: str | None = None,
     method: Choice | None = None,
+    into: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Derivatives of each measure by each contributor that varies, realization by realization, by differences on the draws.
@@ -43,10 +46,14 @@ def sensitivities(
     sides of the step agree within a tenth (or a hundredth of the largest derivative of all), a difference is the derivative,
     but for its second order. Elsewhere it is that of both sides, and of a jump between them, which the linearized resolution
     may make, as may points that come into the objective "active points". (2 contributors + 1) samples are simulated.
-    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
+    statistics/sensitivities; the report shows it.
+    Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
     program = program_of(model, solver, method)
+    if into is not None:
+        check_room_for(into, words.OF_SENSITIVITIES, program)
     deviation = program.draws(seed=seed, start=0, stop=SOME).std(axis=0)
     columns = np.flatnonzero(deviation > 0)
     if not columns.size:
@@ -71,7 +78,7 @@ def sensitivities(
         "step": STEP * deviation[columns],
         "by_status": statuses,
     }
-    return xr.Dataset(
+    answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.SENSITIVITIES},
         coords={
             words.MEASURE: [measure.name for measure in program.nominal.measures],
@@ -93,6 +100,9 @@ def sensitivities(
             "objective": program.method.objective,
         },
     )
+    if into is not None:
+        keep(into, words.OF_SENSITIVITIES, answer, program)
+    return answer
 
 
 def _simulated(

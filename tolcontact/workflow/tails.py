@@ -1,12 +1,14 @@
 """How often a measure is outside its limits, or parts do not go together, where that is too rare to be counted."""
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from scipy.special import ndtr
 
 from tolcontact import vocabulary as words
+from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block, simulate_blocks
@@ -27,6 +29,7 @@ def tails(
     seed: int = 1,
     solver: str | None = None,
     method: Choice | None = None,
+    into: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Probabilities of rare events, by subset simulation (see tolcontact.statistics.tails).
@@ -40,12 +43,17 @@ def tails(
     parts do not go together, which is right if they do whenever they do with larger ones.
     Estimates are of realizations as they are, also of those that are not resolved. `progress` is called with the number of
     realizations simulated, and about how many there will be.
-    Raises ModelError, OptionError for options that cannot be used, a model without such an event, or in which nothing varies.
+    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
+    statistics/tails; the report shows it.
+    Raises ModelError, ArchiveError, OptionError for options that cannot be used, a model without such an event, or in which
+    nothing varies.
     """
     check_counts(samples=samples, seed=seed)
     if samples < LEAST:
         raise OptionError(f"samples is {samples!r}; expected {LEAST} realizations for an event, or more")
     program = program_of(model, solver, method)
+    if into is not None:
+        check_room_for(into, words.OF_TAILS, program)
     if not program.draws.varying:
         raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
     events = dict(_events(program))
@@ -62,7 +70,7 @@ def tails(
         found.append(tail_probability(score, len(program.draws.varying), samples=samples // looks, rng=rng))
         statuses.append(engine.statuses)
     values = {"probability": found, "simulated": np.sum(statuses, axis=1), "by_status": statuses}
-    return xr.Dataset(
+    answer = xr.Dataset(
         {of.name: (of.dims, np.array(values[of.name]), of.all_attributes) for of in words.TAILS},
         coords={
             words.EVENT: list(events),
@@ -78,6 +86,9 @@ def tails(
             "objective": program.method.objective,
         },
     )
+    if into is not None:
+        keep(into, words.OF_TAILS, answer, program)
+    return answer
 
 
 class _Engine:

@@ -1,11 +1,13 @@
 """The least and the largest value that each measure can have, with the combination of deviations that gives it."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
+from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.linear_model import linear_model
@@ -25,6 +27,7 @@ def worst_case(
     seed: int = 1,
     solver: str | None = None,
     method: Choice | None = None,
+    into: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """The least and the largest value of each measure over all that drawings allow (see tolcontact.variation.region).
@@ -43,10 +46,14 @@ def worst_case(
     end of the region in the direction of its slopes, with steps that shrink (a generating set search; Kolda, Lewis, Torczon,
     2003). `unseen` is the estimate w (w + 1) / (n (n - 1)) of w ends of n searches (Boender, Rinnooy Kan, 1987).
     Only certified realizations count. `progress` is called with the number of searches that ended, and of all.
-    Raises ModelError, OptionError for options that cannot be used, or a model in which nothing varies.
+    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
+    statistics/worst_case; the report shows it.
+    Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
     program = program_of(model, solver, method)
+    if into is not None:
+        check_room_for(into, words.OF_WORST_CASE, program)
     region = Region(program.draws, seed=seed)
     if not region.varies.size:
         raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
@@ -74,7 +81,7 @@ def worst_case(
         "unseen": np.minimum(1.0, ends * (ends + 1) / (SEARCHES * (SEARCHES - 1))).reshape(shape),
         "by_status": evaluate.statuses,
     }
-    return xr.Dataset(
+    answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.WORST_CASE},
         coords={
             words.MEASURE: [measure.name for measure in program.nominal.measures],
@@ -95,6 +102,9 @@ def worst_case(
             "objective": program.method.objective,
         },
     )
+    if into is not None:
+        keep(into, words.OF_WORST_CASE, answer, program)
+    return answer
 
 
 def _different(values: np.ndarray, same: float) -> int:

@@ -13,6 +13,7 @@ from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import grouped, limits_text
+from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import scene_of
 from tolcontact.report.html.shown import shown_of
@@ -58,10 +59,17 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
         "details": _details(summary),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": {"columns": pair_columns(summary), "rows": pair_rows(summary)} if summary.sizes["pair"] else None,
+        "tables": list(tables_of(results)),
+        "contributions": (shares := contributions_of(results)),
         "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
         "missing": _missing(scene),
     }
-    data = {"scene": scene, "charts": charts_of(results, summary), "relations": relations_of(results, summary)}
+    data = {
+        "scene": scene,
+        "charts": charts_of(results, summary),
+        "relations": relations_of(results, summary),
+        "contributions": shares,
+    }
     return _page("report", values, data)
 
 

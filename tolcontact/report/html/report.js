@@ -97,6 +97,33 @@ function settling(measure) {
   Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
 }
 
+/** Shares of variance by contributor: total Sobol' indices of both states, with intervals, and linear percentages. */
+function contributions(of) {
+  const groups = of.groups.map(escaped).toReversed(), back = (list) => list.toReversed();
+  const traces = of.states.map((own, s) => {
+    const estimates = back(own.total);
+    return {
+      type: "bar", orientation: "h", name: STATES[s], y: groups, x: estimates.map((each) => each[0]), marker: { color: COLOURS[s] },
+      error_x: {
+        type: "data", symmetric: false, thickness: 1,
+        array: estimates.map((each) => each[2] - each[0]), arrayminus: estimates.map((each) => each[0] - each[1]),
+      },
+      text: back(own.first).map((each) => (each[0] === null ? "" : `alone ${each[0].toFixed(1)} %`)), textposition: "none",
+      hovertemplate: `%{x:.1f} % in total, %{text}<extra>${STATES[s]}</extra>`,
+    };
+  });
+  traces.push({
+    type: "scatter", mode: "markers", name: "linear", y: groups, x: back(of.linear), marker: { symbol: "line-ns-open", size: 14, color: "#2563eb" },
+  });
+  const shown = layout(`${escaped(of.measure)}: where its variance comes from`, "% of variance, in total", "");
+  Object.assign(shown, { barmode: "group", bargap: 0.25, height: 140 + 34 * groups.length });
+  shown.margin.l = 12;
+  shown.yaxis.automargin = true;
+  const box = chart(`Contributions to the variance of ${of.measure}, raw and corrected`, byId("shares"));
+  box.style.height = `${shown.height}px`;
+  Plotly.newPlot(box, traces, shown, SETTINGS);
+}
+
 /** One measure against a contributor, or against another measure, both in their states. */
 function relations() {
   const measured = unpacked(data.relations.measured), measures = data.charts.length;
@@ -128,6 +155,7 @@ for (const measure of data.charts) {
   histogram(measure);
   settling(measure);
 }
+data.contributions.forEach(contributions);
 relations();
 try {
   window.stage = new Stage(data.scene);

@@ -11,6 +11,7 @@ from tolcontact.report.figures import grouped, number, percent
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import CORRECTED, UNRESOLVED
 
+SENSITIVITY_COLUMNS = ("", "nominal", "untouched", "touched", "corrected", "spread", "kinks")
 SMALL = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
 
 
@@ -29,13 +30,13 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
     for measure in found["measure"].values:
         of = found.sel(measure=measure)
         yield Text(f"\n{measure} ({of['measure_units'].values} for a unit of each)", style="bold")
-        rows, small = _rows(of)
-        yield FigureTable(["", "nominal", "untouched", "touched", "corrected", "spread", "kinks"], rows)
+        rows, small = sensitivity_rows(of)
+        yield FigureTable(SENSITIVITY_COLUMNS, rows)
         if small:
             yield Text(f"and {small} that do next to nothing")
 
 
-def _rows(of: xr.Dataset) -> tuple[list[list[str]], int]:
+def sensitivity_rows(of: xr.Dataset) -> tuple[list[list[str]], int]:
     """Contributors, those with the largest effect first; and how many are left out."""
     mean = np.abs(of["sensitivity"].sel(interval="estimate").values).max(axis=0)
     size = np.fmax(mean, of["spread"].max("state").values)

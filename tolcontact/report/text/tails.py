@@ -9,6 +9,8 @@ from rich.text import Text
 from tolcontact.report.figures import grouped
 from tolcontact.report.text.table import FigureTable
 
+TAIL_COLUMNS = ("", "ppm")
+
 
 def tails_text(found: xr.Dataset) -> Group:
     """Rare events (see tolcontact.workflow.tails) as something that rich prints."""
@@ -19,9 +21,15 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
     simulated = int(found["simulated"].sum())
     yield Text(f"{found.attrs['title']}: {grouped(simulated)} realizations", style="bold")
     yield Text("Probabilities in ppm, with contact, by subset simulation; 95 % intervals.")
-    yield FigureTable(["", "ppm"], [[str(event), _ppm(found.sel(event=event))] for event in found["event"].values])
+    yield FigureTable(TAIL_COLUMNS, tail_rows(found))
+
+
+def tail_rows(found: xr.Dataset) -> list[list[str]]:
+    """Events, with their probabilities."""
+    return [[str(event), _ppm(found.sel(event=event))] for event in found["event"].values]
 
 
 def _ppm(of: xr.Dataset) -> str:
-    estimate, lower, upper = (f"{1e6 * float(value):.3g}" for value in of["probability"].values)
+    ppm = [1e6 * float(value) for value in of["probability"].values]
+    estimate, lower, upper = (grouped(round(value)) if value >= 1000 else f"{value:.3g}" for value in ppm)
     return f"{estimate} [{lower}, {upper}]"

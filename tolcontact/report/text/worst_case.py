@@ -12,6 +12,7 @@ from tolcontact.report.figures import grouped
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import CORRECTED, ENDS, STATES, STATUS_MEANINGS, UNRESOLVED, Status
 
+WORST_COLUMNS = ("", "found", "bound", "random", "unseen ends")
 UNSURE = 0.1  # from this share of unseen starts on, it is said that there may be worse ends
 
 
@@ -34,12 +35,13 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
     for measure in found["measure"].values:
         of = found.sel(measure=measure)
         yield Text(f"\n{measure} [{of['measure_units'].values}]", style="bold")
-        yield FigureTable(["", "found", "bound", "random", "unseen ends"], list(_values(of)))
+        yield FigureTable(WORST_COLUMNS, list(worst_rows(of)))
         yield from _remarks(of)
         yield FigureTable(["corrected", *ENDS], list(_combination(of.isel(state=CORRECTED))))
 
 
-def _values(of: xr.Dataset) -> Iterator[list[str]]:
+def worst_rows(of: xr.Dataset) -> Iterator[list[str]]:
+    """Both ends of a measure in both states."""
     for state in STATES:
         for end in ENDS:
             own = of.sel(state=state, end=end)

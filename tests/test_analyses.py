@@ -1,0 +1,94 @@
+"""Analyses kept in archives, and what the page shows of them."""
+
+import netCDF4
+import numpy as np
+import pytest
+import xarray as xr
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+from tolcontact.report.html.page import page_of
+from tolcontact.vocabulary import ANALYZED
+
+FAST = {"solver": "daqp"}
+
+
+@pytest.fixture
+def archive(tmp_path):
+    path = tmp_path / "ra1.nc"
+    tc.run(cases.ra1(), samples=300, out=path, surfaces=4, fields=64, **FAST).close()
+    return path
+
+
+def test_an_archive_keeps_what_was_asked_of_its_model(archive):
+    kept = {
+        "contributions": tc.contributions(cases.ra1(), samples=1024, into=archive, **FAST),
+        "sensitivities": tc.sensitivities(cases.ra1(), samples=16, into=archive, **FAST),
+        "worst_case": tc.worst_case(cases.ra1(), samples=16, into=archive, **FAST),
+        "tails": tc.tails(cases.ra1(), samples=4000, into=archive, **FAST),
+        "allocation": tc.allocate(cases.ra1(), "corner height: ppm 700000", samples=256, by="part", into=archive, **FAST),
+    }
+    with tc.open_archive(archive) as results:
+        assert results.sizes["realization"] == 300 and tc.summarize(results).attrs["realizations"] == 300
+        for name, found in kept.items():
+            there = results[f"statistics/{name}"].to_dataset()
+            for each in found.data_vars:
+                np.testing.assert_array_equal(there[each], found[each])
+                assert there[each].dims == found[each].dims and "long_name" in there[each].attrs
+            assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
+        page = page_of(results, tc.summarize(results))
+    assert "What matters" in page and "Worst cases of corner height [mm]" in page and "Rare events" in page
+    assert '"groups":["base.A2"' in page
+    with netCDF4.Dataset(archive) as file:  # without us
+        assert file["statistics/contributions/total"].units == "1"
+    tc.run(cases.ra1(), samples=600, out=archive, resume=True, surfaces=4, fields=64, **FAST).close()
+    with xr.open_datatree(archive) as longer:
+        assert longer.sizes["realization"] == 600 and "tails" in longer["statistics"].children
+
+
+def test_a_page_without_analyses_has_no_such_section(archive):
+    with tc.open_archive(archive) as results:
+        assert "What matters" not in page_of(results, tc.summarize(results))
+
+
+def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
+    before = archive.read_bytes()
+    with pytest.raises(tc.ArchiveError, match="another model"):
+        tc.sensitivities(cases.one_dimensional(0), samples=4, into=archive, **FAST)
+    with pytest.raises(tc.ArchiveError, match="does not exist"):
+        tc.sensitivities(cases.ra1(), samples=4, into=tmp_path / "none.nc", **FAST)
+    (tmp_path / "text.nc").write_text("no archive")
+    with pytest.raises(tc.ArchiveError, match=r"text\.nc"):
+        tc.sensitivities(cases.ra1(), samples=4, into=tmp_path / "text.nc", **FAST)
+    assert archive.read_bytes() == before
+    tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+    once = archive.read_bytes()
+    with pytest.raises(tc.ArchiveError, match="sensitivities already"):
+        tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
+    assert archive.read_bytes() == once and not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
+
+
+def test_numbers_that_were_changed_are_not_shown(archive):
+    tc.contributions(cases.ra1(), samples=16, into=archive, **FAST)
+    with netCDF4.Dataset(archive, "r+") as file:
+        file["statistics/contributions/linear"][0, 3] = 0.5
+    with tc.open_archive(archive) as results, pytest.raises(tc.ArchiveError, match="linear in the archive is not what"):
+        page_of(results, tc.summarize(results))
+
+
+def test_every_variable_of_analyses_has_one_kind():
+    kinds = {}
+    for variable in ANALYZED:
+        assert kinds.setdefault(variable.name, variable.kind) == variable.kind
+
+
+def test_the_command_keeps_it_too(tmp_path):
+    model, out = cases.MODELS / "ra1.py", tmp_path / "a.nc"
+    assert call(tmp_path, "run", model, "--samples", "64", "--solver", "daqp", "--out", out).returncode == 0
+    options = ("sensitivities", model, "--samples", "4", "--solver", "daqp", "--into", out)
+    done = call(tmp_path, *options)
+    assert done.returncode == 0, done.stderr
+    with xr.open_datatree(out) as results:
+        assert results["statistics/sensitivities"].attrs["realizations"] == 4
+    assert call(tmp_path, *options).returncode == 2

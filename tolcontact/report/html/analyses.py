@@ -1,0 +1,60 @@
+"""What a page shows of the analyses that its archive keeps: contributions as bars, the others as tables."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as words
+from tolcontact.report.figures import grouped
+from tolcontact.report.text.sensitivities import SENSITIVITY_COLUMNS, sensitivity_rows
+from tolcontact.report.text.tails import TAIL_COLUMNS, tail_rows
+from tolcontact.report.text.worst_case import WORST_COLUMNS, worst_rows
+from tolcontact.statistics import kept_analysis
+
+MOST = 15  # bars of a chart
+
+
+def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
+    """For each measure its groups, the largest total index first, with total and first-order shares of both states."""
+    found = kept_analysis(results, words.OF_CONTRIBUTIONS)
+    return [] if found is None else [_shares(found.sel(measure=measure)) for measure in found["measure"].values]
+
+
+def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
+    """Sensitivities, worst cases and rare events, with titles, columns and rows."""
+    slopes = kept_analysis(results, words.OF_SENSITIVITIES)
+    if slopes is not None:
+        count = grouped(slopes.attrs["realizations"])
+        for measure in slopes["measure"].values:
+            rows, _ = sensitivity_rows(slopes.sel(measure=measure))
+            yield {"title": f"Sensitivities of {measure}, {count} realizations", "columns": SENSITIVITY_COLUMNS, "rows": rows}
+    worst = kept_analysis(results, words.OF_WORST_CASE)
+    if worst is not None:
+        for measure in worst["measure"].values:
+            of = worst.sel(measure=measure)
+            title = f"Worst cases of {measure} [{of['measure_units'].values}]"
+            yield {"title": title, "columns": WORST_COLUMNS, "rows": list(worst_rows(of))}
+    rare = kept_analysis(results, words.OF_TAILS)
+    if rare is not None:
+        yield {"title": "Rare events", "columns": TAIL_COLUMNS, "rows": tail_rows(rare)}
+
+
+def _shares(of: xr.Dataset) -> dict[str, Any]:
+    total = of[words.TOTAL].sel(interval="estimate")
+    order = np.argsort(-np.nan_to_num(total.max("state").values), kind="stable")[:MOST]
+    states = [
+        {word: [_finite(of[word].values[state, k]) for k in order] for word in (words.FIRST, words.TOTAL)}
+        for state in range(len(words.STATES))
+    ]
+    return {
+        "measure": str(of["measure"].values),
+        "groups": [str(of["group"].values[k]) for k in order],
+        "states": states,
+        "linear": [_finite(of[words.LINEAR].values[k, None])[0] for k in order],
+    }
+
+
+def _finite(values: np.ndarray) -> list[float | None]:
+    return [100 * float(value) if np.isfinite(value) else None for value in values]
