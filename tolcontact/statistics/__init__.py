@@ -30,8 +30,12 @@ distribution, because contact cuts distributions off.
 | Pp, Ppk by percentiles (ISO 22514-2) | places of three percentiles together, from the multinomial distribution |
 | skewness, kurtosis, Pp and Ppk as of a normal distribution | influence functions (delta method) |
 | Sobol' indices, share that linear sensitivities miss | influence functions of ratios of means |
+| probabilities of rare events (`tc.tails`) | Student's t over 16 subset simulations |
 | change: shift of the mean | Student's t on the differences of the same draws |
 | change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
+
+Of a run by a sampling plan, with 16 replicates or more, intervals of the mean, the standard deviation, percentiles, shares
+outside, shape and changes are as wide as replicates differ (their design effect).
 
 Shares outside and capability are given only for measures with limits. Skewness and kurtosis need many realizations: with
 10 000 of a skewed distribution their intervals cover some 90 of 100, not 95. A measure that evaluates to NaN does not stop the

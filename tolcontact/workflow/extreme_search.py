@@ -13,7 +13,8 @@ from tolcontact.variation import GivenDraws, Region
 AROUND = 8  # random directions that a search tries, beside those of single contributors
 SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
 SHRINK, FINEST = 0.25, 1e-7  # of a search's step, in shares of the ranges
-GAIN = 1e-10  # of a measure's spread: less is rounding
+GAIN, ENOUGH = 1e-10, 0.01  # of a measure's spread: less is rounding; and, times the square of a step, no progress
+ROUNDS = 200  # steps of a search at most
 FINISHES = 4
 NEAR = 1e-4  # of the ranges: steps of differences at an end
 
@@ -61,17 +62,19 @@ class Searches:
     step: np.ndarray
 
     @classmethod
-    def begun(cls, starts: np.ndarray, seen: np.ndarray, count: int) -> "Searches":
-        """`count` of them for each measure, state and sense, from the best starts (n, contributor), with measures
-        (n, state, measure)."""
+    def begun(cls, starts: np.ndarray, seen: np.ndarray, best: int, others: int, rng: np.random.Generator) -> "Searches":
+        """Some for each measure, state and sense: from the best starts (n, contributor), with measures (n, state, measure), and
+        from others at random."""
+        count = best + others
         every = []
         for measure in range(seen.shape[2]):
             for state in range(seen.shape[1]):
                 for sense in words.SENSES:
                     values = np.nan_to_num(sense * seen[:, state, measure], nan=-np.inf)
-                    best = np.argsort(-values, kind="stable")[:count]
-                    same = np.ones(count, dtype=int)
-                    every.append(cls(sense * same, state * same, measure * same, starts[best], values[best], 1.0 * same))
+                    order, same = np.argsort(-values, kind="stable"), np.ones(count, dtype=int)
+                    rest = order[best : max(int(np.isfinite(values).sum()), best + 1)]
+                    chosen = np.concatenate([order[:best], rng.choice(rest, others)])
+                    every.append(cls(sense * same, state * same, measure * same, starts[chosen], values[chosen], 1.0 * same))
         return cls(*(np.concatenate([getattr(each, field.name) for each in every]) for field in fields(cls)))
 
     def take(self, rows: np.ndarray) -> "Searches":
@@ -104,17 +107,20 @@ class Searcher:
     """Moves searches in a region. `spread` (measure,): how much measures differ there."""
 
     def __init__(self, region: Region, evaluate: Evaluation, spread: np.ndarray, rng: np.random.Generator) -> None:
-        self._region, self._evaluate, self._least, self._rng = region, evaluate, GAIN * spread, rng
+        self._region, self._evaluate, self._spread, self._rng = region, evaluate, spread, rng
         self._ranges = np.zeros(len(region.lower))
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
         self._compass = np.diag(self._ranges)[region.moves]
 
     def search(self, searches: Searches, progress: Callable[[int, int], None] | None) -> None:
         """Go on until all steps are small (a generating set search). `progress` is told how many ended, and of how many."""
-        while (going := np.flatnonzero(searches.step > FINEST)).size:
+        for _ in range(ROUNDS):
+            going = np.flatnonzero(searches.step > FINEST)
+            if not going.size:
+                break
             now = searches.take(going)
             there, worth, slopes = self._around(now, now.step, self._random())
-            gains = now.move(there, worth, self._least[now.measure])
+            gains = now.move(there, worth, self._least(now))
             gains |= self._go_far(now, self._region.farthest(slopes))
             now.step[~gains] *= SHRINK
             searches.put(going, now)
@@ -123,6 +129,7 @@ class Searcher:
 
     def finish(self, searches: Searches) -> None:
         """Go to the very end of round zones, along the slopes."""
+        searches.step[:] = 0.0
         for _ in range(FINISHES):
             _, _, slopes = self._around(searches, np.full(len(searches.value), NEAR), np.zeros((0, len(self._ranges))))
             ends = [
@@ -130,6 +137,10 @@ class Searcher:
             ]
             if not self._go_far(searches, np.array(ends)).any():
                 return
+
+    def _least(self, searches: Searches) -> np.ndarray:
+        """What a step has to gain (n,): the more the longer it is, so that searches do not creep (a forcing function)."""
+        return np.asarray(self._spread[searches.measure] * (GAIN + ENOUGH * searches.step**2))
 
     def _random(self) -> np.ndarray:
         """Steps (direction, contributor) of length 1 in shares of the ranges."""
@@ -158,4 +169,4 @@ class Searcher:
         there = searches.own[:, None] + SHARES[:, None] * (ends - searches.own)[:, None]
         fixed = np.setdiff1d(self._region.varies, self._region.moves)
         there[:, :, fixed] = ends[:, None, fixed]
-        return searches.move(there, searches.worth(there, self._evaluate), self._least[searches.measure])
+        return searches.move(there, searches.worth(there, self._evaluate), self._least(searches))

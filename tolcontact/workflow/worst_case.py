@@ -16,7 +16,7 @@ from tolcontact.workflow.extreme_search import Evaluation, Searcher, Searches
 from tolcontact.workflow.farthest_pose import farthest_poses
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
-SEARCHES = 12  # for each value
+BEST, OTHERS = 4, 12  # searches for each value: from the best combinations, and from others at random
 SAME = 1e-4  # of a measure's spread: ends that differ by less are one
 
 
@@ -37,14 +37,15 @@ def worst_case(
         bound       (measure, state, end)               beyond which no pose free of penetration lies, in the linear model; see
                                                         tolcontact.workflow.farthest_pose. Infinite: contact alone holds nothing
         random      (measure, state, end)               the best of `samples` random combinations
-        ends        (measure, state, end)               number of different values that searches ended at
+        ends        (measure, state, end)               number of different values that the twelve ended at
         unseen      (measure, state, end)               expected share of starts whose end no search has seen
         by_status   (status_meaning)                    number of realizations, of all that were simulated
 
     With contact a measure is neither smooth nor concave, and the linearized resolution jumps: a search finds what it finds.
-    Each begins at one of the best random combinations, goes on along single contributors, random directions, and to the far
-    end of the region in the direction of its slopes, with steps that shrink (a generating set search; Kolda, Lewis, Torczon,
-    2003). `unseen` is the estimate w (w + 1) / (n (n - 1)) of w ends of n searches (Boender, Rinnooy Kan, 1987).
+    Four begin at the best random combinations, twelve at any of them. Each goes on along single contributors, random
+    directions, and to the far end of the region in the direction of its slopes, with steps that shrink (a generating set
+    search; Kolda, Lewis, Torczon, 2003). `unseen` is the estimate w (w + 1) / (n (n - 1)) of w ends of the n = 12 (Boender,
+    Rinnooy Kan, 1987).
     Only certified realizations count. `progress` is called with the number of searches that ended, and of all.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/worst_case; the report shows it.
@@ -65,20 +66,20 @@ def worst_case(
     if not np.isfinite(seen[:, words.CORRECTED]).any():
         raise OptionError(f'"{program.nominal.assembly.name}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(seen, axis=(0, 1)) - np.nanmin(seen, axis=(0, 1))
-    searches, searcher = Searches.begun(starts, seen, SEARCHES), Searcher(region, evaluate, spread, rng)
+    searches, searcher = Searches.begun(starts, seen, BEST, OTHERS, rng), Searcher(region, evaluate, spread, rng)
     searcher.search(searches, progress)
-    worth = searches.value.reshape(-1, SEARCHES)
-    best = searches.take(worth.argmax(axis=1) + SEARCHES * np.arange(len(worth)))
+    worth = searches.value.reshape(-1, BEST + OTHERS)
+    best = searches.take(worth.argmax(axis=1) + worth.shape[1] * np.arange(len(worth)))
     searcher.finish(best)
     shape = (len(program.nominal.measures), len(words.STATES), len(words.ENDS))
-    ends = np.array([_different(row, SAME * spread[of]) for row, of in zip(worth, best.measure, strict=True)])
+    ends = np.array([_different(row[BEST:], SAME * spread[of]) for row, of in zip(worth, best.measure, strict=True)])
     found = {
         "worst": (best.sense * best.value).reshape(shape),
         "deviations": region.deviations(best.own).reshape(*shape, -1),
         "bound": farthest_poses(program, region, linear),
         "random": np.stack([np.nanmin(seen, axis=0), np.nanmax(seen, axis=0)], axis=-1).swapaxes(0, 1),
         "ends": ends.reshape(shape),
-        "unseen": np.minimum(1.0, ends * (ends + 1) / (SEARCHES * (SEARCHES - 1))).reshape(shape),
+        "unseen": np.minimum(1.0, ends * (ends + 1) / (OTHERS * (OTHERS - 1))).reshape(shape),
         "by_status": evaluate.statuses,
     }
     answer = xr.Dataset(
@@ -95,7 +96,7 @@ def worst_case(
         attrs={
             "title": f"worst cases of the measures of {program.nominal.assembly.name}",
             "random_combinations": samples,
-            "searches": SEARCHES,
+            "searches": BEST + OTHERS,
             "seed": seed,
             "solver": program.plugin.name,
             "resolution": program.method.resolution,
