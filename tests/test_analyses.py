@@ -8,6 +8,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
+from tests.test_report import data_of, unpacked
 from tolcontact.report.html.page import page_of
 from tolcontact.vocabulary import ANALYZED
 
@@ -39,12 +40,33 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
         page = page_of(results, tc.summarize(results))
     assert "What matters" in page and "Worst cases of corner height [mm]" in page and "Rare events" in page
+    assert "Allocation" in page and "Cost 2 before" in page
+    drawn = data_of(page)["scene"]["realizations"]
+    assert drawn["names"][:2] == [f"worst case: {end} corner height" for end in ("least", "largest")]
+    measured, worst = unpacked(drawn["measured"]), kept["worst_case"].worst.sel(state="corrected").values[0]
+    assert measured[:2, 1, 0] == pytest.approx(worst, rel=1e-6) and len(unpacked(drawn["motions"])) == len(drawn["names"])
+    case = kept["worst_case"].sel(case="least corner height", state="corrected", part="top")
+    corner = case.rotation.values @ [100, 12.5, 20] + case.translation.values
+    assert corner[2] - 20 == pytest.approx(float(case.measured[0]), abs=1e-9)
     assert '"groups":["base.A2"' in page
     with netCDF4.Dataset(archive) as file:  # without us
         assert file["statistics/contributions/total"].units == "1"
     tc.run(cases.ra1(), samples=600, out=archive, resume=True, surfaces=4, fields=64, **FAST).close()
     with xr.open_datatree(archive) as longer:
         assert longer.sizes["realization"] == 600 and "tails" in longer["statistics"].children
+
+
+def test_a_model_without_contact_can_be_asked_as_well():
+    a = tc.Assembly("alone")
+    part = a.part("plate", tc.Box(100, 50, 10))
+    a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=10), tolerance=0.1)
+    a.measure("corner", part.point(100, 50, 10), along="z", tolerance=0.1)
+    worst = tc.worst_case(a, samples=64, **FAST)
+    assert np.abs(worst.worst.values - worst.bound.values).max() < 1e-3
+    assert float(tc.contributions(a, samples=256, **FAST).missed.max()) < 1e-3
+    nominal = tc.sensitivities(a, samples=4, **FAST).nominal.values[0]
+    assert worst.bound.values[0, 0, 1] == pytest.approx(0.05 * np.abs(nominal).sum(), abs=1e-9)
+    assert tc.tails(a, samples=4000, **FAST).sizes["event"] == 1
 
 
 def test_a_page_without_analyses_has_no_such_section(archive):

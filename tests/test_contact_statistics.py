@@ -18,6 +18,10 @@ def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
     share = (results["status"].values[: contacts.AT_MOST] == tc.Status.RESOLVED).mean()
     assert found.attrs["realizations"] == contacts.AT_MOST and (found["pair"] == "seat").all()
     assert np.abs(found["touching"].sel(interval="estimate") - share).max() < 1e-12
+    archived = results["contact"]  # for whoever reads an archive without tolcontact
+    assert np.array_equal(archived["touching"], found["touching"].sel(interval="estimate"))
+    assert np.array_equal(archived["touching_interval"], found["touching"].sel(interval=["lower", "upper"]))
+    assert int(archived["touching_realizations"]) == contacts.AT_MOST and archived["touching"].dims == ("point",)
 
 
 def test_figures_are_those_of_the_rows():
@@ -52,6 +56,7 @@ def test_archives_without_poses_say_nothing_of_points():
     results = tc.run(cases.stack(), samples=30, solver="daqp", keep="measures", surfaces=0)
     found = touching(results)
     assert found.attrs["realizations"] == 0 and np.isnan(found["touching"]).all()
+    assert int(results["contact/touching_realizations"]) == 0 and np.isnan(results["contact/touching"]).all()
 
 
 @needs_browser

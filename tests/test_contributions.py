@@ -1,6 +1,7 @@
 """Sobol' indices: known functions, RA1's closed form, scipy's estimates; what is drawn together; what the command prints."""
 
 import io
+import itertools
 import json
 
 import numpy as np
@@ -12,8 +13,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tests.test_ra1 import MEASURED, TOP, plane_weights
-from tolcontact.statistics.contributions import missed, sobol_indices
-from tolcontact.variation import MixedDraws, independent_groups
+from tolcontact.simulation.linear_model import linear_model
+from tolcontact.statistics.contributions import missed, shapley_effects, sobol_indices
+from tolcontact.variation import MixedDraws, ReleasedDraws, independent_groups
 
 
 def values(function, A, B):
@@ -165,6 +167,77 @@ def test_what_is_drawn_together_is_one_group():
     assert sorted(k for columns in groups.values() for k in columns) == list(range(len(labels)))
     by_part = tc.contributions(a, samples=16, solver="daqp", by="part")
     assert by_part.sizes["group"] == 2 and "bottom" in by_part["group"].values
+
+
+def of_normal(weights, matrix):
+    """Shapley effects of a sum of correlated normal numbers, from the variance that each set of them explains."""
+    weights, matrix = np.asarray(weights), np.asarray(matrix)
+
+    def explained(members):
+        members = list(members)
+        slopes = np.linalg.solve(matrix[np.ix_(members, members)], matrix[members] @ weights)
+        return slopes @ matrix[members] @ weights
+
+    found, orders = np.zeros(len(weights)), list(itertools.permutations(range(len(weights))))
+    for order in orders:
+        for place, own in enumerate(order):
+            found[own] += explained(order[: place + 1]) - (explained(order[:place]) if place else 0)
+    return found / len(orders) / (weights @ matrix @ weights)
+
+
+CORRELATED = ["upper.A3", "middle.A1", "upper.A1"]
+MATRIX = [[1, 0.8, -0.3], [0.8, 1, 0.1], [-0.3, 0.1, 1]]
+
+
+def test_shapley_effects_divide_what_is_correlated():
+    """Against the closed form: also of a locator that the measure does not follow; it is correlated with one it follows."""
+    rho, first, second = 0.5, 1, 2  # Owen, Prieur (2017), two numbers
+    own = (first**2 * (1 - rho**2 / 2) + rho * first * second + second**2 * rho**2 / 2) / 7
+    assert of_normal([first, second], [[1, rho], [rho, 1]]) == pytest.approx([own, 1 - own])
+    a = cases.stack()
+    a.correlate(CORRELATED, MATRIX)
+    program = tc.build(a, solver="daqp")
+    found = tc.contributions(program, samples=4096).sel(measure="top")
+    columns = [list(program.nominal.contributors).index(label) for label in (*CORRELATED, "upper.A2")]
+    slopes = linear_model(program).by_deviations[0, columns]
+    matrix = np.eye(4)
+    matrix[:3, :3] = MATRIX
+    for label, truth in zip((*CORRELATED, "upper.A2"), of_normal(slopes, matrix), strict=True):
+        estimate, lower, upper = found["shapley"].sel(state="raw", unit=label).values
+        assert abs(estimate - truth) < 1.7 * (upper - lower) / 2 + 1e-3 and truth > 0.05, label
+    assert found["shapley"].sel(interval="estimate").sum("unit").values == pytest.approx([1, 1])
+    assert found.sizes["unit"] == found.sizes["group"] + 2
+    assert tc.contributions(program, samples=16, by="part").sizes["unit"] == 3
+
+
+def test_intervals_of_shapley_effects_cover():
+    """Of a clipped sum of independent numbers they are the means of first-order and total indices."""
+    draws, inside = np.random.default_rng(8), np.zeros(2)
+    truth = of_clipped().mean(axis=0)
+    for _ in range(500):
+        A, B = draws.normal(size=(2, 1000, 2))
+        places = draws.random((1000, 2)).argsort(axis=1)
+        f = np.column_stack([clipped(np.where(places < members, A, B)) for members in range(3)])
+        inside += [e.lower <= t <= e.upper for e, t in zip(shapley_effects(f, places), truth, strict=True)]
+    assert (inside >= 460).all() and (inside <= 490).all(), inside
+
+
+def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
+    a = cases.stack()
+    a.correlate(CORRELATED, MATRIX)
+    program = tc.build(a, solver="daqp")
+    labels = list(program.nominal.contributors)
+    columns = [labels.index(label) for label in CORRELATED]
+    released = ReleasedDraws(program.draws, independent_groups(program.draws, labels, correlated=False))
+    whole = released(seed=2, start=0, stop=19 * 3000)
+    assert np.array_equal(whole[37:777], released(seed=2, start=37, stop=777))
+    rows = whole.reshape(3000, 19, -1)
+    assert np.abs(rows[:, -1] - program.draws(seed=2, start=0, stop=3000)).max() < 1e-9
+    for members in (0, 9, 18):
+        assert np.corrcoef(rows[:, members, columns].T) == pytest.approx(np.array(MATRIX), abs=0.06)
+    places = released.places(2, 0, 3000)
+    kept = np.isclose(rows[:, 9], rows[:, -1], atol=1e-9)[:, labels.index("upper.A2")]
+    assert np.array_equal(kept, places[:, labels.index("upper.A2")] < 9)
 
 
 def test_the_command_prints_a_table_json_and_csv(tmp_path):

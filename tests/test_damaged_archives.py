@@ -1,6 +1,7 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import multiprocessing
+import functools
+from pathlib import Path
 
 import netCDF4
 import numpy as np
@@ -14,13 +15,10 @@ from tests.helpers import COMMAND, call, model_in, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
 from tolcontact.archive import inspection
-from tolcontact.child import ChildDiedError
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
 HARMLESS = ("declared_at is an escape",)  # what is shown as it is written
-FORKS = multiprocessing.get_context("forkserver")
-FORKS.set_forkserver_preload(["tolcontact.archive.inspection"])
 NAMES = [coordinate.name for coordinate in vocabulary.COORDINATES]
 
 
@@ -32,35 +30,27 @@ def good(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def said(good):
+    return tc.summarize(good)
+
+
+@pytest.fixture(scope="module")
 def program():
     return tc.build(ra1.assembly, solver="daqp")
 
 
 @pytest.fixture
-def near(monkeypatch):
-    """The inspection in a process that need not import anything: some hundred files take seconds."""
-
-    def look_nearby(_script, path, **_):
-        there, here = FORKS.Pipe()
-        process = FORKS.Process(target=look, args=(path, here))
-        process.start()
-        here.close()
-        try:
-            return there.recv()
-        except EOFError as error:  # the netCDF library may crash
-            raise ChildDiedError("its reader died") from error
-        finally:
-            process.join()
-
-    monkeypatch.setattr(inspection, "run_child", look_nearby)
-
-
-def look(path, answer):
-    answer.send(inspection._look(inspection.Path(path)))
+def once(monkeypatch):
+    """A file that has not changed is inspected once: each inspection is a process of its own."""
+    inspected = inspection.run_child
+    answer = functools.cache(lambda script, path, _content, seconds: inspected(script, path, seconds=seconds))
+    monkeypatch.setattr(
+        inspection, "run_child", lambda script, path, seconds: answer(script, path, Path(path).read_bytes(), seconds)
+    )
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("near")
+@pytest.mark.usefixtures("once")
 @pytest.mark.parametrize("name", [name for name in HOSTILE if name not in CRASHES])
 def test_an_archive_with_a_lie_is_refused_in_one_line(name, good, program, tmp_path):
     path = tmp_path / "hostile.nc"
@@ -96,8 +86,8 @@ def test_the_command_refuses_with_code_2(name, good, tmp_path):
 
 
 @pytest.mark.parametrize("seed", range(40))
-@pytest.mark.usefixtures("near")
-def test_a_damaged_file_is_refused_or_says_what_it_said(seed, good, program, tmp_path):
+@pytest.mark.usefixtures("once")
+def test_a_damaged_file_is_refused_or_says_what_it_said(seed, said, good, program, tmp_path):
     """Bytes changed anywhere, among the headers, or cut off: no other numbers ever."""
     rng = np.random.default_rng(seed)
     path, content = tmp_path / "damaged.nc", bytearray(good.read_bytes())
@@ -110,7 +100,7 @@ def test_a_damaged_file_is_refused_or_says_what_it_said(seed, good, program, tmp
             found = use()
         except ArchiveError:
             continue
-        expected = tc.summarize(good) if "by_status" in found else xr.Dataset({"model": str(program.nominal.assembly)})
+        expected = said if "by_status" in found else xr.Dataset({"model": str(program.nominal.assembly)})
         assert found.identical(expected)
 
 

@@ -45,7 +45,7 @@ def test_a_model_with_faults_shows_them():
 
 def test_results_show_figures_and_the_report(results):
     shown = results.tolcontact._repr_html_()
-    assert shown.index("<table>") < shown.index("<iframe") and len(scene_in(shown)["realizations"]["rows"]) == 200
+    assert shown.index("<table>") < shown.index("<iframe") and len(scene_in(shown)["realizations"]["names"]) == 200
 
 
 def test_a_summary_shows_tables_and_a_selection_of_it_what_xarray_shows(results):

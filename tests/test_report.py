@@ -33,6 +33,11 @@ def data_of(page):
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
 
 
+def unpacked(of):
+    """An array that a page holds."""
+    return np.frombuffer(base64.b64decode(of["data"]), f"<{of['kind']}").reshape(of["shape"])
+
+
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("report") / "ra1.nc"
@@ -70,8 +75,9 @@ def test_counts_of_a_histogram_are_all_realizations(archive, page):
 def test_extreme_realizations_are_shown_first(archive, page):
     shown = data_of(page.read_text())["scene"]["realizations"]
     order = np.argsort(tc.open_archive(archive)["measured"].values[:, 1, 0])
-    assert shown["rows"][:10] == [*order[:5].tolist(), *order[::-1][:5].tolist()]
-    assert shown["why"][0].startswith("smallest") and shown["why"][5].startswith("largest") and len(shown["rows"]) == 300
+    said = {"smallest": order[:5], "largest": order[::-1][:5]}
+    assert shown["names"][:10] == [f"realization {row} ({word} corner height)" for word, rows in said.items() for row in rows]
+    assert len(shown["names"]) == 300
 
 
 @pytest.mark.parametrize(
@@ -252,9 +258,9 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
     part = data_of(page)["scene"]["parts"][0]
     count = part["faces"]["shape"][0]
     assert count <= 2000 < part["triangles"] and f"drawn with {grouped(count)} of its" in page
-    vertices = np.frombuffer(base64.b64decode(part["vertices"]["data"]), "<f4").reshape(part["vertices"]["shape"])
+    vertices = unpacked(part["vertices"])
     assert np.abs(np.linalg.norm(vertices, axis=1) - 50).max() < 0.5
-    field = np.frombuffer(base64.b64decode(part["sixSigma"]["data"]), "<f4").reshape(part["sixSigma"]["shape"])
+    field = unpacked(part["sixSigma"])
     assert field.shape == (2, len(vertices), 4) and np.ptp(field[0, :, 2]) < 1e-5  # it does not turn: all points go alike
 
 
@@ -271,7 +277,7 @@ def test_means_settle_within_students_interval(archive, page):
     (chart,) = data_of(page.read_text())["charts"]
     x = tc.open_archive(archive)["measured"].values[:, 1, 0]
     of = chart["states"][1]["settling"]
-    found = np.frombuffer(base64.b64decode(of["data"]), "<f4").reshape(of["shape"])
+    found = unpacked(of)
     assert found[0, 0] == 2 and found[-1, 0] == 500
     for n, mean, half in found:
         expected = intervals.mean(x[: int(n)])
@@ -285,4 +291,4 @@ def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         tc.run(cases.stack(), samples=60_000, solver="daqp", out=tmp_path / "part.nc", progress=stop)
     page = page_of(tmp_path / "part.nc", tmp_path / "part.html")
-    assert "of 60 000; the run is unfinished" in page and len(data_of(page)["scene"]["realizations"]["rows"]) == 300
+    assert "of 60 000; the run is unfinished" in page and len(data_of(page)["scene"]["realizations"]["names"]) == 300

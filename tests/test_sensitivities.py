@@ -28,6 +28,24 @@ def test_without_contact_they_are_those_of_the_plane_through_the_locators(of_ra1
     assert (of_ra1["nominal"].sel(contributor=[f"base.A{k}" for k in (1, 2, 3)]) == 0).all()
 
 
+def test_leverage_of_locators():
+    """Against the twist that the six locators allow."""
+    a = tc.Assembly("lever")
+    part = a.part("plate", tc.Box(100, 50, 10))
+    a.part("ground", tc.Box(5, 5, 5), at=(0, 0, -5), fixed=True)
+    a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x"), inset=10), tolerance=0.1)
+    a.variable("heat", 0.1, drives={"plate.C1": 1.0})
+    a.measure("corner", part.point(100, 50, 10), along="z")
+    found = tc.sensitivities(a, samples=2, solver="daqp")["leverage"]
+    assert np.isnan(found.sel(contributor="heat")) and float(found.sel(contributor="plate.C1")) == pytest.approx(1, abs=1e-6)
+    own = tc.build(a, solver="daqp").nominal.parts[0].locators
+    twists = np.linalg.inv(np.hstack([own.directions, np.cross(own.points, own.directions)]))  # columns: t, w for each locator
+    corners = np.array([(x, y, z) for x in (0, 100) for y in (0, 50) for z in (0, 10)])
+    for label, twist in zip(own.labels, twists.T, strict=True):
+        farthest = np.linalg.norm(twist[:3] + np.cross(twist[3:], corners), axis=1).max()
+        assert float(found.sel(contributor=label)) == pytest.approx(farthest, abs=1e-6)
+
+
 def test_with_contact_they_are_those_of_the_plane_below(of_ra1):
     """CASES C2: a top that touches follows the base alone."""
     touched = of_ra1["by_contact"].sel(contact="touched")
@@ -46,6 +64,17 @@ def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
     assert of["by_contact"].sel(interval="estimate").values == pytest.approx([1.0, 0.0], abs=1e-7)
     assert float(of["spread"].sel(state="corrected")) == pytest.approx(0.5, abs=0.02)
     assert float(of["sensitivity"].sel(state="raw", interval="estimate")) == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.slow
+def test_intervals_cover():
+    """500 repeats of 100 realizations: the mean derivative of max(0, g) is 0.5."""
+    program, inside = tc.build(cases.one_dimensional(0), solver="daqp"), 0
+    for seed in range(500):
+        found = tc.sensitivities(program, samples=100, seed=seed).isel(measure=0)
+        _, lower, upper = found["sensitivity"].sel(state="corrected", contributor="block.Z").values
+        inside += lower <= 0.5 <= upper
+    assert 460 <= inside <= 490
 
 
 def test_a_clutch_follows_its_drawing_as_its_formula_says():

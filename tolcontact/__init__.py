@@ -51,9 +51,9 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
-| ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate` |
+| ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
-| catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError` |
+| catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
 | warnings | `ContactWarning`, `UnitsWarning` |
 
 `tolcontact.testing` has asserts for tests of your own models.

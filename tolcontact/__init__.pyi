@@ -38,6 +38,7 @@ from .declaration import (
 from .discretization import bodies_in, faces_in, parts_from
 from .errors import (
     ArchiveError,
+    ClusterError,
     ContactWarning,
     ModelError,
     OptionError,
@@ -58,6 +59,7 @@ from .workflow import (
     compare_runs,
     contributions,
     open_archive,
+    relocate,
     run,
     sensitivities,
     summarize,
@@ -67,11 +69,12 @@ from .workflow import (
 )
 
 __all__ = [
-    "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "Coaxiality", "ContactPair",
+    "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "ClusterError", "Coaxiality", "ContactPair",
     "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
     "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "allocate", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
-    "plot", "run", "sensitivities", "simulate_blocks", "summarize", "tails", "three_two_one", "worst_case", "write_model",
+    "plot", "relocate", "run", "sensitivities", "simulate_blocks", "summarize", "tails", "three_two_one", "worst_case",
+    "write_model",
 ]  # fmt: skip

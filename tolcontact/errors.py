@@ -32,6 +32,9 @@ class ModelError(TolcontactError):
         count = "1 fault" if len(self.faults) == 1 else f"{len(self.faults)} faults"
         super().__init__("\n".join([f'model "{model}" has {count}:', *(f"  - {fault}" for fault in self.faults)]))
 
+    def __reduce__(self) -> tuple[type, tuple[str, tuple[str, ...]]]:
+        return ModelError, (self.model, self.faults)
+
 
 class ScriptError(TolcontactError):
     """A model script cannot be read or has no usable `assembly()`."""
@@ -43,6 +46,10 @@ class OptionError(TolcontactError):
 
 class ArchiveError(TolcontactError):
     """An archive cannot be written, is damaged, or is not an archive of tolcontact."""
+
+
+class ClusterError(TolcontactError):
+    """Workers cannot be used: there are none, they have other versions, or they end."""
 
 
 class ContactWarning(UserWarning):

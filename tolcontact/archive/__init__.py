@@ -37,11 +37,11 @@ Each realization is one row and carries its own certificate.
 `state` is raw or corrected. Groups hold the rest: `contact` the contact points, `sample` the contributors (locators, freedoms
 of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
 contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as
-JSON, `statistics/<name>` what `tc.contributions`, `tc.sensitivities`, `tc.worst_case`, `tc.tails` and `tc.allocate` found, if
-they were told to keep it there (`into=`). A group is called like its part; a part with the name of a dimension gets an
-underscore behind it (the attribute `part` is the name in any case). Attributes state the format number, the versions, the
-seed, the solver with its options, and the method with all its choices, and the sampling plan (`sampler`); `method_from`
-states whether the method was the model's, the defaults, or set by options.
+JSON, `statistics/<name>` what `tc.contributions`, `tc.sensitivities`, `tc.worst_case`, `tc.tails`, `tc.allocate` and
+`tc.relocate` found, if they were told to keep it there (`into=`). A group is called like its part; a part with the name of a
+dimension gets an underscore behind it (the attribute `part` is the name in any case). Attributes state the format
+number, the versions, the seed, the solver with its options, and the method with all its choices, and the sampling plan
+(`sampler`); `method_from` states whether the method was the model's, the defaults, or set by options.
 
 ## Reading it
 

@@ -102,6 +102,8 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_model(file.createGroup("model"), nominal, declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
     _write_sample(file.createGroup("sample"), program, deviations=words.DEVIATION in kept_rows(run.keep))
+    file["contact"].createDimension(words.BOUND, 2)
+    _lay_out_together(file["contact"], nothing_touching(file["contact"].dimensions[words.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(words.CHECKED, run.surfaces)
     _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
@@ -194,6 +196,15 @@ def no_field(vertices: int) -> dict[Variable, Any]:
         words.FIELD_INTERVAL: np.full([states, vertices, len(words.BOUNDS)], np.nan),
         words.FIELD_REALIZATIONS: 0,
         words.MAGNITUDE_REALIZATIONS: 0,
+    }
+
+
+def nothing_touching(points: int) -> dict[Variable, Any]:
+    """What the group of contact points holds of how often they touch, before that was looked at."""
+    return {
+        words.TOUCHING_SHARE: np.full(points, np.nan),
+        words.TOUCHING_INTERVAL: np.full((points, 2), np.nan),
+        words.TOUCHING_REALIZATIONS: 0,
     }
 
 

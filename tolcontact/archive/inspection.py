@@ -42,7 +42,7 @@ ONCE = {  # by group
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
     "model": (words.DECLARATION,),
     "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,
-                words.LOCATOR_OF_POINT, *words.ROUND, *words.FEATURE_FACES),
+                words.LOCATOR_OF_POINT, *words.ROUND, *words.FEATURE_FACES, *words.TOUCHING, words.GROUP_CHECKSUM),
     "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
                words.LOCATOR_DIRECTION, words.CONTRIBUTOR_LABEL, words.CONTRIBUTOR_SOURCE, words.CONTRIBUTOR_UNITS,
                words.MEAN_SHIFT, words.FACE_OF_LOCATOR),
@@ -271,7 +271,7 @@ def _check_sums(group: netCDF4.Dataset) -> None:
                 raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{name} is not what was written")
     if words.GROUP_CHECKSUM.name in group.variables:
         said, found = int(group[words.GROUP_CHECKSUM.name][...]), 0
-        for variable in words.SURFACE if kind == "surface" else words.FIELDS:
+        for variable in {"surface": words.SURFACE, "contact": words.TOUCHING}.get(kind, words.FIELDS):
             if variable.name in group.variables:  # magnitude_realizations is not in archives of format 2
                 found = crc32(variable, _values(group[variable.name], variable), found)
         if said not in (words.UNFINISHED, found):

@@ -9,20 +9,19 @@ from tolcontact import poses as pose
 from tolcontact import vocabulary as words
 from tolcontact.checksums import crc32
 from tolcontact.simulation import Block
-from tolcontact.vocabulary import Variable
 
 
 class StoredBlock(NamedTuple):
-    """Realizations `start` to `stop`: the values of each variable that is kept, and their checksums."""
+    """Realizations `start` to `stop`: the values of each variable that is kept, by name, and their checksums."""
 
     start: int
     stop: int
-    values: dict[Variable, np.ndarray]
+    values: dict[str, np.ndarray]
     checksums: list[int]
 
 
-def stored(block: Block, kept: Sequence[Variable]) -> StoredBlock:
-    """A block, converted once for the file and for its checksums."""
+def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
+    """A block, converted once for the file and for its checksums; `kept` are names of variables."""
     found = {
         words.MEASURED: block.measured,
         words.GAP_MIN: block.gap_min,
@@ -37,9 +36,14 @@ def stored(block: Block, kept: Sequence[Variable]) -> StoredBlock:
         words.DEVIATION: block.deviations,
         words.STATUS: block.status,
     }
-    if words.ROTATION in kept:
+    if words.ROTATION.name in kept:
         found |= {words.ROTATION: pose.rotation(block.poses), words.TRANSLATION: pose.translation(block.poses)}
-    values = {variable: np.ascontiguousarray(found[variable], dtype=variable.kind) for variable in kept}
+    values = {
+        variable: np.ascontiguousarray(found[variable], dtype=variable.kind)
+        for variable in words.BY_REALIZATION
+        if variable.name in kept
+    }
+    checksums = [crc32(variable, data) for variable, data in values.items()]
     return StoredBlock(
-        block.start, block.start + len(block), values, [crc32(variable, data) for variable, data in values.items()]
+        block.start, block.start + len(block), {variable.name: data for variable, data in values.items()}, checksums
     )

@@ -21,7 +21,7 @@ from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 from tolcontact import vocabulary as words
 from tolcontact.archive.checked import archived_poses, choose, nothing_checked
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
-from tolcontact.archive.header import Run, kept_rows, no_field, now, run_settings, versions, write_header
+from tolcontact.archive.header import Run, kept_rows, no_field, nothing_touching, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.laid_out import LaidOut
 from tolcontact.archive.reader import opened
@@ -80,8 +80,11 @@ class ArchiveWriter:
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
             # What follows stands for the rows of before.
             nothing = {words.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
+            nothing["surface"] = nothing_checked(run.surfaces, len(program.nominal.pairs))
             with contextlib.closing(LaidOut(part)) as values:
-                values.overwrite_together({"surface": nothing_checked(run.surfaces, len(program.nominal.pairs)), **nothing})
+                if values.has("contact", words.TOUCHING_SHARE):  # not in archives that were begun before
+                    nothing["contact"] = nothing_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
+                values.overwrite_together(nothing)
         writer._go_on(path, program.nominal)
         return writer
 
@@ -115,11 +118,11 @@ class ArchiveWriter:
         with _refusals_told(self._path):
             if block.stop > self._length:
                 self._make_room_for_all()
-            for variable, data in block.values.items():
+            for variable in self.kept:
                 if variable is not words.STATUS:
-                    self._values.overwrite(_group_of(variable), variable, data, block.start)
+                    self._values.overwrite(_group_of(variable), variable, block.values[variable.name], block.start)
             self._values.overwrite("", words.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
-            self._values.overwrite("", words.STATUS, block.values[words.STATUS], block.start)
+            self._values.overwrite("", words.STATUS, block.values[words.STATUS.name], block.start)
         self.rows = block.stop
 
     def _make_room_for_all(self) -> None:
@@ -177,6 +180,13 @@ class ArchiveWriter:
             values[variable][: len(rows)] = of_rows
         with _refusals_told(self._path):
             self._values.overwrite_together({"surface": values})
+
+    def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
+        """How often each contact point touches, (point,), with its interval, (point, bound)."""
+        if self._values.has("contact", words.TOUCHING_SHARE):
+            with _refusals_told(self._path):
+                values = dict(zip(words.TOUCHING, (share, interval, realizations), strict=True))
+                self._values.overwrite_together({"contact": values})
 
 
 @contextlib.contextmanager

@@ -16,6 +16,7 @@
     tolcontact worst MODEL.py                            the least and the largest value of each measure, and what gives it
     tolcontact tails MODEL.py                            how often measures are outside their limits, where that is rare
     tolcontact allocate MODEL.py --require "gap: ppm 1000"   ranges at least cost, and which to tighten first
+    tolcontact relocate MODEL.py --locator top.A3 ...   where a locator makes a measure vary least
     tolcontact compare A.nc B.nc [--report FILE.html]    runs side by side, from the same draws or not
     tolcontact view MODEL.py | FILE.stp                  look at it before any run: faces with the words that choose them
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
@@ -64,6 +65,7 @@ from tolcontact.cli import (
     contributions,
     faces,
     new,
+    relocate,
     report,
     run,
     sensitivities,
@@ -75,6 +77,6 @@ from tolcontact.cli import (
 from tolcontact.cli.app import command_line, main
 
 __all__ = [
-    "allocate", "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "report", "run",
-    "sensitivities", "summary", "tails", "view", "worst",
+    "allocate", "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "relocate", "report",
+    "run", "sensitivities", "summary", "tails", "view", "worst",
 ]  # fmt: skip

@@ -12,6 +12,7 @@ from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.report import write_page
+from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
@@ -19,7 +20,10 @@ from tolcontact.workflow.run import run as run_model
 
 @app.command(
     epilog=examples(
-        "run model.py --samples 10000", "run model.py --out run.nc --report run.html", "run model.py --out run.nc --resume"
+        "run model.py --samples 10000",
+        "run model.py --out run.nc --report run.html",
+        "run model.py --out run.nc --resume",
+        "run model.py --samples 1000000 --out run.nc --workers 8",
     )
 )
 def run(
@@ -46,6 +50,11 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Simulate in so many processes, with dask.")] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.
@@ -58,7 +67,11 @@ def run(
         check_page(report)
     method = chosen(resolution=resolution, objective=objective)
     # Who stops it gets the cursor back first.
-    with stopped(out, done := [0, samples]), shown_progress(model.stem, samples, quiet=quiet) as show:
+    with (
+        stopped(out, done := [0, samples]),
+        shown_progress(model.stem, samples, quiet=quiet) as show,
+        client_of(workers, scheduler) as client,
+    ):
 
         def progress(rows: int) -> None:
             done[:] = rows, max(samples, rows)
@@ -66,7 +79,7 @@ def run(
 
         results = run_model(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until,
+            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until, client=client,
             fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip
     with results:

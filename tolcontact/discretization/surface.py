@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import igl
 import numpy as np
@@ -40,6 +40,10 @@ class Surface:
         self._given = corner_normals
         self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is sent to other processes: a search tree is grown again there."""
+        return {name: value for name, value in self.__dict__.items() if name != "_tree"}
 
     @cached_property
     def corner_normals(self) -> np.ndarray:

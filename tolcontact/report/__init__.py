@@ -45,6 +45,7 @@ from tolcontact.report.text import (
     comparison_text,
     contributions_text,
     population_text,
+    relocation_text,
     runs_text,
     sensitivities_text,
     summary_text,
@@ -53,6 +54,7 @@ from tolcontact.report.text import (
 )
 
 __all__ = [
-    "allocation_text", "capability_text", "comparison_text", "contributions_text", "grouped", "population_text", "runs_text",
-    "sensitivities_text", "summary_text", "tails_text", "worst_case_text", "write_comparison", "write_page", "write_view",
+    "allocation_text", "capability_text", "comparison_text", "contributions_text", "grouped", "population_text",
+    "relocation_text", "runs_text", "sensitivities_text", "summary_text", "tails_text", "worst_case_text",
+    "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

@@ -34,6 +34,26 @@ True
 The solvers `qpoases`, `osqp` and `highs` start each QP from the one before, and forget it at the end of a block. So the last
 digits of their results depend on which realizations share a block, and thereby on the number of realizations.
 
+## Many processes, many machines
+
+`tolcontact run MODEL --workers 8` simulates in eight processes of this machine, `--scheduler tcp://HOST:8786` on the workers of
+a running dask scheduler, `tc.run(..., client=client)` on those of any client of `dask.distributed` (the extra `dask`). In two
+shells, and one for each further worker:
+
+    dask scheduler
+    dask worker tcp://HOST:8786 --nthreads 1
+
+A worker gets the discretized model, not its script or its files, compiles it once, and simulates shards of some blocks, about a
+second each; this process writes what they give, in order. Four shards for each worker are under way at most, so memory does
+not grow with the number of realizations. Results are those of one process to the last bit, if workers have the same versions
+(others are refused) and the same kind of processor. Shards of a worker that is lost are simulated by others, and a scheduler
+that comes back within a minute gets again what it forgot. Whatever ends this process, `--resume` goes on, with any number of
+workers. Give workers of your own `DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__MALLOC_TRIM_THRESHOLD_=100000000`: with dask's
+own value they take half as long again (those of `--workers` have it). What a cluster costs and what limits it is in
+`studies/scale`. Workers run Python code that clients send: a scheduler belongs in a network that one trusts.
+
+`tc.contributions` and `tc.sensitivities` take a `client`, too.
+
 ## Time and memory
 
 From draws to measures, on one thread, RA1 takes 11 to 13 us for a realization with `daqp` and 25 to 30 us with `qpoases`;

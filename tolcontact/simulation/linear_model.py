@@ -54,6 +54,28 @@ def linear_model(program: Program) -> LinearModel:
     )  # fmt: skip
 
 
+def leverages(program: Program) -> np.ndarray:
+    """Of each locator (contributor,) the largest displacement of any vertex of its part for 1 mm, nominally; NaN for others.
+
+    It is 1 of three locators on a plane that span all of the part, and more the closer together they stand.
+    """
+    nominal = program.nominal
+    found = np.full(len(nominal.contributors), np.nan)
+    for number, part in enumerate(nominal.parts):
+        columns = nominal.columns(number)
+        if not len(columns):
+            continue
+        steps = np.zeros((len(columns), len(found)))
+        steps[np.arange(len(columns)), columns] = STEP
+        ends = [
+            program.place(deviations=sign * steps)["poses"].reshape(len(columns), len(nominal.parts), -1)[:, number]
+            for sign in (1, -1)
+        ]
+        apart = pose.apply(ends[0], part.vertices) - pose.apply(ends[1], part.vertices)
+        found[columns] = np.linalg.norm(apart, axis=-1).max(axis=-1, initial=0) / (2 * STEP)
+    return found
+
+
 def _seen(program: Program, poses: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Measures (n, measure) and gaps (n, row) at poses (n, part * 12)."""
     seen = program.observe(poses=poses, deviations=deviations)
@@ -86,14 +108,14 @@ def _moves(group: Group, mover: int, axis: int, points: np.ndarray) -> np.ndarra
 def _motions(program: Program, sign: int) -> np.ndarray:
     """Poses (freedom, part * 12) with a small step of each freedom."""
     freedoms = _freedoms(program)
-    found = _at_rest(program, len(freedoms)).reshape(len(freedoms), -1, pose.ENTRIES)
+    found = _at_rest(program, len(freedoms)).reshape(len(freedoms), len(program.nominal.parts), pose.ENTRIES)
     for row, (group, mover, axis) in enumerate(freedoms):
         origin, *ends = _moves(group, mover, axis, np.vstack([np.zeros(3), np.eye(3)]))
         turn = np.column_stack([end - origin for end in ends])
         for part, carried in zip(group.parts, group.carried, strict=True):
             if mover in carried.movers:
                 found[row, part] += sign * STEP * np.concatenate([turn.ravel(), origin])
-    return np.asarray(found.reshape(len(freedoms), -1))
+    return np.asarray(found.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts)))
 
 
 def _held(program: Program) -> np.ndarray:

@@ -48,7 +48,7 @@ True
 Of contact it holds the share of realizations in which each pair carries, the mean and percentiles of its reaction (in the units
 of the objective: N only where it is the locators' stiffness or forces), and which pairs carry together. How points share a
 reaction is not unique where faces lie flat on each other; which points touch is. `results.tolcontact.touching()` looks at them
-in the first 2048 realizations.
+in the first 2048 realizations, and archives have that in the group `contact`, point by point.
 
 >>> round(float(summary.carried.sel(pair="interface", interval="estimate")), 2)
 0.9

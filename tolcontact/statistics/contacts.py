@@ -13,7 +13,7 @@ from tolcontact.statistics.sample import Sample
 
 TOUCHES = 1e-4  # mm: a point with a smaller gap touches
 AT_MOST = 2048  # realizations that points are looked at in
-AT_ONCE = 500_000  # gaps that are computed at once
+AT_ONCE, IN_ALL = 500_000, 20_000_000  # gaps that are computed at once, and in all
 COMBINATIONS = 10  # of pairs that carry together
 
 
@@ -47,7 +47,8 @@ def combinations(rows: xr.Dataset) -> list[tuple[tuple[str, ...], int]]:
 def touching(results: xr.DataTree) -> xr.Dataset:
     """Share of realizations in which each contact point touches, corrected, with its interval, from the archive alone.
 
-    touching   (point, interval): gaps below 1e-4 mm, in the first 2048 realizations at most, those whose points are archived;
+    touching   (point, interval): gaps below 1e-4 mm, in the first 2048 realizations at most (fewer of more than 10 000 points),
+               those whose points are archived;
                NaN for points without gaps of their own
     pair       (point) name of its pair
     point      (point, axis) of the moving part, nominal [mm]
@@ -56,9 +57,11 @@ def touching(results: xr.DataTree) -> xr.Dataset:
     """
     rows = {str(name): of for name, of in results.to_dataset().data_vars.items()}
     rows |= {str(name): of for name, of in results["sample"].to_dataset().data_vars.items()}
-    contact = results["contact"].to_dataset()
-    of_point, names = contact[words.PAIR_OF_POINT.name].values, results.to_dataset()[words.PAIR].values
-    some = slice(min(finished(results), AT_MOST))
+    contact, names = results["contact"].to_dataset(), results.to_dataset()[words.PAIR].values
+    of_point, points = np.zeros(0, dtype=int), np.zeros((0, len(words.AXES)))  # of a model without contact
+    if words.PAIR_OF_POINT.name in contact:
+        of_point, points = contact[words.PAIR_OF_POINT.name].values, contact[words.MOVING_POINT.name].values
+    some = slice(min(finished(results), AT_MOST, -(-IN_ALL // max(len(of_point), 1))))
     searched = rows[words.SEARCHED.name].values[some] == 1 if words.SEARCHED.name in rows else np.zeros(some.stop, dtype=bool)
     values = np.full((len(of_point), len(words.ESTIMATE)), np.nan)
     count = int((~searched).sum())
@@ -77,10 +80,10 @@ def touching(results: xr.DataTree) -> xr.Dataset:
     return xr.Dataset(
         {
             "touching": ((words.POINT, words.INTERVAL), values if count else np.full_like(values, np.nan), {"units": "1"}),
-            "point": ((words.POINT, words.AXIS), contact[words.MOVING_POINT.name].values, {"units": "mm"}),
+            "point": ((words.POINT, words.AXIS), points, {"units": "mm"}),
         },
         coords={
-            "pair": (words.POINT, names[of_point].astype(str) if len(of_point) else np.zeros(0, dtype=str)),
+            "pair": (words.POINT, names.astype(str)[of_point]),
             words.AXIS: list(words.AXES),
             words.INTERVAL: list(words.ESTIMATE),
         },

@@ -9,6 +9,13 @@ With A and B two independent sets of draws, and A_i the set A with group i from 
 
     S_i = mean(f(B) (f(A_i) - f(A))) / V,    T_i = mean((f(A) - f(A_i))^2) / 2 V,    V = mean(f(A)^2 + f(B)^2) / 2, f centred
 
+Of groups that are correlated neither says what a group's share is. Shapley effects do: each is what a group adds to the
+variance that those before it explain, or what is left without it, on average over all orders (Owen, 2014; Song, Nelson, Staum,
+2016). They add up to 1. With f_m a realization that has the groups of A at the first m places of a random order, and others
+drawn anew, given these, the group at place m has
+
+    Sh = mean((f(A) - f_m)^2 - (f(A) - f_{m+1})^2) / mean((f(A) - f_0)^2)
+
 Each is a ratio of means over independent base realizations, so its interval is that of Student's t for its influence function.
 """
 
@@ -28,6 +35,15 @@ def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
         return [NOTHING] * mixed.shape[1], [NOTHING] * mixed.shape[1]
     first, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
     return [ratio(u, v) for u in first.T], [ratio(u, v) for u in total.T]
+
+
+def shapley_effects(f: np.ndarray, places: np.ndarray) -> list[Estimate]:
+    """Of each group, of values f (n, 1 + group) with ever more groups of A, the last one A; places (n, group) in its order."""
+    left = (f[:, -1:] - f) ** 2
+    if not np.isfinite(f).all() or not left[:, 0].mean() > CONSTANT * f.mean() ** 2:
+        return [NOTHING] * places.shape[1]
+    freed = np.take_along_axis(left[:, :-1] - left[:, 1:], places, axis=1)
+    return [ratio(u, left[:, 0]) for u in freed.T]
 
 
 def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:

@@ -40,6 +40,9 @@ class FieldSums:
         # Mean of the magnitude, and the sums of its second to fourth powers about it.
         self.of_magnitude, self.magnitude, self.moments = of_magnitude, moments[0], tuple(moments[1:])
 
+    def __reduce__(self) -> tuple[type, tuple[int, np.ndarray]]:
+        return FieldSums, (len(self.magnitude), self.numbers)  # the others are views of these
+
     def merge(self, other: "FieldSums") -> None:
         """Take in the sums of other realizations, at least one, those that come next. Chan et al., Pébay (2008)."""
         n, m = self.count, other.count

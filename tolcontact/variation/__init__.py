@@ -112,6 +112,17 @@ from tolcontact.variation.draws import Draws, draw
 from tolcontact.variation.given import GivenDraws
 from tolcontact.variation.mixed import MixedDraws, independent_groups
 from tolcontact.variation.region import Region
+from tolcontact.variation.released import ReleasedDraws
 from tolcontact.variation.stepped import SteppedDraws
 
-__all__ = ["Contributor", "Draws", "GivenDraws", "MixedDraws", "Region", "SteppedDraws", "draw", "independent_groups"]
+__all__ = [
+    "Contributor",
+    "Draws",
+    "GivenDraws",
+    "MixedDraws",
+    "Region",
+    "ReleasedDraws",
+    "SteppedDraws",
+    "draw",
+    "independent_groups",
+]

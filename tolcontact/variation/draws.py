@@ -49,7 +49,7 @@ class Draws:
     def planned(self, name: str) -> "Draws":
         """The same contributors, drawn by a sampling plan (see plans)."""
         other = copy.copy(self)
-        other._plan = Plan(name, [*self._column, *self._rows_drawn])
+        other._plan = Plan(name, [*self._column, *self.rows_drawn])
         return other
 
     def scaled(self, factors: np.ndarray) -> "Draws":
@@ -57,6 +57,16 @@ class Draws:
         other = copy.copy(self)
         other._scale = factors
         return other
+
+    @property
+    def labels(self) -> list[str]:
+        """Labels of the columns of deviations."""
+        return list(self._column)
+
+    @property
+    def correlated(self) -> list[tuple[list[str], np.ndarray]]:
+        """Labels that are correlated, set by set, and the lower factor of their correlations (Cholesky)."""
+        return [(list(each.labels), own) for each, own in zip(self._assembly.correlations, self._factors, strict=True)]
 
     @property
     def plan(self) -> str:
@@ -76,7 +86,7 @@ class Draws:
         measured = {label for population in self._assembly.populations for label in population.columns}
         some = np.array([0.1, 0.5, 0.9])
         drawn = [each.label for each in self.contributors.every if np.ptp(each.drawn(some)) > 0 and each.label not in measured]
-        return drawn + self._rows_drawn
+        return drawn + self.rows_drawn
 
     def made_of(self, numbers: Numbers, count: int) -> np.ndarray:
         """Deviations (count, contributor) of numbers between 0 and 1 for each label."""
@@ -96,7 +106,7 @@ class Draws:
             deviations[:, together.columns] = together.draw(anew)
         if not (self._scale == 1.0).all():
             deviations = self._middle + self._scale * (deviations - self._middle)
-        for label, population in zip(self._rows_drawn, self._assembly.populations, strict=True):
+        for label, population in zip(self.rows_drawn, self._assembly.populations, strict=True):
             rows = numbers(label)
             drawn = population.values[(rows * len(population.values)).astype(int)]
             deviations[:, [self._column[label] for label in population.columns]] = drawn
@@ -110,15 +120,14 @@ class Draws:
         return deviations
 
     @property
-    def _rows_drawn(self) -> list[str]:
+    def rows_drawn(self) -> list[str]:
         """What the numbers that choose the rows of measured parts are called."""
         return [f"population {k}: {', '.join(each.columns)}" for k, each in enumerate(self._assembly.populations, start=1)]
 
-    @property
-    def dependent(self) -> list[list[int]]:
-        """Columns that are not independent of each other, set by set: correlated, drawn together, or driven by one cause."""
+    def dependent(self, *, correlated: bool = True) -> list[list[int]]:
+        """Columns that are not independent of each other, set by set: drawn together, driven by one cause, `correlated`."""
         assembly = self._assembly
-        found = [[self._column[label] for label in each.labels] for each in assembly.correlations]
+        found = [[self._column[label] for label in each.labels] for each in assembly.correlations if correlated]
         found += [[self._column[label] for label in each.columns] for each in assembly.populations]
         found += [[int(column) for column in each.columns] for each in self.contributors.together]
         found += [[each.size, *(int(column) for column in each.columns)] for each in self.contributors.bonuses]

@@ -21,13 +21,13 @@ class MixedDraws:
         self._draws, self._groups = draws, groups
 
     @property
-    def mixtures(self) -> int:
+    def together(self) -> int:
         """How many realizations each base realization has."""
         return 2 + len(self._groups)
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
         """Deviations (realization, contributor); see Draws."""
-        count = self.mixtures
+        count = self.together
         first, last = start // count, -(-stop // count)
         A = self._draws(seed=seed, start=first, stop=last)
         B = self._draws(seed=seed, start=OTHER + first, stop=OTHER + last)
@@ -38,8 +38,11 @@ class MixedDraws:
         return every.reshape(-1, A.shape[1])[start - first * count : stop - first * count]
 
 
-def independent_groups(draws: Draws, owners: Sequence[str]) -> dict[str, np.ndarray]:
-    """Columns by who owns them, so that groups are independent of each other: what is drawn together is one group."""
+def independent_groups(draws: Draws, owners: Sequence[str], *, correlated: bool = True) -> dict[str, np.ndarray]:
+    """Columns by who owns them, so that groups are independent of each other: what is drawn together is one group.
+
+    Without `correlated`, groups may be correlated by declaration, but not depend on each other in another way.
+    """
     leader = list(range(len(owners)))
 
     def find(k: int) -> int:
@@ -49,7 +52,7 @@ def independent_groups(draws: Draws, owners: Sequence[str]) -> dict[str, np.ndar
 
     first: dict[str, int] = {}
     together = [[first.setdefault(owner, k), k] for k, owner in enumerate(owners)]
-    for columns in [*together, *draws.dependent]:
+    for columns in [*together, *draws.dependent(correlated=correlated)]:
         for k in columns[1:]:
             one, other = sorted((find(int(columns[0])), find(int(k))))
             leader[other] = one

@@ -7,6 +7,7 @@ from tolcontact.vocabulary.comparison import *  # noqa: F403
 from tolcontact.vocabulary.contributions import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.population import *  # noqa: F403
+from tolcontact.vocabulary.relocation import *  # noqa: F403
 from tolcontact.vocabulary.sensitivities import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surfaces import *  # noqa: F403

@@ -214,6 +214,18 @@ BESIDE = Variable(
     "mm",
 )
 SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE)
+TOUCHING_SHARE = Variable(
+    "touching",
+    (POINT,),
+    "f8",
+    "share of realizations in which a contact point touches in the corrected state, gap below 1e-4 mm; NaN: not known",
+    "1",
+)
+TOUCHING_INTERVAL = Variable("touching_interval", (POINT, BOUND), "f8", "its 95 % confidence interval", "1")
+TOUCHING_REALIZATIONS = Variable(
+    "touching_realizations", (), "i8", "number of realizations, of the first ones, that this share is of", "1"
+)
+TOUCHING = (TOUCHING_SHARE, TOUCHING_INTERVAL, TOUCHING_REALIZATIONS)
 GROUP_CHECKSUM = Variable(
     "checksum",
     (),

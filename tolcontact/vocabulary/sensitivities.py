@@ -8,6 +8,7 @@ CONTACT = "contact"
 CONTACT_STATES = ("untouched", "touched")
 SENSITIVITIES = (
     Variable("nominal", (MEASURE, CONTRIBUTOR), "f8", "derivative of the raw measure at the nominal assembly"),
+    Variable("leverage", (CONTRIBUTOR,), "f8", "largest displacement of the located part for a unit of its locator", "1"),
     Variable("sensitivity", (MEASURE, STATE, CONTRIBUTOR, INTERVAL), "f8", "mean derivative over all realizations"),
     Variable("spread", (MEASURE, STATE, CONTRIBUTOR), "f8", "standard deviation of the derivative over realizations"),
     Variable(

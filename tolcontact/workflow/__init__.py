@@ -97,6 +97,12 @@ least cost, and says which range to tighten first.
 >>> bool(given.cost.sum("group").sel(stage="after") < given.cost.sum("group").sel(stage="before"))
 True
 
+`tc.relocate` looks for the place of a locator, within a box, where a measure varies least: here as far out as it may be.
+
+>>> moved = tc.relocate(assembly, "block.A3", between=((0, 25, 0), (50, 25, 0)), least="height: 6 sigma", samples=256)
+>>> moved.point.sel(stage="before").values.tolist(), moved.sizes["trial"] > 9
+([25.0, 25.0, 0.0], True)
+
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
 
 >>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
@@ -126,6 +132,7 @@ from tolcontact.workflow.compare import compare
 from tolcontact.workflow.compare_runs import compare_runs
 from tolcontact.workflow.contributions import contributions
 from tolcontact.workflow.population import check_population
+from tolcontact.workflow.relocate import relocate
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.sensitivities import sensitivities
 from tolcontact.workflow.tails import tails
@@ -134,5 +141,5 @@ from tolcontact.workflow.written import write_model
 
 __all__ = [
     "accessor", "allocate", "build", "check", "check_population", "compare", "compare_runs", "contributions",
-    "open_archive", "run", "sensitivities", "summarize", "tails", "worst_case", "write_model",
+    "open_archive", "relocate", "run", "sensitivities", "summarize", "tails", "worst_case", "write_model",
 ]  # fmt: skip

@@ -1,7 +1,9 @@
 """Which contributors a measure's variance comes from, with contact and without."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,12 +12,13 @@ from tolcontact import vocabulary as words
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import Block
+from tolcontact.simulation.cluster import mapping
 from tolcontact.simulation.linear_model import linear_model
-from tolcontact.statistics.contributions import missed, sobol_indices
-from tolcontact.variation import MixedDraws, independent_groups
+from tolcontact.statistics.contributions import missed, shapley_effects, sobol_indices
+from tolcontact.variation import MixedDraws, ReleasedDraws, independent_groups
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.run import Choice, Model, Progress, check_counts, program_of
 
 SOME = 1 << 14  # realizations that spreads are estimated from
 
@@ -29,19 +32,23 @@ def contributions(
     method: Choice | None = None,
     by: str = "contributor",
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Sobol' indices of each measure (see tolcontact.statistics.contributions), beside the classical linear percentages.
 
         first   (measure, state, group, interval)   share of variance by a group alone, with its 95 % interval
         total   (measure, state, group, interval)   with all that it does together with others
+        shapley (measure, state, unit, interval)    Shapley effects, if something is correlated: units are groups without that
         linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2
         missed  (measure, state, interval)          share of variance that a prediction by these sensitivities misses
         by_status (status_meaning)                  number of realizations
 
     `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn together,
     driven by one cause) are one group whatever `by` is; those that do not vary are left out.
-    `samples` are base realizations: samples (2 + groups) are simulated. `progress` is called with how many are done, of all.
+    `samples` are base realizations: samples (2 + groups) are simulated, and samples (1 + units) for Shapley effects.
+    `progress` is called with how many are done, of all.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/contributions; the report shows it.
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
@@ -54,17 +61,33 @@ def contributions(
         check_room_for(into, words.OF_CONTRIBUTIONS, program)
     some = program.draws(seed=seed, start=0, stop=SOME)
     varies = np.ptp(some, axis=0) > 0
-    groups = {
-        name: columns[varies[columns]]
-        for name, columns in independent_groups(program.draws, owners(program, by)).items()
-        if varies[columns].any()
-    }
+    whose = owners(program, by)
+    groups, units = (
+        {
+            name: columns[varies[columns]]
+            for name, columns in independent_groups(program.draws, whose, correlated=correlated).items()
+            if varies[columns].any()
+        }
+        for correlated in (True, False)
+    )
     if not groups:
         raise OptionError(
             f'nothing varies in "{program.nominal.assembly.name}"; give tolerances before asking what they contribute'
         )
-    mixed = MixedDraws(program.draws, list(groups.values()))
-    values, statuses, A = _simulated(program, mixed, samples, seed, progress)
+    mixed, released = MixedDraws(program.draws, list(groups.values())), ReleasedDraws(program.draws, units)
+    is_correlated = len(units) > len(groups)
+    simulated = samples * (mixed.together + is_correlated * released.together)
+    values, statuses, A = _simulated(
+        program, mixed, samples, seed, client, progress and (lambda done: progress(done, simulated))
+    )
+    shares = np.empty((values.shape[3], values.shape[2], 0, len(words.ESTIMATE)))
+    if is_correlated:
+        before = samples * mixed.together
+        freed, more, _ = _simulated(
+            program, released, samples, seed, client, progress and (lambda n: progress(before + n, simulated))
+        )
+        statuses, places = statuses + more, released.places(seed, 0, samples)
+        shares = np.array([[shapley_effects(of.T, places) for of in state] for state in freed.T])
     slopes = linear_model(program).by_deviations
     first, total, linear, off = [], [], [], []
     for measure in range(len(program.nominal.measures)):
@@ -75,20 +98,24 @@ def contributions(
         linear.append(parts / parts.sum() if parts.sum() > 0 else np.full(len(parts), np.nan))
         predicted = A @ slopes[measure]
         off.append([missed(values[:, 0, state, measure], predicted) for state in range(len(words.STATES))])
-    found = {words.FIRST: first, words.TOTAL: total, words.LINEAR: linear, words.MISSED: off, "by_status": statuses}
+    found = {
+        words.FIRST: first, words.TOTAL: total, words.SHAPLEY: shares, words.LINEAR: linear, words.MISSED: off,
+        "by_status": statuses,
+    }  # fmt: skip
     answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.CONTRIBUTIONS},
         coords={
             words.MEASURE: [measure.name for measure in program.nominal.measures],
             words.STATE: list(words.STATES),
             words.GROUP: list(groups),
+            words.UNIT: list(units) if is_correlated else [],
             words.INTERVAL: list(words.ESTIMATE),
             words.STATUS_MEANING: list(words.STATUS_MEANINGS),
         },
         attrs={
             "title": f"contributions to the measures of {program.nominal.assembly.name}",
             "base_realizations": samples,
-            "realizations": samples * mixed.mixtures,
+            "realizations": simulated,
             "seed": seed,
             "by": by,
             "solver": program.plugin.name,
@@ -114,17 +141,29 @@ def owners(program: Program, by: str) -> list[str]:
 
 
 def _simulated(
-    program: Program, mixed: MixedDraws, samples: int, seed: int, progress: Callable[[int, int], None] | None
+    program: Program, draws: MixedDraws | ReleasedDraws, samples: int, seed: int, client: Any, progress: Progress | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Measures (base, mixture, state, measure), statuses by meaning, and the first draws (base, column)."""
-    mixtures = mixed.mixtures
+    """Measures (base, realization, state, measure), statuses by meaning, and the first draws (base, column)."""
+    together = draws.together
     measured, A, statuses, done = [], [], np.zeros(len(words.STATUS_MEANINGS), dtype=int), 0
-    for block in simulate_blocks(program, samples=samples * mixtures, seed=seed, draws=mixed):
-        measured.append(block.measured.copy())
-        A.append(block.deviations[-block.start % mixtures :: mixtures].copy())
-        statuses += np.bincount(block.status, minlength=len(statuses))
-        done += len(block)
+    blocks = mapping(client)(_Observed(together), program, samples=samples * together, seed=seed, draws=draws)
+    for values, own, counts in blocks:
+        measured.append(values)
+        A.append(own)
+        statuses += counts
+        done += len(values)
         if progress:
-            progress(done, samples * mixtures)
-    values = np.concatenate(measured)
-    return values.reshape(samples, mixtures, *values.shape[1:]), statuses, np.concatenate(A)
+            progress(done)
+    every = np.concatenate(measured)
+    return every.reshape(samples, together, *every.shape[1:]), statuses, np.concatenate(A)
+
+
+@dataclass(frozen=True)
+class _Observed:
+    """Of a block: measures, deviations of the first of every so many realizations, and statuses by meaning."""
+
+    together: int
+
+    def __call__(self, block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        first = block.deviations[-block.start % self.together :: self.together]
+        return block.measured.copy(), first.copy(), np.bincount(block.status, minlength=len(words.STATUS_MEANINGS))

@@ -43,6 +43,7 @@ def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
 def _of_one(program: Program, seed: int) -> float:
     """How long a realization takes [s]: of more and more, up to a block, until they take long enough."""
     trial = TRIAL
+    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # what is loaded first takes longer than a block
     while True:
         started = time.perf_counter()
         list(simulate_blocks(program, samples=trial, seed=seed, threads=1))

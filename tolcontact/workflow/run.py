@@ -2,7 +2,7 @@
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,10 @@ from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
-from tolcontact.simulation import Block, map_blocks
+from tolcontact.simulation import Block
+from tolcontact.simulation.cluster import mapping
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
-from tolcontact.statistics import BlockSums, DisplacementFields, Summary
+from tolcontact.statistics import BlockSums, DisplacementFields, Summary, touching
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.forecast import announce
@@ -104,6 +105,7 @@ def run(
     fields: int | str = "some",
     plan: str = MONTE_CARLO,
     until: str | None = None,
+    client: Any = None,
     progress: Progress | None = None,
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
@@ -118,11 +120,13 @@ def run(
     draw 256 realizations together; from 16 such replicates on, intervals are theirs, and narrower.
     `until` says how narrow an interval has to become, such as "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm
     +-20 %", of corrected measures: `samples` are the first ones, and as many more follow as it takes.
+    `client` of dask.distributed, if there is one: its workers simulate, this process writes; the results are the same to the
+    last bit (see tolcontact.simulation).
     `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
     To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
     read, with fields of what is finished, and resumed.
-    Raises ModelError, OptionError, or ArchiveError before anything is simulated or written.
+    Raises ModelError, OptionError, or ArchiveError before anything is simulated or written; ClusterError if workers fail.
     """
     check_counts(samples=samples, seed=seed, surfaces=surfaces)
     if keep not in KEPT:
@@ -146,7 +150,8 @@ def run(
                 ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, of_fields.sizes)
             ) as writer:
                 announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-                _simulate(program, writer, of_fields, seed, progress)
+                _simulate(program, writer, of_fields, seed, client, progress)
+                _look_at_points(path, writer)
             more = target.next(path, program) if target else None
             if more is None:
                 return
@@ -166,17 +171,26 @@ def run(
     return opened(path)
 
 
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What is made of a block where it was simulated: rows as they are stored, and sums for fields."""
+
+    kept: tuple[str, ...]
+    fields: DisplacementFields
+
+    def __call__(self, block: Block) -> tuple[StoredBlock, BlockSums]:
+        return stored(block, self.kept), self.fields.sums(block.poses, block.start)
+
+
 def _simulate(
-    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, progress: Progress | None
+    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, client: Any, progress: Progress | None
 ) -> None:
     fields.go_on_from(writer.take_up())
 
-    def prepared(block: Block) -> tuple[StoredBlock, BlockSums]:
-        return stored(block, writer.kept), fields.sums(block.poses, block.start)
-
+    prepared = _Prepared(tuple(variable.name for variable in writer.kept), fields)
     is_summed = bool(writer.rows)
     try:
-        for rows, sums in map_blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
+        for rows, sums in mapping(client)(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
             is_summed = False
             fields.merge(sums)
             writer.append(rows)
@@ -202,6 +216,14 @@ def _simulate(
         deviations = program.draws.of(chosen_rows, seed=seed)
         poses = simulated_poses(program, deviations) if kept is None else kept
         writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
+
+
+def _look_at_points(path: Path, writer: ArchiveWriter) -> None:
+    """Note how often each contact point touches."""
+    with opened(path) as results:
+        found = touching(results)
+    shares = found["touching"].values
+    writer.write_touching(shares[:, 0], shares[:, 1:], found.attrs["realizations"])
 
 
 def summarize(results: xr.DataTree | str | Path) -> Summary:

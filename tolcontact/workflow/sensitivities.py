@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -10,8 +11,9 @@ from tolcontact import vocabulary as words
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.linear_model import linear_model
+from tolcontact.simulation import Block
+from tolcontact.simulation.cluster import mapping
+from tolcontact.simulation.linear_model import leverages, linear_model
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import NOTHING, Estimate
 from tolcontact.variation import SteppedDraws
@@ -31,11 +33,14 @@ def sensitivities(
     solver: str | None = None,
     method: Choice | None = None,
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Derivatives of each measure by each contributor that varies, realization by realization, by differences on the draws.
 
         nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it
+        leverage     (contributor)                             of a locator: the largest displacement of any point of its part,
+                                                               for 1 mm; not a number for others
         sensitivity  (measure, state, contributor, interval)   mean over all realizations, with its 95 % interval
         spread       (measure, state, contributor)             standard deviation over realizations
         changing     (contributor, interval)                   share of realizations with a kink or a jump within the step
@@ -46,6 +51,7 @@ def sensitivities(
     sides of the step agree within a tenth (or a hundredth of the largest derivative of all), a difference is the derivative,
     but for its second order. Elsewhere it is that of both sides, and of a jump between them, which the linearized resolution
     may make, as may points that come into the objective "active points". (2 contributors + 1) samples are simulated.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/sensitivities; the report shows it.
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
@@ -59,7 +65,7 @@ def sensitivities(
     if not columns.size:
         raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
     stepped = SteppedDraws(program.draws, columns, STEP * deviation[columns])
-    measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, progress)
+    measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, client, progress)
     up, down = np.split(np.arange(1, stepped.together), 2)
     steps = (STEP * deviation[columns])[:, None, None]
     ahead, behind = (measured[:, up] - measured[:, :1]) / steps, (measured[:, :1] - measured[:, down]) / steps
@@ -71,6 +77,7 @@ def sensitivities(
     by_contact = [_means(smooth[touched == is_touched]) for is_touched in (False, True)]
     found = {
         "nominal": nominal,
+        "leverage": leverages(program)[columns],
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(words.STATES))], axis=1),
         "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
         "by_contact": np.stack(by_contact, axis=1),
@@ -106,17 +113,18 @@ def sensitivities(
 
 
 def _simulated(
-    program: Program, stepped: SteppedDraws, samples: int, seed: int, progress: Callable[[int, int], None] | None
+    program: Program, stepped: SteppedDraws, samples: int, seed: int, client: Any, progress: Callable[[int, int], None] | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of each realization and its steps: measures (n, step, state, measure) and carrying points (n, step, pair); of the
     realizations themselves whether contact touches them (n,), and statuses by meaning."""
     together, done = stepped.together, 0
-    measured, carrying, status = [], [], []
-    for block in simulate_blocks(program, samples=samples * together, seed=seed, draws=stepped):
-        measured.append(block.measured.copy())
-        carrying.append(block.carrying.copy())
-        status.append(block.status.copy())
-        done += len(block)
+    measured: list[np.ndarray] = []
+    carrying: list[np.ndarray] = []
+    status: list[np.ndarray] = []
+    for found in mapping(client)(_observed, program, samples=samples * together, seed=seed, draws=stepped):
+        for every, own in zip((measured, carrying, status), found, strict=True):
+            every.append(own)
+        done += len(status[-1])
         if progress:
             progress(done, samples * together)
     values, points = np.concatenate(measured), np.concatenate(carrying)
@@ -127,6 +135,10 @@ def _simulated(
         own != words.Status.UNTOUCHED,
         np.bincount(own, minlength=len(words.STATUS_MEANINGS)),
     )
+
+
+def _observed(block: Block) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return block.measured.copy(), block.carrying.copy(), block.status.copy()
 
 
 def _kinked(ahead: np.ndarray, behind: np.ndarray, nominal: np.ndarray) -> np.ndarray:

@@ -6,12 +6,14 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from tolcontact import poses
 from tolcontact import vocabulary as words
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.linear_model import linear_model
-from tolcontact.variation import Region
+from tolcontact.variation import GivenDraws, Region
 from tolcontact.workflow.extreme_search import Evaluation, Searcher, Searches
 from tolcontact.workflow.farthest_pose import farthest_poses
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
@@ -40,6 +42,8 @@ def worst_case(
         ends        (measure, state, end)               number of different values that the twelve ended at
         unseen      (measure, state, end)               expected share of starts whose end no search has seen
         by_status   (status_meaning)                    number of realizations, of all that were simulated
+        measured, rotation, translation, gap_min, kkt_residual, status  (case, ...)  corrected worst cases, as archives keep
+                                                        realizations; a case is "least" or "largest" of a measure
 
     With contact a measure is neither smooth nor concave, and the linearized resolution jumps: a search finds what it finds.
     Four begin at the best random combinations, twelve at any of them. Each goes on along single contributors, random
@@ -82,6 +86,8 @@ def worst_case(
         "unseen": np.minimum(1.0, ends * (ends + 1) / (OTHERS * (OTHERS - 1))).reshape(shape),
         "by_status": evaluate.statuses,
     }
+    corrected = best.take(np.flatnonzero(best.state == words.CORRECTED))
+    found |= _as_realizations(program, region.deviations(corrected.own))
     answer = xr.Dataset(
         {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in words.WORST_CASE},
         coords={
@@ -90,6 +96,11 @@ def worst_case(
             words.END: list(words.ENDS),
             words.CONTRIBUTOR: list(program.nominal.contributors),
             words.STATUS_MEANING: list(words.STATUS_MEANINGS),
+            words.CASE: [f"{end} {measure.name}" for measure in program.nominal.measures for end in words.ENDS],
+            words.AXIS: list(words.AXES),
+            words.BODY_AXIS: list(words.AXES),
+            words.PART: [part.name for part in program.nominal.parts],
+            words.PAIR: [pair.name for pair in program.nominal.pairs],
             "measure_units": (words.MEASURE, [measure.units for measure in program.nominal.measures]),
             "contributor_units": (words.CONTRIBUTOR, [each.units for each in program.draws.contributors.every]),
         },
@@ -106,6 +117,16 @@ def worst_case(
     if into is not None:
         keep(into, words.OF_WORST_CASE, answer, program)
     return answer
+
+
+def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.ndarray]:
+    """What archives keep of realizations, of deviations (n, contributor)."""
+    (block,) = simulate_blocks(program, samples=len(deviations), seed=0, draws=GivenDraws(deviations), block=len(deviations))
+    return {
+        words.MEASURED.name: block.measured, words.ROTATION.name: poses.rotation(block.poses),
+        words.TRANSLATION.name: poses.translation(block.poses),
+        words.GAP_MIN.name: block.gap_min, words.KKT_RESIDUAL.name: block.kkt_residual, words.STATUS.name: block.status,
+    }  # fmt: skip
 
 
 def _different(values: np.ndarray, same: float) -> int:

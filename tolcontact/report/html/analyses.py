@@ -8,7 +8,9 @@ import xarray as xr
 
 from tolcontact import vocabulary as words
 from tolcontact.report.figures import grouped
-from tolcontact.report.text.sensitivities import SENSITIVITY_COLUMNS, sensitivity_rows
+from tolcontact.report.text.allocation import allocation_tables
+from tolcontact.report.text.relocation import relocation_table
+from tolcontact.report.text.sensitivities import LEVERAGE_COLUMNS, SENSITIVITY_COLUMNS, leverage_rows, sensitivity_rows
 from tolcontact.report.text.tails import TAIL_COLUMNS, tail_rows
 from tolcontact.report.text.worst_case import WORST_COLUMNS, worst_rows
 from tolcontact.statistics import kept_analysis
@@ -23,22 +25,33 @@ def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
 
 
 def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
-    """Sensitivities, worst cases and rare events, with titles, columns and rows."""
+    """Sensitivities, worst cases, rare events and allocation, with titles, columns and rows."""
     slopes = kept_analysis(results, words.OF_SENSITIVITIES)
     if slopes is not None:
         count = grouped(slopes.attrs["realizations"])
         for measure in slopes["measure"].values:
             rows, _ = sensitivity_rows(slopes.sel(measure=measure))
             yield {"title": f"Sensitivities of {measure}, {count} realizations", "columns": SENSITIVITY_COLUMNS, "rows": rows}
+        if rows := leverage_rows(slopes):
+            yield {"title": "Leverage of locators", "columns": LEVERAGE_COLUMNS, "rows": rows}
     worst = kept_analysis(results, words.OF_WORST_CASE)
     if worst is not None:
         for measure in worst["measure"].values:
             of = worst.sel(measure=measure)
-            title = f"Worst cases of {measure} [{of['measure_units'].values}]"
+            title = f"Worst cases of {measure} [{of['measure_units'].values}], the first of the single realizations above"
             yield {"title": title, "columns": WORST_COLUMNS, "rows": list(worst_rows(of))}
     rare = kept_analysis(results, words.OF_TAILS)
     if rare is not None:
         yield {"title": "Rare events", "columns": TAIL_COLUMNS, "rows": tail_rows(rare)}
+    allocation = kept_analysis(results, words.OF_ALLOCATION)
+    if allocation is not None:
+        for title, columns, rows in allocation_tables(allocation):
+            yield {"title": title, "columns": columns, "rows": rows}
+
+    relocation = kept_analysis(results, words.OF_RELOCATION)
+    if relocation is not None:
+        columns, rows = relocation_table(relocation)
+        yield {"title": "Place of a locator", "columns": columns, "rows": rows}
 
 
 def _shares(of: xr.Dataset) -> dict[str, Any]:

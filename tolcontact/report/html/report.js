@@ -7,8 +7,8 @@ function drive(stage) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
   const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
   const state = () => Number(document.querySelector("input[name=state]:checked").value);
-  byId("which").max = Math.max(one.rows.length - 1, 0);
-  byId("single").disabled = byId("play").disabled = !one.rows.length;
+  byId("which").max = Math.max(one.names.length - 1, 0);
+  byId("single").disabled = byId("play").disabled = !one.names.length;
 
   function painted() {
     const name = byId("field").value, isOfContact = OF_CONTACT.includes(name);
@@ -35,7 +35,7 @@ function drive(stage) {
     });
     const deepest = pairs ? `smallest gap, ${seen ? "corrected" : "raw"}: ${figure(Math.min(...own))} mm` : "no contact pairs";
     byId("said").textContent = [
-      `realization ${one.rows[k]} (${one.why[k]})`, `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
+      one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
     return stage.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
   }
@@ -51,7 +51,7 @@ function drive(stage) {
     if (stop) playing = clearInterval(playing) ?? null;
     else {
       byId("single").checked = true;
-      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.rows.length; moved(); }, 300);
+      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.names.length; moved(); }, 300);
     }
     byId("play").textContent = stop ? "play" : "stop";
     byId("play").setAttribute("aria-pressed", String(!stop));

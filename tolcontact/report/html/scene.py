@@ -10,7 +10,7 @@ from tolcontact.report.html.coarse import allowed, coarser
 from tolcontact.report.html.packed import Packed, packed
 from tolcontact.report.html.shown import Shown
 from tolcontact.report.marks import Marks, marks_of
-from tolcontact.statistics import touching
+from tolcontact.statistics import kept_analysis, touching
 
 Drawn = dict[str, Any]
 
@@ -66,22 +66,27 @@ def _part(name: str, field: xr.Dataset, count: int) -> Drawn:
 
 
 def _realizations(results: xr.DataTree, shown: list[Shown]) -> Drawn:
-    """Single realizations; their motions (realization, state, part, 12) as R - I and t."""
+    """Worst cases that are kept, and single realizations; their motions (realization, state, part, 12) as R - I and t."""
     order = np.argsort([each.row for each in shown], kind="stable")
     back = np.empty(len(order), dtype=int)
     back[order] = np.arange(len(order))
     rows = results.to_dataset().isel({words.REALIZATION: np.array([each.row for each in shown], dtype=int)[order]})
+    worst = kept_analysis(results, words.OF_WORST_CASE)
+    names = [] if worst is None else [f"worst case: {case}" for case in worst[words.CASE].values]
+
+    def of(variable: words.Variable) -> np.ndarray:
+        own = rows[variable.name].values[back]
+        return own if worst is None else np.concatenate([worst[variable.name].values, own])
+
     drawn: Drawn = {
-        "rows": [each.row for each in shown],
-        "why": [each.why for each in shown],
-        "status": [words.STATUS_MEANINGS[status] for status in rows[words.STATUS.name].values[back]],
-        "residual": packed(rows[words.KKT_RESIDUAL.name].values[back]),
-        "gaps": packed(rows[words.GAP_MIN.name].values[back]),
-        "measured": packed(rows[words.MEASURED.name].values[back]),
+        "names": names + [f"realization {each.row} ({each.why})" for each in shown],
+        "status": [words.STATUS_MEANINGS[status] for status in of(words.STATUS)],
+        "residual": packed(of(words.KKT_RESIDUAL)),
+        "gaps": packed(of(words.GAP_MIN)),
+        "measured": packed(of(words.MEASURED)),
     }
     if words.ROTATION.name in rows:
-        R, t = rows[words.ROTATION.name].values[back] - np.eye(3), rows[words.TRANSLATION.name].values[back]
-        drawn["motions"] = _motions(R, t)
+        drawn["motions"] = _motions(of(words.ROTATION) - np.eye(3), of(words.TRANSLATION))
     return drawn
 
 

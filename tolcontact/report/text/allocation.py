@@ -21,20 +21,25 @@ def allocation_text(found: xr.Dataset) -> Group:
 def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
     yield Text(f"{found.attrs['title']}: {grouped(found.attrs['samples'])} realizations", style="bold")
     yield Text(f"What is required, in fresh runs of {grouped(found.attrs['fresh'])} realizations; 95 % intervals.\n")
+    for place, (title, columns, rows) in enumerate(allocation_tables(found)):
+        if place:
+            yield Text(f"\n{title}", style="bold")
+        yield FigureTable(columns, rows)
+
+
+def allocation_tables(found: xr.Dataset) -> Iterator[tuple[str, list[str], list[list[str]]]]:
+    """What is required, ranges, and effects on each measure: titles, columns, and rows."""
     rows = [
         [str(each), *(_kept(str(each), found["kept"].sel(requirement=each, stage=stage).values) for stage in STAGES)]
         for each in found["requirement"].values
     ]
-    yield FigureTable(["required", *STAGES], rows)
+    yield "Allocation", ["required", *STAGES], rows
     cost = found["cost"].sum("group").values
-    yield Text(f"\nCost {cost[0]:.4g} before, {cost[1]:.4g} after", style="bold")
-    yield FigureTable(["range", *STAGES, "factor"], list(_ranges(found)))
+    yield f"Cost {cost[0]:.4g} before, {cost[1]:.4g} after", ["range", *STAGES, "factor"], list(_ranges(found))
     for measure in found["measure"].values:
         of = found["effect"].sel(measure=measure)
-        yield Text(
-            f"\n{measure} [{of['measure_units'].values}]: changes if zones were a tenth narrower than before", style="bold"
-        )
-        yield FigureTable(["", *EFFECTS], list(_effects(of)))
+        title = f"{measure} [{of['measure_units'].values}]: changes if zones were a tenth narrower than before"
+        yield title, ["", *EFFECTS], list(_effects(of))
 
 
 def _kept(name: str, values: np.ndarray) -> str:

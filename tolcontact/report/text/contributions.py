@@ -9,7 +9,7 @@ from rich.text import Text
 
 from tolcontact.report.figures import grouped, percent
 from tolcontact.report.text.table import FigureTable
-from tolcontact.vocabulary import CORRECTED, FIRST, STATES, TOTAL, UNRESOLVED
+from tolcontact.vocabulary import CORRECTED, FIRST, SHAPLEY, STATES, TOTAL, UNRESOLVED
 
 # What is drawn without contact is nearly a sum: its shares alone and in total hardly differ.
 _COLUMNS = (("raw", TOTAL, "raw"), ("corrected, alone", FIRST, "corrected"), ("in total", TOTAL, "corrected"))
@@ -34,8 +34,22 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
         yield FigureTable(["", *(heading for heading, _, _ in _COLUMNS), "linear"], rows)
         if small:
             yield Text(f"and {small} of less than {100 * SMALL:g} % each")
+        if of.sizes["unit"]:
+            yield Text("Shapley effects, which divide what is correlated:")
+            yield FigureTable(["", *STATES], _divided(of))
         off = [percent(of["missed"].sel(state=state).values) for state in STATES]
         yield Text(f"missed by linear sensitivities:\n  raw {off[0]}, corrected {off[1]}")
+
+
+def _divided(of: xr.Dataset) -> list[list[str]]:
+    """Shapley effects of those units that have one worth a line, the largest first."""
+    sizes = of[SHAPLEY].sel(interval="estimate")
+    order = sizes.isel(state=CORRECTED).argsort()[::-1].values
+    return [
+        [str(of["unit"].values[k]), *(percent(of[SHAPLEY].sel(state=state).values[k]) for state in STATES)]
+        for k in order
+        if not abs(float(sizes.isel(unit=k).max())) < SMALL
+    ]
 
 
 def _rows(of: xr.Dataset) -> tuple[list[list[str]], int]:

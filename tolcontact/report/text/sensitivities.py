@@ -12,6 +12,7 @@ from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import CORRECTED, UNRESOLVED
 
 SENSITIVITY_COLUMNS = ("", "nominal", "untouched", "touched", "corrected", "spread", "kinks")
+LEVERAGE_COLUMNS = ("", "leverage")
 SMALL = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
 
 
@@ -34,6 +35,16 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
         yield FigureTable(SENSITIVITY_COLUMNS, rows)
         if small:
             yield Text(f"and {small} that do next to nothing")
+    if rows := leverage_rows(found):
+        yield Text("\nLeverage of locators: the farthest that 1 mm moves a point of their part", style="bold")
+        yield FigureTable(LEVERAGE_COLUMNS, rows)
+
+
+def leverage_rows(found: xr.Dataset) -> list[list[str]]:
+    """Locators, that with the largest leverage first."""
+    leverage = found["leverage"].values
+    order = [k for k in np.argsort(-leverage, kind="stable") if np.isfinite(leverage[k])]
+    return [[str(found["contributor"].values[k]), f"{leverage[k]:.3g}"] for k in order]
 
 
 def sensitivity_rows(of: xr.Dataset) -> tuple[list[list[str]], int]:

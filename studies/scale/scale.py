@@ -1,0 +1,174 @@
+"""What a cluster costs: throughput with threads and workers, bytes, start; and what a large one would be limited by.
+
+    python -m studies.scale.scale [--samples 1000000] [--kills 20]
+
+Everything is measured in one run. A large cluster is simulated with these costs: workers that simulate shards, a network
+between them and one writer, a scheduler that serves tasks one by one, a writer that takes shards in order.
+"""
+
+import argparse
+import heapq
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+import xarray as xr
+
+import tolcontact as tc
+from models import ra1, ra2
+from tolcontact.simulation.cluster import AHEAD, MOST_ROWS, local_cluster
+
+VARYING = ("summed_rows", "sums", "sums_checksum")
+TASK = 1e-3  # s that a scheduler takes for a task, of dask's own documentation: 200 us to 1 ms
+NETWORK = 1.25e9  # bytes/s of 10 Gbit/s
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--samples", type=int, default=1_000_000)
+    parser.add_argument("--kills", type=int, default=20)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        for model in (ra1, ra2):
+            costs = throughput(model, given.samples, Path(folder) / "run.nc")
+            if model is ra2:
+                large(costs)
+        kills(given.kills, given.kills // 2, Path(folder))
+
+
+def throughput(model, samples, path):
+    """Realizations a second; returns costs of a realization: of a worker and of the writer [s], and bytes."""
+    program = tc.build(model.assembly, solver="daqp")
+    options = {"out": path, "overwrite": True, "surfaces": 0}
+    tc.run(program, samples=10_000, **options).close()
+    bytes_before = path.stat().st_size
+    began = time.perf_counter()
+    tc.run(program, samples=samples, **options).close()
+    threads = samples / (time.perf_counter() - began)
+    size = (path.stat().st_size - bytes_before) / (samples - 10_000)
+    print(f"\n{program.nominal.assembly.name}: {size:.0f} bytes a realization; two threads {threads:,.0f} a second")
+    rates, spent = {}, {}
+    for workers in (1, 2):
+        began = time.perf_counter()
+        with local_cluster(workers) as client:
+            started = time.perf_counter() - began
+            began = time.perf_counter()
+            tc.run(program, samples=5000, client=client, **options).close()
+            first = time.perf_counter() - began
+            began, own = time.perf_counter(), processor_times()
+            tc.run(program, samples=samples, client=client, **options).close()
+            rates[workers] = samples / (time.perf_counter() - began)
+            spent[workers] = (processor_times() - own) / samples
+        print(
+            f"  {workers} workers: {rates[workers]:,.0f} a second; cluster up in {started:.1f} s, first 5000 in {first:.1f} s; "
+            f"processor time of one: writer {spent[workers][0] * 1e6:.1f} us, workers {spent[workers][1] * 1e6:.1f} us"
+        )
+    print(f"  two workers to one {rates[2] / rates[1]:.2f}, to two threads {rates[2] / threads:.2f}")
+    return spent[1][1], spent[1][0], size
+
+
+def processor_times():
+    """Of this process, and of its workers [s]."""
+    own = psutil.Process()
+    return np.array([sum(own.cpu_times()[:2]), sum(sum(each.cpu_times()[:2]) for each in own.children(recursive=True))])
+
+
+def large(costs, samples=1_000_000_000):
+    """How long so many realizations take on clusters, and what is busy how much of the time."""
+    of_worker, of_writer, size = costs
+    said = f"worker {of_worker * 1e6:.1f} us, writer {of_writer * 1e6:.1f} us, {size:.0f} bytes"
+    print(f"\n{samples:.0e} realizations, by the costs of one: {said}")
+    for workers in (1, 10, 100, 1000):
+        for writers in (1, 16):
+            if writers > workers:
+                continue
+            seconds, busy = simulated(workers, writers, samples, of_worker, of_writer, size)
+            said = ", ".join(f"{name} {100 * share:.0f} %" for name, share in busy.items())
+            print(f"  {workers:5d} workers, {writers:2d} archives: {seconds / 3600:7.2f} h; busy: {said}")
+
+
+def simulated(workers, writers, samples, of_worker, of_writer, size):
+    """Hours of one of the archives, which each have workers and a writer of their own, and share scheduler and network."""
+    count, own = samples // MOST_ROWS // writers, workers // writers
+    lot, free = np.random.default_rng(1), [0.0] * own
+    ready, written = [], []
+    scheduler = wire = 0.0
+    for shard in range(count):
+        while len(ready) < min(count, shard + AHEAD * own):
+            begun = len(ready) - AHEAD * own
+            scheduler = max(scheduler, written[begun] if begun >= 0 else 0.0) + TASK * writers
+            start = max(heapq.heappop(free), scheduler)
+            ready.append(start + MOST_ROWS * of_worker * lot.uniform(0.9, 1.1))
+            heapq.heappush(free, ready[-1])
+        wire = max(wire, ready[shard]) + MOST_ROWS * size * writers / NETWORK
+        written.append(max(written[-1] if written else 0.0, wire) + MOST_ROWS * of_writer)
+    rows = count * MOST_ROWS
+    busy = {
+        "workers": rows * of_worker / own,
+        "writer": rows * of_writer,
+        "network": rows * size * writers / NETWORK,
+        "scheduler": count * TASK * writers,
+    }
+    return written[-1], {name: seconds / written[-1] for name, seconds in busy.items()}
+
+
+def kills(of_workers, of_writers, folder):
+    """Runs with a worker, or the writer, killed at a random instant, compared with a run that nothing happened to."""
+    whole = folder / "whole.nc"
+    tc.run(ra1.assembly, samples=120_000, solver="daqp", surfaces=4, out=whole).close()
+    lot, equal = random.Random(1), 0
+    with local_cluster(2) as client:
+        for _ in range(of_workers):
+            at, killed = lot.randrange(1, 100_000), []
+
+            def kill(rows, at=at, killed=killed):
+                if rows >= at and not killed:
+                    killed.append(lot.choice(list(client.run(os.getpid).values())))
+                    os.kill(killed[0], signal.SIGKILL)
+
+            path = folder / "killed.nc"
+            tc.run(
+                ra1.assembly, samples=120_000, solver="daqp", surfaces=4, out=path, overwrite=True, client=client, progress=kill
+            ).close()
+            equal += same(path, whole)
+    print(f"\na worker killed at a random instant: {equal} of {of_workers} runs equal to the last bit")
+    equal, left, command = (
+        0,
+        0,
+        [sys.executable, "-m", "tolcontact", "run", ra1.__file__, "--solver", "daqp", "--surfaces", "4"],
+    )
+    for number in range(of_writers):
+        path = folder / f"writer{number}.nc"
+        options = [*command, "--samples", "120000", "--quiet", "--out", str(path)]
+        begun = subprocess.Popen([*options, "--workers", "2"], stdout=subprocess.DEVNULL)
+        while not path.exists():
+            time.sleep(0.05)
+        time.sleep(lot.uniform(0.0, 1.2))
+        children = psutil.Process(begun.pid).children(recursive=True)
+        begun.kill()
+        begun.wait()
+        left += len(psutil.wait_procs(children, timeout=20)[1])
+        subprocess.run([*options, "--resume", "--workers", str(1 + number % 3)], check=True, stdout=subprocess.DEVNULL)
+        equal += same(path, whole)
+    print(f"the writer killed at a random instant, resumed with 1 to 3 workers: {equal} of {of_writers} equal; {left} left")
+
+
+def same(path, whole):
+    with xr.open_datatree(path) as one, xr.open_datatree(whole) as other:
+        return all(
+            np.array_equal(one[group][name].values, other[group][name].values, equal_nan=other[group][name].dtype.kind == "f")
+            for group in other.groups
+            for name in other[group].data_vars
+            if name not in VARYING
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,256 @@
+"""Workers of a dask cluster, as processes of their own: the same results to the last bit, whatever happens to them."""
+
+import contextlib
+import os
+import random
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import psutil
+import pytest
+import xarray as xr
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import COMMAND, call
+from tolcontact.errors import ClusterError
+from tolcontact.simulation import cluster
+from tolcontact.simulation.cluster import local_cluster, running_cluster
+
+pytestmark = pytest.mark.slow
+VARYING = ("summed_rows", "sums", "sums_checksum")  # which checkpoint was the last depends on time
+
+
+@pytest.fixture(scope="module")
+def client():
+    with local_cluster(2) as client:
+        yield client
+
+
+def assert_same(found, expected):
+    """Every variable of two archives, to the last bit."""
+    with xr.open_datatree(found) as one, xr.open_datatree(expected) as other:
+        assert one.groups == other.groups
+        for group in one.groups:
+            for name in other[group].data_vars:
+                if name not in VARYING:
+                    np.testing.assert_array_equal(one[group][name].values, other[group][name].values, err_msg=f"{group} {name}")
+
+
+@pytest.fixture
+def dask_processes():
+    """Begins a scheduler, or a worker of it, as a user does: in a shell."""
+    begun = []
+
+    def begin(command, *options):
+        code = f"from distributed.cli.dask_{command} import main; main()"
+        environment = {**os.environ, "DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__MALLOC_TRIM_THRESHOLD_": "100000000"}
+        begun.append(subprocess.Popen(
+            [sys.executable, "-c", code, *map(str, options)], env=environment, stderr=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, start_new_session=True,
+        ))  # fmt: skip
+        return begun[-1]
+
+    yield begin
+    for process in begun:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def free_port():
+    with contextlib.closing(socket.socket()) as own:
+        own.bind(("127.0.0.1", 0))
+        return own.getsockname()[1]
+
+
+def scheduler(begin, port):
+    return begin("scheduler", "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+
+
+def worker(begin, port):
+    return begin("worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard")
+
+
+@pytest.mark.parametrize(
+    ("name", "samples", "method"), [("ra1", 20_000, {}), ("ra2", 6000, {}), ("cells", 40, {"solver": "qpoases"})]
+)
+def test_results_are_those_of_one_process(name, samples, method, client, tmp_path):
+    options = {"samples": samples, "solver": "daqp", "surfaces": 4, **method}
+    tc.run(cases.MODELS / f"{name}.py", out=tmp_path / "one.nc", **options).close()
+    tc.run(cases.MODELS / f"{name}.py", out=tmp_path / "two.nc", client=client, **options).close()
+    assert_same(tmp_path / "two.nc", tmp_path / "one.nc")
+
+
+@pytest.mark.parametrize("workers", [1, 4])
+def test_results_do_not_depend_on_the_number_of_workers(workers, tmp_path):
+    tc.run(cases.ra1(), samples=20_000, solver="qpoases", out=tmp_path / "one.nc", surfaces=4).close()
+    with local_cluster(workers) as own:
+        tc.run(cases.ra1(), samples=20_000, solver="qpoases", out=tmp_path / "many.nc", surfaces=4, client=own).close()
+    assert_same(tmp_path / "many.nc", tmp_path / "one.nc")
+
+
+def test_functions_of_users_and_plans_come_along(client, tmp_path):
+    script = tmp_path / "bent.py"
+    script.write_text(
+        "import casadi as ca\nimport tolcontact as tc\nfrom models import ra1\nTWICE = 2\n\n\ndef bent(poses):\n"
+        "    return TWICE * ca.sin(poses.position(POINT)[2] / 10)\n\n\n"
+        "def assembly():\n    global POINT\n    a = ra1.assembly()\n    POINT = a.parts[1].point(50, 0, 10)\n"
+        '    a.measure("bent", bent, units="1")\n    return a\n'
+    )
+    options = {"samples": 5000, "solver": "daqp", "plan": "sobol", "surfaces": 0, "keep": "measures", "fields": "none"}
+    tc.run(script, out=tmp_path / "one.nc", **options).close()
+    tc.run(script, out=tmp_path / "two.nc", client=client, **options).close()
+    assert_same(tmp_path / "two.nc", tmp_path / "one.nc")
+
+
+def test_contributions_and_sensitivities_are_those_of_one_process(client):
+    a = cases.stack()
+    a.correlate(["upper.A1", "middle.A1"], 0.8)
+    program = tc.build(a, solver="daqp")
+    for ask in (tc.contributions, tc.sensitivities):
+        assert ask(program, samples=200, client=client).identical(ask(program, samples=200))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_worker_may_be_killed(seed, client, tmp_path):
+    lot = random.Random(seed)
+    whole, path = tmp_path / "whole.nc", tmp_path / "killed.nc"
+    options = {"samples": 40_000, "solver": "daqp", "surfaces": 4}
+    tc.run(cases.stack(), out=whole, **options).close()
+    killed, at = [], lot.randrange(1, 30_000)
+
+    def kill(rows):
+        if rows >= at and not killed:
+            killed.extend(client.run(os.getpid).values())
+            os.kill(lot.choice(killed), signal.SIGKILL)
+
+    tc.run(cases.stack(), out=path, client=client, progress=kill, **options).close()
+    assert killed
+    assert_same(path, whole)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tmp_path):
+    path, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
+    options = ["run", cases.MODELS / "ra1.py", "--solver", "daqp", "--surfaces", 4, "--samples", 150_000, "--quiet", "--out"]
+    begun = subprocess.Popen(
+        [*COMMAND, *map(str, [*options, path, "--workers", 2])], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+    )
+    while not path.exists():
+        time.sleep(0.1)
+        assert begun.poll() is None
+    time.sleep(random.Random(seed).uniform(0.2, 1))
+    children = psutil.Process(begun.pid).children(recursive=True)
+    begun.send_signal(signal.SIGKILL if seed else signal.SIGINT)
+    begun.wait()
+    gone, alive = psutil.wait_procs(children, timeout=20)
+    assert not alive and len(gone) >= 2
+    with tc.open_archive(path) as results:
+        assert (results["status"].values == -1).any()
+    done = call(tmp_path, *options, path, "--resume", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    assert call(tmp_path, *options, whole).returncode == 0
+    assert_same(path, whole)
+
+
+def test_a_scheduler_and_workers_in_shells(dask_processes, tmp_path):
+    port = free_port()
+    first = scheduler(dask_processes, port)
+    workers = [worker(dask_processes, port) for _ in range(2)]
+    address, whole, path = f"tcp://127.0.0.1:{port}", tmp_path / "whole.nc", tmp_path / "run.nc"
+    options = {"samples": 40_000, "solver": "daqp", "surfaces": 4}
+    tc.run(cases.stack(), out=whole, **options).close()
+    done = call(
+        tmp_path, "run", cases.MODELS / "ra1.py", "--solver", "daqp", "--samples", "9000", "--scheduler", address, "--quiet"
+    )
+    assert done.returncode in (0, 1), done.stderr
+    begun = []
+
+    def restart(rows):
+        """The scheduler dies and another one begins at its address; one of the workers is lost for good."""
+        if rows >= 9000 and not begun:
+            os.killpg(first.pid, signal.SIGKILL)
+            os.killpg(workers[0].pid, signal.SIGKILL)
+            first.wait()
+            begun.append(scheduler(dask_processes, port))
+            begun.append(worker(dask_processes, port))
+
+    with running_cluster(address) as own:
+        tc.run(cases.stack(), out=path, client=own, progress=restart, **options).close()
+    assert begun
+    assert_same(path, whole)
+
+
+def test_a_run_that_all_workers_left_ends(dask_processes, tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", 6.0)
+    port = free_port()
+    scheduler(dask_processes, port)
+    only = worker(dask_processes, port)
+    path = tmp_path / "run.nc"
+
+    def kill(rows):
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(only.pid, signal.SIGKILL)
+
+    with pytest.raises(ClusterError, match="all workers are gone"), running_cluster(f"tcp://127.0.0.1:{port}") as own:
+        tc.run(cases.stack(), samples=200_000, solver="daqp", surfaces=0, out=path, client=own, progress=kill).close()
+    with tc.open_archive(path) as results:
+        assert (results["status"].values[:4096] >= 0).all()
+    with pytest.raises(ClusterError, match="no worker came within 6 s"), running_cluster(f"tcp://127.0.0.1:{port}") as own:
+        tc.run(cases.stack(), samples=200_000, solver="daqp", surfaces=0, out=path, client=own, resume=True).close()
+
+
+def test_a_shard_that_fails_says_why_once(client, tmp_path):
+    class Wild:
+        """Gives no numbers from realization 9000 on."""
+
+        def __init__(self, draws):
+            self.draws, self.plan = draws, draws.plan
+
+        def __call__(self, *, seed, start, stop):
+            if stop > 9000:
+                raise tc.ModelError("wild", ['variable "heat" yields non-finite deviations'])
+            return self.draws(seed=seed, start=start, stop=stop)
+
+    program = tc.build(cases.ra1(), solver="daqp")
+    found = []
+    with pytest.raises(tc.ModelError, match='variable "heat" yields') as raised:
+        found.extend(cluster.map_shards(client, len, program, samples=40_000, seed=1, start=0, draws=Wild(program.draws)))
+    assert str(raised.value).count("heat") == 1 and raised.value.faults and sum(found) in (0, 4096, 8192)
+
+
+@pytest.mark.parametrize("library", ["numba", "tolcontact"])
+def test_a_worker_with_other_versions_is_refused_by_name(library, client, monkeypatch):
+    monkeypatch.setattr(cluster, "versions", lambda: {library: "0.0.1"})
+    with pytest.raises(ClusterError, match=rf"worker .*has {library} .*this process 0\.0\.1"):
+        tc.run(cases.ra1(), samples=100, solver="daqp", client=client)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--workers", "0"), "workers is 0; expected a whole number, at least 1"),
+        (("--workers", "2", "--scheduler", "tcp://127.0.0.1:1"), "choose one of --workers and --scheduler"),
+        (("--scheduler", "tcp://127.0.0.1:1"), 'no dask scheduler answers at "tcp://127.0.0.1:1"'),
+        (("--scheduler", "nowhere"), 'no dask scheduler answers at "nowhere"'),
+    ],
+)
+def test_what_cannot_be_is_told_in_one_line(options, said, tmp_path):
+    done = call(tmp_path, "run", cases.MODELS / "ra1.py", "--samples", "100", *options)
+    assert done.returncode == 2 and said in " ".join(done.stderr.split()) and "Traceback" not in done.stderr
+
+
+def test_memory_of_the_client_does_not_grow(client):
+    program, rss = tc.build(cases.ra1(), solver="daqp"), []
+    own = psutil.Process()
+    for rows, _ in enumerate(
+        cluster.map_shards(client, lambda b: b, program, samples=500_000, seed=1, start=0, draws=program.draws)
+    ):
+        if rows in (60, 120):
+            rss.append(own.memory_info().rss)
+    assert rss[1] - rss[0] < 100e6
