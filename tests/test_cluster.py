@@ -116,6 +116,21 @@ def test_contributions_and_sensitivities_are_those_of_one_process(client):
         assert ask(program, samples=200, client=client).identical(ask(program, samples=200))
 
 
+def test_searches_and_comparisons_are_those_of_one_process(client):
+    program = tc.build(cases.ra1(), solver="daqp")
+    for ask, model, options in (
+        (tc.worst_case, tc.build(cases.one_dimensional(6), solver="daqp"), {"samples": 32}),
+        (tc.tails, program, {"samples": 4000}),
+        (tc.allocate, program, {"require": "corner height: ppm 10000", "by": "part", "samples": 1024}),
+    ):
+        assert ask(model, client=client, **options).identical(ask(model, **options)), ask
+    asked = {"between": ((20, 12.5, 0), (80, 12.5, 0)), "least": "corner height: 6 sigma", "samples": 64, "solver": "daqp"}
+    assert tc.relocate(cases.ra1(), "top.A3", client=client, **asked).identical(tc.relocate(cases.ra1(), "top.A3", **asked))
+    solvers = ["daqp", "qpoases"]
+    found, expected = (tc.compare(cases.ra1(), solvers, samples=500, client=each) for each in (client, None))
+    assert found.drop_vars("seconds").identical(expected.drop_vars("seconds")) and (found["seconds"] > 0).all()
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_a_worker_may_be_killed(seed, client, tmp_path):
     lot = random.Random(seed)
@@ -220,7 +235,7 @@ def test_a_shard_that_fails_says_why_once(client, tmp_path):
     program = tc.build(cases.ra1(), solver="daqp")
     found = []
     with pytest.raises(tc.ModelError, match='variable "heat" yields') as raised:
-        found.extend(cluster.map_shards(client, len, program, samples=40_000, seed=1, start=0, draws=Wild(program.draws)))
+        found.extend(cluster.Workers(client)(len, program, samples=40_000, seed=1, start=0, draws=Wild(program.draws)))
     assert str(raised.value).count("heat") == 1 and raised.value.faults and sum(found) in (0, 4096, 8192)
 
 
@@ -249,7 +264,7 @@ def test_memory_of_the_client_does_not_grow(client):
     program, rss = tc.build(cases.ra1(), solver="daqp"), []
     own = psutil.Process()
     for rows, _ in enumerate(
-        cluster.map_shards(client, lambda b: b, program, samples=500_000, seed=1, start=0, draws=program.draws)
+        cluster.Workers(client)(lambda b: b, program, samples=500_000, seed=1, start=0, draws=program.draws)
     ):
         if rows in (60, 120):
             rss.append(own.memory_info().rss)

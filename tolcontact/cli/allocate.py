@@ -13,8 +13,10 @@ from tolcontact.cli.app import (
     Objective,
     Quiet,
     Resolution,
+    Scheduler,
     Seed,
     Solver,
+    Workers,
     app,
     chosen,
     examples,
@@ -26,6 +28,7 @@ from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.report import allocation_text
+from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
 from tolcontact.workflow.allocate import VERIFICATIONS
 from tolcontact.workflow.allocate import allocate as allocate_model
@@ -58,15 +61,17 @@ def allocate(
     as_json: AsJson = False,
     as_csv: AsCsv = False,
     into: Into = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Print tolerance ranges at least cost for what is required, and which to tighten first."""
     only_one(json=as_json, csv=as_csv)
-    with shown_progress(model.stem, VERIFICATIONS, quiet=quiet) as show:
+    with shown_progress(model.stem, VERIFICATIONS, quiet=quiet) as show, client_of(workers, scheduler) as client:
         found = allocate_model(
             functools.partial(load_model, model), require, costs=dict(map(_cost, cost)) if cost else None, by=by,
             samples=samples, seed=seed, solver=solver, method=chosen(resolution=resolution, objective=objective),
-            into=into, progress=show,
+            into=into, client=client, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

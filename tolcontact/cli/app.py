@@ -60,6 +60,11 @@ Objective = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
 Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Keep it in an archive of the same model, too.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Simulate in so many processes, with dask.")]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; results are printed.")]
 
 

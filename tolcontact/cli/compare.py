@@ -9,18 +9,19 @@ import typer
 import xarray as xr
 
 from tolcontact.archive import open_archive, taken
-from tolcontact.cli.app import AsJson, Samples, Seed, app, chosen, examples, or_
+from tolcontact.cli.app import AsJson, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_
 from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text, runs_text, write_comparison
+from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.compare import compare as compare_solvers
 from tolcontact.workflow.compare_runs import compare_runs, named
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
 _ONE_OR_MORE = "One or more of {}. Default: the model's."
-_OF_MODELS = ("solvers", "samples", "seed", "resolution", "objective")
+_OF_MODELS = ("solvers", "samples", "seed", "resolution", "objective", "workers", "scheduler")
 
 
 @app.command(
@@ -42,6 +43,8 @@ def compare(
     seed: Seed = 1,
     resolution: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(RESOLUTIONS)))] = None,
     objective: Annotated[str | None, typer.Option(help=_ONE_OR_MORE.format(or_(OBJECTIVES)))] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     as_json: AsJson = False,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also write it to a new netCDF file.")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Of archives: also write a page to look at.")] = None,
@@ -65,7 +68,10 @@ def compare(
             found = _of_archives(what, report)
         else:
             methods = [chosen(resolution=one, objective=other) for one in _names(resolution) for other in _names(objective)]
-            found = compare_solvers(load_model(what[0]), _listed(solvers), samples=samples, seed=seed, methods=methods)
+            with client_of(workers, scheduler) as client:
+                found = compare_solvers(
+                    load_model(what[0]), _listed(solvers), samples=samples, seed=seed, methods=methods, client=client
+                )
         if path is not None:
             # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in found.variables if found[name].dtype.kind == "U"}

@@ -13,8 +13,10 @@ from tolcontact.cli.app import (
     Objective,
     Quiet,
     Resolution,
+    Scheduler,
     Seed,
     Solver,
+    Workers,
     app,
     chosen,
     examples,
@@ -25,6 +27,7 @@ from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
 from tolcontact.report import contributions_text
+from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
 from tolcontact.workflow.contributions import contributions as contributions_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
@@ -44,14 +47,16 @@ def contributions(
     as_json: AsJson = False,
     as_csv: AsCsv = False,
     into: Into = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Print which contributors the variance of each measure comes from, without contact and with it."""
     only_one(json=as_json, csv=as_csv)
-    with shown_progress(model.stem, samples, quiet=quiet) as show:
+    with shown_progress(model.stem, samples, quiet=quiet) as show, client_of(workers, scheduler) as client:
         found = contributions_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), by=by, into=into, progress=show,
+            method=chosen(resolution=resolution, objective=objective), by=by, into=into, client=client, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

@@ -13,8 +13,10 @@ from tolcontact.cli.app import (
     Objective,
     Quiet,
     Resolution,
+    Scheduler,
     Seed,
     Solver,
+    Workers,
     app,
     chosen,
     examples,
@@ -25,6 +27,7 @@ from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.report import relocation_text
+from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.relocate import relocate as relocate_locator
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
@@ -51,15 +54,17 @@ def relocate(
     as_json: AsJson = False,
     as_csv: AsCsv = False,
     into: Into = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Print the place of a locator, within a region, where a measure varies least."""
     only_one(json=as_json, csv=as_csv)
     corners = _corner(one, "--from"), _corner(other, "--to")
-    with shown_progress(model.stem, 1, quiet=quiet) as show:
+    with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
         found = relocate_locator(
             functools.partial(load_model, model), locator, between=corners, least=least, samples=samples, seed=seed,
-            solver=solver, method=chosen(resolution=resolution, objective=objective), into=into, progress=show,
+            solver=solver, method=chosen(resolution=resolution, objective=objective), into=into, client=client, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

@@ -6,7 +6,21 @@ from typing import Annotated
 
 import typer
 
-from tolcontact.cli.app import Model, Objective, Quiet, Resolution, Samples, Seed, Solver, app, chosen, examples, or_
+from tolcontact.cli.app import (
+    Model,
+    Objective,
+    Quiet,
+    Resolution,
+    Samples,
+    Scheduler,
+    Seed,
+    Solver,
+    Workers,
+    app,
+    chosen,
+    examples,
+    or_,
+)
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.declaration.script import load_model
@@ -50,11 +64,8 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
-    workers: Annotated[int | None, typer.Option(metavar="N", help="Simulate in so many processes, with dask.")] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
-    ] = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Simulate a model with and without contact, and print what happens to its measures.

@@ -13,8 +13,10 @@ from tolcontact.cli.app import (
     Objective,
     Quiet,
     Resolution,
+    Scheduler,
     Seed,
     Solver,
+    Workers,
     app,
     chosen,
     examples,
@@ -24,6 +26,7 @@ from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
 from tolcontact.report import tails_text
+from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
 from tolcontact.workflow.tails import tails as tails_of
 
@@ -39,14 +42,16 @@ def tails(
     as_json: AsJson = False,
     as_csv: AsCsv = False,
     into: Into = None,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Print how often measures are outside their limits, or parts do not go together, where that is rare."""
     only_one(json=as_json, csv=as_csv)
-    with shown_progress(model.stem, samples, quiet=quiet) as show:
+    with shown_progress(model.stem, samples, quiet=quiet) as show, client_of(workers, scheduler) as client:
         found = tails_of(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver,
-            method=chosen(resolution=resolution, objective=objective), into=into, progress=show,
+            method=chosen(resolution=resolution, objective=objective), into=into, client=client, progress=show,
         )  # fmt: skip
     if as_json:
         print_data(found)

@@ -52,7 +52,8 @@ workers. Give workers of your own `DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__M
 own value they take half as long again (those of `--workers` have it). What a cluster costs and what limits it is in
 `studies/scale`. Workers run Python code that clients send: a scheduler belongs in a network that one trusts.
 
-`tc.contributions` and `tc.sensitivities` take a `client`, too.
+All analyses take a `client` as well, and `--workers` or `--scheduler` on the command line. What searches (`worst_case`, `tails`,
+`allocate`, `relocate`) try at once is some hundred realizations: workers gain where one of them takes a millisecond or more.
 
 ## Time and memory
 
@@ -64,8 +65,8 @@ million realizations or more, or of slow ones that will take more than a minute,
 before it starts.
 """
 
-from tolcontact.simulation.block import Block
+from tolcontact.simulation.block import Block, outcomes
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.simulation.threads import block_rows, map_blocks, processors, simulate_blocks
 
-__all__ = ["Block", "block_rows", "map_blocks", "processors", "simulate_block", "simulate_blocks"]
+__all__ = ["Block", "block_rows", "map_blocks", "outcomes", "processors", "simulate_block", "simulate_blocks"]

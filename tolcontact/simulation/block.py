@@ -86,3 +86,8 @@ class Block(Readable):
         every = list(blocks)
         names = [field.name for field in fields(cls) if field.name != "start"]
         return cls(every[0].start, **{name: np.concatenate([getattr(block, name) for block in every]) for name in names})
+
+
+def outcomes(block: Block) -> tuple[Float[Array, "n state measure"], Int[Array, " n"]]:
+    """Measures (n, state, measure) and statuses (n,) of a block, which may go then."""
+    return block.measured.copy(), block.status.copy()

@@ -5,7 +5,6 @@ a second. A bounded number of shards is under way, so memory does not grow with 
 that are lost are simulated again by others, as dask has it; what a scheduler forgot that was started anew is sent again.
 """
 
-import functools
 import hashlib
 import logging
 import os
@@ -44,6 +43,7 @@ NOWHERE = "not installed"
 KEPT = 8  # models and jobs that a worker keeps
 
 T = TypeVar("T")
+MapBlocks = Callable[..., Iterator[Any]]  # `map_blocks`, or what does the same elsewhere
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,38 +141,71 @@ def _dask() -> Iterator[None]:
         raise OptionError("workers need dask; install it with: pip install 'tolcontact[dask]'") from error
 
 
-def mapping(client: Any) -> Callable[..., Iterator[Any]]:
-    """`map_blocks`, or the same on the workers of a client."""
-    return map_blocks if client is None else functools.partial(map_shards, client)
+def mapping(client: Any) -> MapBlocks:
+    """`map_blocks`, or the same on the workers of a client. Raises ClusterError if they cannot be used."""
+    return map_blocks if client is None else Workers(client)
 
 
-def map_shards(
-    client: Any,
-    function: Callable[[Block], T],
-    program: Program,
-    *,
-    samples: int,
-    seed: int,
-    start: int = 0,
-    draws: Sampler | None = None,
-) -> Iterator[T]:
-    """What `function` makes of each block of `simulate_blocks` where it was simulated, on the workers of a client; in order.
+class Workers:
+    """`map_blocks` on the workers of a client. They get a program once, however often it is simulated.
 
     Raises ClusterError if there are no workers, if one has other versions than this process, or if none comes through a shard;
     and whatever a shard raises.
     """
-    check_workers(client)
-    model = Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
-    job = Packed.of((draws or program.draws, function), program.nominal)
-    shards = _Shards(client, model, job, seed, samples, block_rows(program))
-    try:
-        first = start
-        while first < samples or shards:
-            while first < samples and len(shards) < AHEAD * shards.threads:
-                first = shards.begin(first)
-            yield from shards.finish()
-    finally:
-        shards.cancel()
+
+    def __init__(self, client: Any) -> None:
+        check_workers(client)
+        self._client = client
+        self._model: _Model | None = None
+
+    def __call__(
+        self,
+        function: Callable[[Block], T],
+        program: Program,
+        *,
+        samples: int,
+        seed: int,
+        start: int = 0,
+        draws: Sampler | None = None,
+    ) -> Iterator[T]:
+        """What `function` makes of each block of `simulate_blocks` where it was simulated; in order."""
+        job = Packed.of((draws or program.draws, function), program.nominal)
+        shards = _Shards(self._client, self._sent(program), job, seed, samples, block_rows(program))
+        try:
+            first = start
+            while first < samples or shards:
+                while first < samples and len(shards) < AHEAD * shards.threads:
+                    first = shards.begin(first)
+                yield from shards.finish()
+        finally:
+            shards.cancel()
+
+    def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
+        """Have all workers that are there import and compile what they need, which else takes their first shard longer."""
+        model, job = self._sent(program).packed, Packed.of(function, program.nominal)
+        self._client.run(_get_ready, model.data, model.token, job.data)
+
+    def _sent(self, program: Program) -> "_Model":
+        if self._model is None or self._model.program is not program:
+            self._model = _Model(self._client, program)
+        return self._model
+
+
+class _Model:
+    """A program that workers compile: what they need for it is a result that they pass on to each other."""
+
+    def __init__(self, client: Any, program: Program) -> None:
+        self._client, self.program = client, program
+        self.packed = pack_model(program)
+        self.send()
+
+    def send(self) -> None:
+        self.sent = self._client.submit(bytes, self.packed.data, pure=False)
+
+
+def pack_model(program: Program) -> Packed:
+    """What `compile_program` makes a program of."""
+    return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
 
 
 def check_workers(client: Any) -> None:
@@ -204,13 +237,13 @@ def _refuse(worker: str, library: str, found: str, expected: str) -> None:
 class _Shards:
     """Shards that are under way, the first one first."""
 
-    def __init__(self, client: Any, model: Packed, job: Packed, seed: int, samples: int, block: int) -> None:
+    def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int) -> None:
         self._client, self._model, self._job = client, model, job
         self._seed, self._samples, self._block = seed, samples, block
         self._versions = versions()
         self._blocks = 1  # of the next shard
         self._begun: deque[tuple[int, int, Any]] = deque()
-        self._send()
+        self._send_job()
 
     def __len__(self) -> int:
         return len(self._begun)
@@ -266,15 +299,15 @@ class _Shards:
             self._client.cancel([future for _, _, future in self._begun], force=True)
         self._begun.clear()
 
-    def _send(self) -> None:
-        """Model and job as results that workers pass on to each other."""
-        self._sent = [self._client.submit(bytes, each.data, pure=False) for each in (self._model, self._job)]
+    def _send_job(self) -> None:
+        self._sent = self._client.submit(bytes, self._job.data, pure=False)
 
     def _submitted(self, first: int, stop: int) -> Any:
         return self._client.submit(
             simulate_shard,
-            *self._sent,
-            (self._model.token, self._job.token),
+            self._model.sent,
+            self._sent,
+            (self._model.packed.token, self._job.token),
             self._versions,
             self._seed,
             first,
@@ -292,7 +325,8 @@ class _Shards:
                     f"the scheduler was lost, and did not come back within {PATIENCE:.0f} s; resume the run later"
                 )
             time.sleep(0.2)
-        self._send()
+        self._model.send()
+        self._send_job()
         self._begun = deque((first, stop, self._submitted(first, stop)) for first, stop, _ in self._begun)
 
 
@@ -310,6 +344,16 @@ def _made(token: str, make: Callable[[], Any]) -> Any:
         return _ready[token]
 
 
+def _program(model: bytes, token: str) -> Program:
+    """Compiled once, and kept."""
+    return _made(token, lambda: compile_program(*pickle.loads(model)))  # type: ignore[no-any-return]
+
+
+def _get_ready(model: bytes, token: str, job: bytes) -> None:
+    _program(model, token)
+    pickle.loads(job)
+
+
 def simulate_shard(
     model: bytes, job: bytes, tokens: tuple[str, str], versions: dict[str, str], seed: int, start: int, stop: int
 ) -> tuple[float, list[Any]]:
@@ -320,7 +364,7 @@ def simulate_shard(
         except PackageNotFoundError:
             here = NOWHERE
         _refuse(f"on {platform.node()}, process {os.getpid()},", library, here, expected)
-    program = _made(tokens[0], lambda: compile_program(*pickle.loads(model)))
+    program = _program(model, tokens[0])
     draws, function = _made(tokens[1], lambda: pickle.loads(job))
     began = time.perf_counter()
     found = list(map_blocks(function, program, samples=stop, seed=seed, start=start, threads=1, draws=draws))

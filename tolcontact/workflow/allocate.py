@@ -13,7 +13,8 @@ from tolcontact import vocabulary as words
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import outcomes
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.intervals import Estimate, mean
 from tolcontact.workflow.contributions import owners
 from tolcontact.workflow.requirement import Requirement
@@ -42,6 +43,7 @@ def allocate(
     solver: str | None = None,
     method: Choice | None = None,
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Ranges at least cost with which measures keep what is required, contact resolved.
@@ -63,6 +65,7 @@ def allocate(
     ranges that agrees with it in value and slopes, on the same draws, and solves that with scipy's SLSQP within a region that
     shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run does not keep what is
     required, the aim is tightened by what it was missed by, and the search goes on.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/allocation; the report shows it.
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which no range varies.
@@ -70,7 +73,7 @@ def allocate(
     check_counts(samples=samples, seed=seed)
     if by not in words.GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(words.GROUPED_BY)}")
-    program = program_of(model, solver, method)
+    blocks, program = mapping(client), program_of(model, solver, method)
     if into is not None:
         check_room_for(into, words.OF_ALLOCATION, program)
     required = [Requirement.of_text(text, program) for text in ([require] if isinstance(require, str) else require)]
@@ -80,7 +83,7 @@ def allocate(
         each.check(samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
-    engine = _Engine(program, list(groups.values()), seed, samples)
+    engine = _Engine(program, blocks, list(groups.values()), seed, samples)
     free = np.array([name in curves for name in groups])
     cost = [curves.get(name, 0.0) for name in groups]
     logs, kept = _allocated(engine, required, cost, free, progress)
@@ -123,8 +126,8 @@ def allocate(
 class _Engine:
     """Corrected measures for factors of the groups' ranges, on the same draws."""
 
-    def __init__(self, program: Program, groups: Sequence[np.ndarray], seed: int, samples: int) -> None:
-        self._program, self._groups, self._seed, self._samples = program, groups, seed, samples
+    def __init__(self, program: Program, blocks: MapBlocks, groups: Sequence[np.ndarray], seed: int, samples: int) -> None:
+        self._program, self._blocks, self._groups, self._seed, self._samples = program, blocks, groups, seed, samples
 
     def __call__(self, factors: np.ndarray, *, fresh: int = 0) -> np.ndarray:
         """Measures (n, measure); of other draws, and more of them, if `fresh` is the number of a verification."""
@@ -133,8 +136,8 @@ class _Engine:
             scale[columns] = factor
         draws, first = self._program.draws.scaled(scale), fresh << 32
         count = FRESH * self._samples if fresh else self._samples
-        blocks = simulate_blocks(self._program, samples=first + count, start=first, seed=self._seed, draws=draws)
-        return np.asarray(np.concatenate([block.measured[:, words.CORRECTED] for block in blocks]))
+        found = self._blocks(outcomes, self._program, samples=first + count, start=first, seed=self._seed, draws=draws)
+        return np.asarray(np.concatenate([measured[:, words.CORRECTED] for measured, _ in found]))
 
     def __len__(self) -> int:
         return len(self._groups)

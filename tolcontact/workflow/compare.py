@@ -15,7 +15,8 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import Method
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import Block
+from tolcontact.simulation.cluster import MapBlocks, Workers, mapping
 from tolcontact.vocabulary import CORRECTED
 from tolcontact.workflow.run import Choice, Model, check_counts, chosen, declared
 
@@ -31,6 +32,7 @@ def compare(
     samples: int = 1000,
     seed: int = 1,
     methods: Choice | Sequence[Choice] | None = None,
+    client: Any = None,
 ) -> xr.Dataset:
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
@@ -46,6 +48,8 @@ def compare(
         measure_difference (solver, extent, measure)  in the measure's units
         both_resolved      (solver)                   number of realizations that the differences cover
 
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); all but `seconds` is the same to the
+    last bit.
     Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
     """
     check_counts(samples=samples, seed=seed)
@@ -55,12 +59,15 @@ def compare(
     for word, named in {"solvers": solvers, "methods": resolved_by}.items():
         if not named or len(set(named)) < len(named):
             raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
-    nominal = discretize(assembly)
+    blocks, nominal = mapping(client), discretize(assembly)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
-    first = _simulated(programs[0], samples, seed)
-    rows = [_row(first, first, corners), *(_row(_simulated(each, samples, seed), first, corners) for each in programs[1:])]
+    first = _simulated(programs[0], blocks, samples, seed)
+    rows = [
+        _row(first, first, corners),
+        *(_row(_simulated(each, blocks, samples, seed), first, corners) for each in programs[1:]),
+    ]
     labels = {
         words.SOLVER: [" ".join([solver, *_apart(method, resolved_by)]) for solver, method in contestants],
         words.STATUS_MEANING: list(words.STATUS_MEANINGS),
@@ -83,17 +90,21 @@ def compare(
     )
 
 
-def _simulated(program: Program, samples: int, seed: int) -> dict[str, Any]:
+def _simulated(program: Program, blocks: MapBlocks, samples: int, seed: int) -> dict[str, Any]:
     """How long it took [s], and of each realization what is compared, in the corrected state."""
-    list(simulate_blocks(program, samples=WARM_UP, seed=seed))
+    if isinstance(blocks, Workers):
+        blocks.get_ready(_compared, program)
+    list(blocks(len, program, samples=WARM_UP, seed=seed))
     start = time.perf_counter()
-    blocks = []
-    for block in simulate_blocks(program, samples=samples, seed=seed):
-        states = (block.poses, block.measured, block.gap_min)
-        blocks.append((block.status, block.kkt_residual, *(values[:, CORRECTED].copy() for values in states)))
+    found = list(blocks(_compared, program, samples=samples, seed=seed))
     seconds = time.perf_counter() - start
     names = ("status", "kkt_residual", "poses", "measured", "gap_min")
-    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*blocks, strict=True)), strict=True))}
+    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*found, strict=True)), strict=True))}
+
+
+def _compared(block: Block) -> tuple[np.ndarray, ...]:
+    states = (block.poses, block.measured, block.gap_min)
+    return block.status, block.kkt_residual, *(values[:, CORRECTED].copy() for values in states)
 
 
 def _apart(method: Method, methods: Sequence[Method]) -> list[str]:

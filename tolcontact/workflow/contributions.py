@@ -13,7 +13,7 @@ from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block
-from tolcontact.simulation.cluster import mapping
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.simulation.linear_model import linear_model
 from tolcontact.statistics.contributions import missed, shapley_effects, sobol_indices
 from tolcontact.variation import MixedDraws, ReleasedDraws, independent_groups
@@ -56,7 +56,7 @@ def contributions(
     check_counts(samples=samples, seed=seed)
     if by not in GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
-    program = program_of(model, solver, method)
+    blocks, program = mapping(client), program_of(model, solver, method)
     if into is not None:
         check_room_for(into, words.OF_CONTRIBUTIONS, program)
     some = program.draws(seed=seed, start=0, stop=SOME)
@@ -78,13 +78,13 @@ def contributions(
     is_correlated = len(units) > len(groups)
     simulated = samples * (mixed.together + is_correlated * released.together)
     values, statuses, A = _simulated(
-        program, mixed, samples, seed, client, progress and (lambda done: progress(done, simulated))
+        program, mixed, samples, seed, blocks, progress and (lambda done: progress(done, simulated))
     )
     shares = np.empty((values.shape[3], values.shape[2], 0, len(words.ESTIMATE)))
     if is_correlated:
         before = samples * mixed.together
         freed, more, _ = _simulated(
-            program, released, samples, seed, client, progress and (lambda n: progress(before + n, simulated))
+            program, released, samples, seed, blocks, progress and (lambda n: progress(before + n, simulated))
         )
         statuses, places = statuses + more, released.places(seed, 0, samples)
         shares = np.array([[shapley_effects(of.T, places) for of in state] for state in freed.T])
@@ -141,13 +141,17 @@ def owners(program: Program, by: str) -> list[str]:
 
 
 def _simulated(
-    program: Program, draws: MixedDraws | ReleasedDraws, samples: int, seed: int, client: Any, progress: Progress | None
+    program: Program,
+    draws: MixedDraws | ReleasedDraws,
+    samples: int,
+    seed: int,
+    blocks: MapBlocks,
+    progress: Progress | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Measures (base, realization, state, measure), statuses by meaning, and the first draws (base, column)."""
     together = draws.together
     measured, A, statuses, done = [], [], np.zeros(len(words.STATUS_MEANINGS), dtype=int), 0
-    blocks = mapping(client)(_Observed(together), program, samples=samples * together, seed=seed, draws=draws)
-    for values, own, counts in blocks:
+    for values, own, counts in blocks(_Observed(together), program, samples=samples * together, seed=seed, draws=draws):
         measured.append(values)
         A.append(own)
         statuses += counts

@@ -7,7 +7,8 @@ import numpy as np
 
 from tolcontact import vocabulary as words
 from tolcontact.compilation import Program
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import outcomes
+from tolcontact.simulation.cluster import MapBlocks
 from tolcontact.variation import GivenDraws, Region
 
 AROUND = 8  # random directions that a search tries, beside those of single contributors
@@ -22,19 +23,18 @@ NEAR = 1e-4  # of the ranges: steps of differences at an end
 class Evaluation:
     """The engine on own deviations, and how many of each status it has seen."""
 
-    def __init__(self, program: Program, region: Region) -> None:
-        self._program, self._region = program, region
+    def __init__(self, program: Program, region: Region, blocks: MapBlocks) -> None:
+        self._program, self._region, self._blocks = program, region, blocks
         self.statuses = np.zeros(len(words.STATUS_MEANINGS), dtype=int)
 
     def __call__(self, own: np.ndarray) -> np.ndarray:
         """Measures (..., state, measure) of own deviations (..., contributor); NaN, corrected, where it is not certified."""
         flat = self._region.deviations(own.reshape(-1, own.shape[-1]))
         values = []
-        for block in simulate_blocks(self._program, samples=len(flat), seed=0, draws=GivenDraws(flat)):
-            measured = block.measured.copy()
-            measured[np.isin(block.status, words.UNRESOLVED), words.CORRECTED] = np.nan
+        for measured, status in self._blocks(outcomes, self._program, samples=len(flat), seed=0, draws=GivenDraws(flat)):
+            measured[np.isin(status, words.UNRESOLVED), words.CORRECTED] = np.nan
             values.append(measured)
-            self.statuses += np.bincount(block.status, minlength=len(self.statuses))
+            self.statuses += np.bincount(status, minlength=len(self.statuses))
         return np.concatenate(values).reshape(*own.shape[:-1], len(words.STATES), -1)
 
     def raw(self, own: np.ndarray) -> np.ndarray:

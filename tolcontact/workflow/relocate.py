@@ -16,7 +16,9 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import NominalPart, discretize
 from tolcontact.errors import ModelError, OptionError
-from tolcontact.simulation import simulate_blocks
+from tolcontact.method import Method
+from tolcontact.simulation import outcomes
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import outside
 from tolcontact.statistics.intervals import Estimate
@@ -42,6 +44,7 @@ def relocate(
     solver: str = DEFAULT_SOLVER,
     method: Choice | None = None,
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """The best place of a locator, "part.locator", in the box `between` two corners, in its part's own frame [mm].
@@ -57,13 +60,14 @@ def relocate(
     same in both corners stay; the locator keeps its direction, so choose corners on the surface that it stands against.
     All places are tried with the same draws: first a grid, from whose best place scipy's COBYQA goes on. The response may have
     several minima, or be flat: look at `tried_value`. Each trial compiles the model anew.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the model as it is, as the group
     statistics/relocation; the report shows it.
     Raises ModelError, ArchiveError, OptionError for a locator, a region or a measure that there is not.
     """
     check_counts(samples=samples, seed=seed)
-    assembly = declared(model)
-    engine = _Engine(assembly, locator, least, solver, chosen(assembly, method), samples, seed)
+    blocks, assembly = mapping(client), declared(model)
+    engine = _Engine(assembly, blocks, locator, least, solver, chosen(assembly, method), samples, seed)
     if into is not None:
         check_room_for(into, words.OF_RELOCATION, engine.program)
     lower, upper = _corners(between)
@@ -127,8 +131,19 @@ def relocate(
 class _Engine:
     """What is to be least, for places of a locator, on the same draws."""
 
-    def __init__(self, assembly: Assembly, locator: str, least: str, solver: str, method: Any, samples: int, seed: int) -> None:
-        self._assembly, self._solver, self._method, self._samples, self._seed = assembly, solver, method, samples, seed
+    def __init__(
+        self,
+        assembly: Assembly,
+        blocks: MapBlocks,
+        locator: str,
+        least: str,
+        solver: str,
+        method: Method,
+        samples: int,
+        seed: int,
+    ) -> None:
+        self._assembly, self._blocks, self._solver, self._method = assembly, blocks, solver, method
+        self._samples, self._seed = samples, seed
         self.program = self._program(assembly)
         nominal = self.program.nominal
         if locator not in nominal.locators.labels:
@@ -163,9 +178,11 @@ class _Engine:
         scheme = [at_point(each, point) if k == self._number else each for k, each in enumerate(self._own)]
         program, first = self._program(self._with(tuple(scheme))), FRESH * self._samples if fresh else 0
         values, lost = [], 0
-        for block in simulate_blocks(program, samples=first + (first or self._samples), start=first, seed=self._seed):
-            values.append(block.measured[:, words.CORRECTED, self._measure].copy())
-            lost += int(np.isin(block.status, words.UNRESOLVED).sum())
+        for measured, status in self._blocks(
+            outcomes, program, samples=first + (first or self._samples), start=first, seed=self._seed
+        ):
+            values.append(measured[:, words.CORRECTED, self._measure])
+            lost += int(np.isin(status, words.UNRESOLVED).sum())
         return np.concatenate(values), lost
 
     def estimate(self, measured: np.ndarray) -> Estimate:

@@ -17,7 +17,7 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import Block
-from tolcontact.simulation.cluster import mapping
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import BlockSums, DisplacementFields, Summary, touching
 from tolcontact.statistics import summarize as statistics_of
@@ -137,6 +137,7 @@ def run(
         raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
     check_program(model, solver, method)
     target = None if until is None else Target.of(until)
+    blocks = mapping(client)
 
     def write(path: Path) -> None:
         program = program_of(model, solver, method)
@@ -150,7 +151,7 @@ def run(
                 ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, of_fields.sizes)
             ) as writer:
                 announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
-                _simulate(program, writer, of_fields, seed, client, progress)
+                _simulate(program, writer, of_fields, seed, blocks, progress)
                 _look_at_points(path, writer)
             more = target.next(path, program) if target else None
             if more is None:
@@ -183,14 +184,14 @@ class _Prepared:
 
 
 def _simulate(
-    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, client: Any, progress: Progress | None
+    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, blocks: MapBlocks, progress: Progress | None
 ) -> None:
     fields.go_on_from(writer.take_up())
 
     prepared = _Prepared(tuple(variable.name for variable in writer.kept), fields)
     is_summed = bool(writer.rows)
     try:
-        for rows, sums in mapping(client)(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
+        for rows, sums in blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
             is_summed = False
             fields.merge(sums)
             writer.append(rows)

@@ -12,7 +12,7 @@ from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block
-from tolcontact.simulation.cluster import mapping
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.simulation.linear_model import leverages, linear_model
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import NOTHING, Estimate
@@ -65,7 +65,7 @@ def sensitivities(
     if not columns.size:
         raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
     stepped = SteppedDraws(program.draws, columns, STEP * deviation[columns])
-    measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, client, progress)
+    measured, carrying, touched, statuses = _simulated(program, stepped, samples, seed, mapping(client), progress)
     up, down = np.split(np.arange(1, stepped.together), 2)
     steps = (STEP * deviation[columns])[:, None, None]
     ahead, behind = (measured[:, up] - measured[:, :1]) / steps, (measured[:, :1] - measured[:, down]) / steps
@@ -113,7 +113,12 @@ def sensitivities(
 
 
 def _simulated(
-    program: Program, stepped: SteppedDraws, samples: int, seed: int, client: Any, progress: Callable[[int, int], None] | None
+    program: Program,
+    stepped: SteppedDraws,
+    samples: int,
+    seed: int,
+    blocks: MapBlocks,
+    progress: Callable[[int, int], None] | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of each realization and its steps: measures (n, step, state, measure) and carrying points (n, step, pair); of the
     realizations themselves whether contact touches them (n,), and statuses by meaning."""
@@ -121,7 +126,7 @@ def _simulated(
     measured: list[np.ndarray] = []
     carrying: list[np.ndarray] = []
     status: list[np.ndarray] = []
-    for found in mapping(client)(_observed, program, samples=samples * together, seed=seed, draws=stepped):
+    for found in blocks(_observed, program, samples=samples * together, seed=seed, draws=stepped):
         for every, own in zip((measured, carrying, status), found, strict=True):
             every.append(own)
         done += len(status[-1])

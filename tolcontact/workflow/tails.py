@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -11,7 +12,8 @@ from tolcontact import vocabulary as words
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation import Block, simulate_blocks
+from tolcontact.simulation import outcomes
+from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.tails import Score, tail_probability
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
@@ -30,6 +32,7 @@ def tails(
     solver: str | None = None,
     method: Choice | None = None,
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """Probabilities of rare events, by subset simulation (see tolcontact.statistics.tails).
@@ -43,6 +46,7 @@ def tails(
     parts do not go together, which is right if they do whenever they do with larger ones.
     Estimates are of realizations as they are, also of those that are not resolved. `progress` is called with the number of
     realizations simulated, and about how many there will be.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/tails; the report shows it.
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, a model without such an event, or in which
@@ -51,7 +55,7 @@ def tails(
     check_counts(samples=samples, seed=seed)
     if samples < LEAST:
         raise OptionError(f"samples is {samples!r}; expected {LEAST} realizations for an event, or more")
-    program = program_of(model, solver, method)
+    blocks, program = mapping(client), program_of(model, solver, method)
     if into is not None:
         check_room_for(into, words.OF_TAILS, program)
     if not program.draws.varying:
@@ -64,7 +68,7 @@ def tails(
         )
     found, statuses = [], []
     for number, event in enumerate(events.values()):
-        engine = _Engine(program, done=number * samples, total=len(events) * samples, progress=progress)
+        engine = _Engine(program, blocks, done=number * samples, total=len(events) * samples, progress=progress)
         score, looks = event(engine)
         rng = np.random.default_rng([seed, number])
         found.append(tail_probability(score, len(program.draws.varying), samples=samples // looks, rng=rng))
@@ -94,12 +98,14 @@ def tails(
 class _Engine:
     """The engine on normal scores of contributors, and how many of each status it has seen."""
 
-    def __init__(self, program: Program, *, done: int, total: int, progress: Callable[[int, int], None] | None) -> None:
-        self._program, self._done, self._total, self._progress = program, done, total, progress
+    def __init__(
+        self, program: Program, blocks: MapBlocks, *, done: int, total: int, progress: Callable[[int, int], None] | None
+    ) -> None:
+        self._program, self._blocks, self._done, self._total, self._progress = program, blocks, done, total, progress
         self.statuses = np.zeros(len(words.STATUS_MEANINGS), dtype=int)
 
-    def __call__(self, u: np.ndarray) -> Iterator[Block]:
-        """Blocks of realizations u (n, d)."""
+    def __call__(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Measures (n, state, measure) and statuses (n,) of realizations u (n, d)."""
         place = {label: k for k, label in enumerate(self._program.draws.varying)}
 
         def numbers(label: str) -> np.ndarray:
@@ -113,11 +119,12 @@ class _Engine:
             return np.full(len(u), 0.5)
 
         draws = GivenDraws(self._program.draws.made_of(numbers, len(u)))
-        for block in simulate_blocks(self._program, samples=len(u), seed=0, draws=draws):
-            self.statuses += np.bincount(block.status, minlength=len(self.statuses))
-            yield block
+        found = list(self._blocks(outcomes, self._program, samples=len(u), seed=0, draws=draws))
+        measured, status = (np.concatenate(every) for every in zip(*found, strict=True))
+        self.statuses += np.bincount(status, minlength=len(self.statuses))
         if self._progress:
             self._progress(min(self._done + int(self.statuses.sum()), self._total), self._total)
+        return measured, status
 
 
 Event = Callable[[_Engine], tuple[Score, int]]  # its score, and how many realizations one takes
@@ -135,7 +142,8 @@ def _events(program: Program) -> Iterator[tuple[str, Event]]:
 def _outside(measure: int, lower: float, upper: float) -> Event:
     def event(engine: _Engine) -> tuple[Score, int]:
         def score(u: np.ndarray) -> np.ndarray:
-            x: np.ndarray = np.concatenate([block.measured[:, words.CORRECTED, measure] for block in engine(u)])
+            measured, _ = engine(u)
+            x: np.ndarray = measured[:, words.CORRECTED, measure]
             return np.maximum(lower - x, x - upper)
 
         return score, 1
@@ -150,7 +158,7 @@ def _not_assemblable(engine: _Engine) -> tuple[Score, int]:
         low, high = np.zeros(len(u), dtype=int), np.full(len(u), len(INFLATIONS))
         for _ in range(LOOKS):
             middle = (low + high) // 2
-            status = np.concatenate([block.status for block in engine(INFLATIONS[middle][:, None] * u)])
+            _, status = engine(INFLATIONS[middle][:, None] * u)
             stuck = status == words.Status.NOT_ASSEMBLABLE
             low, high = np.where(stuck, low, middle + 1), np.where(stuck, middle, high)
         return 0.5 - low

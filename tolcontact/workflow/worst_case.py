@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,7 @@ from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.cluster import mapping
 from tolcontact.simulation.linear_model import linear_model
 from tolcontact.variation import GivenDraws, Region
 from tolcontact.workflow.extreme_search import Evaluation, Searcher, Searches
@@ -30,6 +32,7 @@ def worst_case(
     solver: str | None = None,
     method: Choice | None = None,
     into: str | Path | None = None,
+    client: Any = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> xr.Dataset:
     """The least and the largest value of each measure over all that drawings allow (see tolcontact.variation.region).
@@ -51,18 +54,19 @@ def worst_case(
     search; Kolda, Lewis, Torczon, 2003). `unseen` is the estimate w (w + 1) / (n (n - 1)) of w ends of the n = 12 (Boender,
     Rinnooy Kan, 1987).
     Only certified realizations count. `progress` is called with the number of searches that ended, and of all.
+    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
     With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
     statistics/worst_case; the report shows it.
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
-    program = program_of(model, solver, method)
+    blocks, program = mapping(client), program_of(model, solver, method)
     if into is not None:
         check_room_for(into, words.OF_WORST_CASE, program)
     region = Region(program.draws, seed=seed)
     if not region.varies.size:
         raise OptionError(f'nothing varies in "{program.nominal.assembly.name}"; give it tolerances first')
-    rng, evaluate, linear = np.random.default_rng(seed), Evaluation(program, region), linear_model(program)
+    rng, evaluate, linear = np.random.default_rng(seed), Evaluation(program, region, blocks), linear_model(program)
     slopes = region.slopes(linear.by_deviations)
     along = [region.exactly_farthest(sense * row) for row in slopes for sense in words.SENSES]
     starts = np.vstack([region.middle, *along, region.scattered(rng, samples)])
