@@ -12,6 +12,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, call
+from tolcontact.simulation import map_blocks
 from tolcontact.statistics.tails import tail_probability
 from tolcontact.variation.uniforms import uniform
 
@@ -83,7 +84,7 @@ def test_ra1_as_a_run_counts_it():
 def test_parts_are_led_to_where_they_do_not_go_together():
     """CASES C6, rotations alone: the least inflation of all deviations at which parts do not go together, by looking at all."""
     program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
-    engine = module._Engine(program, done=0, total=1, progress=None)
+    engine = module._Engine(program, map_blocks, done=0, total=1, progress=None)
     score, looks = module._not_assemblable(engine)
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
     every = np.stack([score_of(engine, factor * u) for factor in module.INFLATIONS])

@@ -15,6 +15,7 @@ import tolcontact as tc
 from tests import cases
 from tests.cases.fasteners import fasteners
 from tests.helpers import call
+from tolcontact.simulation import map_blocks
 from tolcontact.variation import Region
 
 module = importlib.import_module("tolcontact.workflow.worst_case")
@@ -94,7 +95,7 @@ def test_what_is_found_is_what_the_engine_says_of_the_combination():
     assert tc.worst_case(program, samples=64).equals(found)
     for state in (0, 1):
         own = found.deviations.isel(measure=0, state=state).values
-        measured = module.Evaluation(program, Region(program.draws, seed=1))(own)
+        measured = module.Evaluation(program, Region(program.draws, seed=1), map_blocks)(own)
         assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
 
 
