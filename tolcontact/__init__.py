@@ -33,7 +33,7 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | archive | `tolcontact.archive` | the netCDF file: layout, reading, resuming, checksums |
 | report | `tolcontact.report` | tables, pages for a browser, notebooks |
 | draw pictures | `tolcontact.plot` | histograms, fields and assemblies for papers and slides |
-| all of it | `tolcontact.workflow` | `run`, `build`, `check`, `compare`, `summarize` from Python |
+| all of it | `tolcontact.workflow` | `run`, `build`, `check`, `simulate`, `compare`, `summarize` from Python |
 | all of it | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
 `python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.
@@ -48,7 +48,8 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
-| run | `run`, `build`, `check`, `check_population`, `compare`, `simulate_blocks`, `main`, `command_line`; `Method`, `Program` |
+| run | `run`, `build`, `check`, `check_population`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
+| commands | `main`, `command_line` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
 | ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |

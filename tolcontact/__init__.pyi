@@ -62,6 +62,8 @@ from .workflow import (
     relocate,
     run,
     sensitivities,
+    simulate,
+    study,
     summarize,
     tails,
     worst_case,
@@ -75,6 +77,6 @@ __all__ = [
     "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "allocate", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
-    "plot", "relocate", "run", "sensitivities", "simulate_blocks", "summarize", "tails", "three_two_one", "worst_case",
-    "write_model",
+    "plot", "relocate", "run", "sensitivities", "simulate", "simulate_blocks", "study", "summarize", "tails", "three_two_one",
+    "worst_case", "write_model",
 ]  # fmt: skip

@@ -119,7 +119,8 @@ arguments are numbers.
 """
 
 from tolcontact.archive.analyses import check_room_for, keep
-from tolcontact.archive.header import Run
+from tolcontact.archive.header import Run, run_settings
+from tolcontact.archive.labelled import labelled
 from tolcontact.archive.reader import model_of, open_archive, opened
 from tolcontact.archive.room import bytes_of_rows, size_in_words
 from tolcontact.archive.rows import check_rows
@@ -134,9 +135,11 @@ __all__ = [
     "check_room_for",
     "check_rows",
     "keep",
+    "labelled",
     "model_of",
     "open_archive",
     "opened",
+    "run_settings",
     "size_in_words",
     "stored",
     "taken",

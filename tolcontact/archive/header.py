@@ -113,14 +113,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
 
 def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
     """Dimensions of the root, and what their places are called."""
-    labels = {
-        words.STATE: words.STATES,
-        words.PART: [part.name for part in nominal.parts],
-        words.PAIR: [pair.name for pair in nominal.pairs],
-        words.MEASURE: [measure.name for measure in nominal.measures],
-        words.AXIS: words.AXES,
-        words.BODY_AXIS: words.AXES,
-    }
+    labels = labels_of_rows(nominal)
     file.createDimension(words.REALIZATION, None)
     for name, values in labels.items():
         file.createDimension(name, len(values))
@@ -131,12 +124,34 @@ def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
             define(file, coordinate)
 
 
+def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
+    """What the places along the dimensions of rows are called."""
+    return {
+        words.STATE: words.STATES,
+        words.PART: [part.name for part in nominal.parts],
+        words.PAIR: [pair.name for pair in nominal.pairs],
+        words.MEASURE: [measure.name for measure in nominal.measures],
+        words.AXIS: words.AXES,
+        words.BODY_AXIS: words.AXES,
+    }
+
+
+def units_of_rows(program: Program) -> dict[Variable, str]:
+    """Units that depend on the model; those of measures are "1" if they differ."""
+    units = {measure.units for measure in program.nominal.measures} or {"mm"}
+    return {
+        words.REACTION: program.method.minimizes.reaction_units,
+        words.MEASURED: units.pop() if len(units) == 1 else "1",
+    }
+
+
 def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Variable]) -> None:
     """The variables of realizations, their checksums, and the places of checkpoints; all without values yet."""
     for variable in words.ROWS:
         if variable in rows:
             define(file, variable)
-    file[words.REACTION.name].units = program.method.minimizes.reaction_units
+    for variable, units in units_of_rows(program).items():
+        file[variable.name].units = units
     file.createDimension(words.BLOCK, None)
     file.createDimension(words.ROW_VARIABLE, len(rows))
     write(file, words.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
@@ -147,9 +162,6 @@ def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Variable
 
 def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     measures = program.nominal.measures
-    units = [measure.units for measure in measures]
-    if set(units) != {"mm"}:
-        file[words.MEASURED.name].units = "1" if len(set(units)) > 1 else units[0]
     write(file, words.MEASURE_NOMINAL, program.nominal_measures)
     write(file, words.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
@@ -157,7 +169,7 @@ def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     write(file, words.LOWER_LIMIT, bounds[:, 0])
     write(file, words.UPPER_LIMIT, bounds[:, 1])
     write(file, words.QUANTITY, [measure.quantity for measure in measures])
-    write(file, words.MEASURE_UNITS, units)
+    write(file, words.MEASURE_UNITS, [measure.units for measure in measures])
 
 
 def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:

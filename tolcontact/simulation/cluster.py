@@ -100,7 +100,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
     """The client of so many new processes on this machine, with one thread each; they end with it, however it ends."""
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise OptionError(f"workers is {workers!r}; expected a whole number, at least 1")
-    with _dask():
+    with needs_dask():
         started = distributed.LocalCluster
         usual = dask.config.get("distributed.nanny.pre-spawn-environ")
     # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
@@ -123,7 +123,7 @@ def _say_where(client: Any) -> None:
 @contextmanager
 def running_cluster(address: str) -> Iterator[Any]:
     """The client of the scheduler at an address, such as tcp://10.0.0.1:8786."""
-    with _dask():
+    with needs_dask():
         try:
             client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
         except (OSError, ValueError) as error:
@@ -134,11 +134,12 @@ def running_cluster(address: str) -> Iterator[Any]:
 
 
 @contextmanager
-def _dask() -> Iterator[None]:
+def needs_dask() -> Iterator[None]:
+    """Raise OptionError where it turns out not to be installed."""
     try:
         yield
     except ImportError as error:
-        raise OptionError("workers need dask; install it with: pip install 'tolcontact[dask]'") from error
+        raise OptionError("this needs dask; install it with: pip install 'tolcontact[dask]'") from error
 
 
 def mapping(client: Any) -> MapBlocks:
@@ -204,7 +205,7 @@ class _Model:
 
 
 def pack_model(program: Program) -> Packed:
-    """What `compile_program` makes a program of."""
+    """What a program can be compiled from."""
     return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
 
 
@@ -344,13 +345,13 @@ def _made(token: str, make: Callable[[], Any]) -> Any:
         return _ready[token]
 
 
-def _program(model: bytes, token: str) -> Program:
-    """Compiled once, and kept."""
-    return _made(token, lambda: compile_program(*pickle.loads(model)))  # type: ignore[no-any-return]
+def packed_program(model: Packed, make: Callable[[], Program] | None = None) -> Program:
+    """Compiled, or made otherwise, once in each process."""
+    return _made(model.token, make or (lambda: compile_program(*pickle.loads(model.data))))  # type: ignore[no-any-return]
 
 
 def _get_ready(model: bytes, token: str, job: bytes) -> None:
-    _program(model, token)
+    packed_program(Packed(model, token))
     pickle.loads(job)
 
 
@@ -364,7 +365,7 @@ def simulate_shard(
         except PackageNotFoundError:
             here = NOWHERE
         _refuse(f"on {platform.node()}, process {os.getpid()},", library, here, expected)
-    program = _program(model, tokens[0])
+    program = packed_program(Packed(model, tokens[0]))
     draws, function = _made(tokens[1], lambda: pickle.loads(job))
     began = time.perf_counter()
     found = list(map_blocks(function, program, samples=stop, seed=seed, start=start, threads=1, draws=draws))

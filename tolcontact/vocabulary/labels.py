@@ -18,7 +18,7 @@ BLOCK, ROW_VARIABLE = "block", "row_variable"
 FIRST_ROWS = 12 * 4096  # realizations that a new archive has room for at first
 BLOCK_ROWS = 4096  # realizations of a block at most: they are simulated together, and have a checksum of their own
 PIECE_ROWS = 24 * BLOCK_ROWS  # realizations that are read at once
-SOLVER, RUN, STATUS_MEANING, EXTENT = "solver", "run", "status_meaning", "extent"
+SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status_meaning", "extent"
 BOUNDS = ("lower", "upper")
 MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
 REPLICATE = 256  # realizations that the last two draw together, independent of all others

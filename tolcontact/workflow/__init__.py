@@ -35,6 +35,28 @@ a `tc.Program` has its solver and method already, and `resume` needs the name of
 
 `progress` is called with the number of finished realizations. Ctrl-C leaves an archive that can be read and resumed.
 
+`tc.simulate` gives the realizations of `tc.run` as a lazy dataset (it needs the extra `dask`): nothing is simulated before it
+is asked for, chunk by chunk, by threads here or on the workers of a client of `dask.distributed`. So `to_netcdf`, `to_zarr`
+and what xarray computes need no more memory than some chunks. Deviations may be one's own, such as measured ones.
+
+>>> lazy = tc.simulate(assembly, 100_000, solver="daqp")
+>>> lazy.measured.dims, lazy.measured.chunksizes["realization"][0]
+(('realization', 'state', 'measure'), 32768)
+>>> lazy.measured.std("realization").sel(measure="height").round(2).values.tolist()  # raw, corrected
+[0.17, 0.05]
+>>> raised = 0 * lazy.deviation[:1] + 0.5  # all locators of the block, by 0.5 mm
+>>> tc.simulate(assembly, raised).measured.sel(measure="height").round(6).values.tolist()
+[[0.5, 0.5]]
+
+`tc.study` puts designs side by side: models, seeds and methods, along the dimension `design`, as one such dataset.
+
+>>> designs = tc.study({"stand": assembly}, 1000, seeds=[1, 2], methods=[{"resolution": "linearized"}, {"resolution": "exact"}])
+>>> designs.design.values.tolist()[:2]
+['stand, linearized, seed 1', 'stand, linearized, seed 2']
+>>> spreads = designs.measured.sel(state="raw").std("realization")  # one graph, which workers may share
+>>> bool((spreads.groupby("seed").std() < 1e-12).all())  # the raw state does not know how contact is resolved
+True
+
 `tc.compare` runs several solvers or methods on the same draws, and reports agreement, failures, residuals and time.
 Differences are from the first one, in the corrected state, over the realizations that both certified.
 
@@ -135,11 +157,13 @@ from tolcontact.workflow.population import check_population
 from tolcontact.workflow.relocate import relocate
 from tolcontact.workflow.run import build, check, run, summarize
 from tolcontact.workflow.sensitivities import sensitivities
+from tolcontact.workflow.simulate import simulate
+from tolcontact.workflow.study import study
 from tolcontact.workflow.tails import tails
 from tolcontact.workflow.worst_case import worst_case
 from tolcontact.workflow.written import write_model
 
 __all__ = [
     "accessor", "allocate", "build", "check", "check_population", "compare", "compare_runs", "contributions",
-    "open_archive", "relocate", "run", "sensitivities", "summarize", "tails", "worst_case", "write_model",
+    "open_archive", "relocate", "run", "sensitivities", "simulate", "study", "summarize", "tails", "worst_case", "write_model",
 ]  # fmt: skip

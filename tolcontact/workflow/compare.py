@@ -69,7 +69,7 @@ def compare(
         *(_row(_simulated(each, blocks, samples, seed), first, corners) for each in programs[1:]),
     ]
     labels = {
-        words.SOLVER: [" ".join([solver, *_apart(method, resolved_by)]) for solver, method in contestants],
+        words.SOLVER: [" ".join([solver, *told_apart(method, resolved_by)]) for solver, method in contestants],
         words.STATUS_MEANING: list(words.STATUS_MEANINGS),
         words.EXTENT: list(QUANTILES),
     }
@@ -107,7 +107,7 @@ def _compared(block: Block) -> tuple[np.ndarray, ...]:
     return block.status, block.kkt_residual, *(values[:, CORRECTED].copy() for values in states)
 
 
-def _apart(method: Method, methods: Sequence[Method]) -> list[str]:
+def told_apart(method: Method, methods: Sequence[Method]) -> list[str]:
     """What distinguishes a method from the others."""
     names = [field.name for field in fields(Method) if len({getattr(each, field.name) for each in methods}) > 1]
     return [_said(name, getattr(method, name)) for name in names]
