@@ -1,9 +1,9 @@
-"""Functions that CasADi interprets at first, and that are compiled once it pays."""
+"""Functions that CasADi interprets at first, and that are compiled once it pays; or at once, by code of earlier processes."""
 
 import contextlib
 import math
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import casadi as ca
 import numpy as np
@@ -27,24 +27,28 @@ class AdaptiveFunction:
         self._interpreted = InterpretedFunction(function)
         self._native: NativeFunction | None = None
         self._left = ENOUGH if function.n_instructions() <= LARGEST else math.inf
+        self._is_new = True
         self._lock = threading.Lock()
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if self._native is None and self._is_due(len(inputs[0])):
+        if self._native is None and (make := self._due(len(inputs[0]))):
             # Whatever LLVM cannot do on this machine CasADi can.
             with contextlib.suppress(UnknownInstructionError, RuntimeError):
-                self._native = NativeFunction(self._function)  # other threads go on interpreting meanwhile
+                self._native = make(self._function)  # other threads go on interpreting meanwhile
         if self._native is not None:
             return self._native(inputs)
         with self._lock:
             return self._interpreted(inputs)[0]
 
-    def _is_due(self, count: int) -> bool:
-        """Whether the caller should compile the Function now, who is about to evaluate it `count` times: one of all callers."""
+    def _due(self, count: int) -> Callable[[ca.Function], NativeFunction | None] | None:
+        """How the caller, who is about to evaluate the Function `count` times, should try to get machine code: one of all."""
         with self._lock:
             self._left -= count
-            due = self._left < 0
-            if due:
-                self._left = math.inf
-            return due
+            if self._is_new and self._left < math.inf:
+                self._is_new = False
+                return NativeFunction.kept
+            if self._left >= 0:
+                return None
+            self._left = math.inf
+            return NativeFunction

@@ -6,11 +6,17 @@ that the results are the same to the last bit.
 """
 
 import ctypes
+import functools
+import hashlib
 from collections.abc import Callable, Sequence
+from importlib.metadata import version
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
 from llvmlite import binding, ir
+
+from tolcontact.compilation.functions import kept_code
 
 LANES = 4
 _INDEX = ir.IntType(64)
@@ -25,13 +31,23 @@ class UnknownInstructionError(Exception):
 class NativeFunction:
     """A compiled Function, called for many realizations at once: `inputs` and results are (realization, stored entry)."""
 
-    def __init__(self, function: ca.Function) -> None:
+    def __init__(self, function: ca.Function, code: bytes | None = None) -> None:
+        """From machine code that was kept of the same Function, or compiled, and then kept.
+
+        Raises UnknownInstructionError for a Function that cannot be compiled.
+        """
         self.sizes_in = [function.nnz_in(i) for i in range(function.n_in())]
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
-        self._engine = _engine(_module(function))
+        self._engine = _loaded(code) if code else _compiled(_module(function), key_of(function))
         address = self._engine.get_function_address("evaluate")
         pointers = ctypes.POINTER(ctypes.c_void_p)
         self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointers, pointers)(address)
+
+    @classmethod
+    def kept(cls, function: ca.Function) -> "NativeFunction | None":
+        """From code that an earlier process left; None if there is none."""
+        code = kept_code.kept(key_of(function))
+        return None if code is None else cls(function, code)
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         count = len(inputs[0])
@@ -160,14 +176,39 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
 }
 
 
-def _engine(module: ir.Module) -> binding.ExecutionEngine:
+def key_of(function: ca.Function) -> str:
+    """What tells the machine code of a Function from all other code."""
+    return hashlib.blake2b(function.serialize().encode() + _surroundings(), digest_size=20).hexdigest()
+
+
+@functools.cache
+def _surroundings() -> bytes:
+    """What machine code depends on, besides the Function: the processor, the libraries, and how it is translated."""
+    translation = Path(__file__).read_bytes()
+    features = binding.get_host_cpu_features().flatten()
+    known = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
+    return "\n".join(known).encode() + translation
+
+
+def _compiled(module: ir.Module, key: str) -> binding.ExecutionEngine:
+    engine = _engine(str(module))
+    engine.set_object_cache(notify_func=lambda _, code: kept_code.keep(key, code))
+    engine.finalize_object()
+    return engine
+
+
+def _loaded(code: bytes) -> binding.ExecutionEngine:
+    engine = _engine("")
+    engine.add_object_file(binding.ObjectFileRef.from_data(code))
+    engine.finalize_object()
+    return engine
+
+
+def _engine(module: str) -> binding.ExecutionEngine:
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
-    parsed = binding.parse_assembly(str(module))
     # More optimization would take as long again, for code that is no faster.
     target = binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=1
     )
-    engine = binding.create_mcjit_compiler(parsed, target)
-    engine.finalize_object()
-    return engine
+    return binding.create_mcjit_compiler(binding.parse_assembly(module), target)
