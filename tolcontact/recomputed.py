@@ -206,16 +206,24 @@ class ArchivedPair:
             apart = np.einsum("...ij,...j->...i", turn, t_m - t_r)
             grown = (of_moving[:, None], of_reference[:, None])
             return np.stack([point.gaps(turn @ R_m, apart, *grown) for point in self.round], axis=-1)
-        moving = self.moving_point @ R_m.swapaxes(-1, -2) + t_m[..., None, :]
-        reference = self.reference_point @ R_r.swapaxes(-1, -2) + t_r[..., None, :]
-        normal = self.normal @ R_r.swapaxes(-1, -2)
-        gaps = ((moving - reference) * normal).sum(axis=-1) / np.linalg.norm(normal, axis=-1)
+        # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
+        back, n = R_r.swapaxes(-1, -2), self.normal
+        apart = np.einsum("...ij,...j->...i", np.broadcast_to(back, R_m.shape), t_m - t_r)
+        from_moving = _products(back @ R_m, n, self.moving_point) + apart @ n.T
+        from_reference, length = (_products(back @ R_r, n, of) for of in (self.reference_point, n))
+        gaps = (from_moving - from_reference) / np.sqrt(length)
         if self.facing is not None:
             gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
         supports = self.locators >= 0
         if supports.any():
             gaps[..., supports] -= self.faces.held(self.locators[supports], drawn)[:, None]
         return np.asarray(gaps)
+
+
+def _products(matrix: np.ndarray, left: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """left . matrix right (..., point) of matrices (..., 3, 3) and two vectors (point, 3)."""
+    of_entries = left[:, :, None] * right[:, None, :]
+    return np.asarray(matrix.reshape(*matrix.shape[:-2], 9) @ of_entries.reshape(-1, 9).T)
 
 
 def _pose(rows: Rows, some: slice, part: int) -> tuple[np.ndarray, np.ndarray]:

@@ -55,7 +55,10 @@ def touching(results: xr.DataTree) -> xr.Dataset:
 
     The attribute `realizations` is their number; 0 if the archive has no poses (or, where they matter, no deviations).
     """
-    rows = {str(name): of for name, of in results.to_dataset().data_vars.items()}
+    rows = {
+        str(name): of.isel({words.STATE: [words.CORRECTED]} if words.STATE in of.dims else {})
+        for name, of in results.to_dataset().data_vars.items()
+    }
     rows |= {str(name): of for name, of in results["sample"].to_dataset().data_vars.items()}
     contact, names = results["contact"].to_dataset(), results.to_dataset()[words.PAIR].values
     of_point, points = np.zeros(0, dtype=int), np.zeros((0, len(words.AXES)))  # of a model without contact
