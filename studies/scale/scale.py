@@ -22,7 +22,7 @@ import psutil
 import xarray as xr
 
 import tolcontact as tc
-from models import ra1, ra2
+from models import cells, ra1, ra2
 from tolcontact.simulation.cluster import AHEAD, MOST_ROWS, local_cluster
 
 VARYING = ("summed_rows", "sums", "sums_checksum")
@@ -36,10 +36,11 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=20)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        for model in (ra1, ra2):
-            costs = throughput(model, given.samples, Path(folder) / "run.nc")
+        for model, slower in ((ra1, 1), (ra2, 1), (cells, 20)):
+            costs = throughput(model, given.samples // slower, Path(folder) / "run.nc")
             if model is ra2:
                 large(costs)
+        memory(10 * given.samples, Path(folder) / "run.nc")
         kills(given.kills, given.kills // 2, Path(folder))
 
 
@@ -66,12 +67,32 @@ def throughput(model, samples, path):
             tc.run(program, samples=samples, client=client, **options).close()
             rates[workers] = samples / (time.perf_counter() - began)
             spent[workers] = (processor_times() - own) / samples
+            began = time.perf_counter()
+            tc.simulate(program, samples).to_zarr(path.with_suffix(".zarr"), mode="w")
+            apart = samples / (time.perf_counter() - began)
         print(
             f"  {workers} workers: {rates[workers]:,.0f} a second; cluster up in {started:.1f} s, first 5000 in {first:.1f} s; "
-            f"processor time of one: writer {spent[workers][0] * 1e6:.1f} us, workers {spent[workers][1] * 1e6:.1f} us"
+            f"processor time of one: writer {spent[workers][0] * 1e6:.1f} us, workers {spent[workers][1] * 1e6:.1f} us; "
+            f"to zarr, without a writer, {apart:,.0f} a second"
         )
     print(f"  two workers to one {rates[2] / rates[1]:.2f}, to two threads {rates[2] / threads:.2f}")
     return spent[1][1], spent[1][0], size
+
+
+def memory(samples, path):
+    """Of client and workers [MB], from a tenth of a long run on."""
+    program, own, seen = tc.build(ra1.assembly, solver="daqp"), psutil.Process(), []
+
+    def look(rows):
+        if rows >= samples // 10 * (len(seen) + 1):
+            seen.append([each.memory_info().rss for each in (own, *sorted(own.children(recursive=True), key=lambda p: p.pid))])
+
+    with local_cluster(2) as client:
+        options = {"keep": "measures", "surfaces": 0, "fields": "none", "overwrite": True}
+        tc.run(program, samples=samples, out=path, client=client, progress=look, **options).close()
+    low, high = np.min(seen, axis=0) / 1e6, np.max(seen, axis=0) / 1e6
+    print(f"\nmemory over {samples:.0e} realizations of RA1, of the client and its processes [MB]:")
+    print("  " + ", ".join(f"{one:.0f} to {other:.0f}" for one, other in zip(low, high, strict=True)))
 
 
 def processor_times():

@@ -52,8 +52,8 @@ workers. Give workers of your own `DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__M
 own value they take half as long again (those of `--workers` have it). What a cluster costs and what limits it is in
 `studies/scale`. Workers run Python code that clients send: a scheduler belongs in a network that one trusts.
 
-`tc.simulate` and `tc.study` (see `tolcontact.workflow`) give realizations to dask as arrays: workers then write
-what they simulate themselves (`to_zarr`), which no single writer limits.
+`tc.simulate` and `tc.study` (see `tolcontact.workflow`) make lazy datasets of realizations, for dask to compute: workers then
+write themselves what they simulate (`to_zarr`), and no single writer limits them.
 
 All analyses take a `client` as well, and `--workers` or `--scheduler` on the command line. What searches try at once
 (`worst_case`, `tails`, `allocate`, `relocate`) is some hundred realizations: workers gain where one of them takes a millisecond

@@ -52,6 +52,7 @@ class Packed:
 
     data: bytes
     token: str
+    versions: dict[str, str]
 
     @classmethod
     def of(cls, thing: Any, nominal: Nominal) -> "Packed":
@@ -63,7 +64,7 @@ class Packed:
                 f'model "{nominal.assembly.name}" cannot be sent to workers: {error}; '
                 "let its measures use nothing but numbers and functions"
             ) from error
-        return cls(data, hashlib.blake2b(data).hexdigest())
+        return cls(data, hashlib.blake2b(data).hexdigest(), versions())
 
 
 @contextmanager
@@ -184,7 +185,7 @@ class Workers:
     def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
         """Have all workers that are there import and compile what they need, which else takes their first shard longer."""
         model, job = self._sent(program).packed, Packed.of(function, program.nominal)
-        self._client.run(_get_ready, model.data, model.token, job.data)
+        self._client.run(_get_ready, model, job.data)
 
     def _sent(self, program: Program) -> "_Model":
         if self._model is None or self._model.program is not program:
@@ -241,7 +242,6 @@ class _Shards:
     def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int) -> None:
         self._client, self._model, self._job = client, model, job
         self._seed, self._samples, self._block = seed, samples, block
-        self._versions = versions()
         self._blocks = 1  # of the next shard
         self._begun: deque[tuple[int, int, Any]] = deque()
         self._send_job()
@@ -309,7 +309,7 @@ class _Shards:
             self._model.sent,
             self._sent,
             (self._model.packed.token, self._job.token),
-            self._versions,
+            self._model.packed.versions,
             self._seed,
             first,
             stop,
@@ -346,12 +346,18 @@ def _made(token: str, make: Callable[[], Any]) -> Any:
 
 
 def packed_program(model: Packed, make: Callable[[], Program] | None = None) -> Program:
-    """Compiled, or made otherwise, once in each process."""
+    """Compiled, or made otherwise, once in each process. Raises ClusterError if that has other versions than who packed it."""
+    for library, expected in model.versions.items():
+        try:
+            here = version(library)
+        except PackageNotFoundError:
+            here = NOWHERE
+        _refuse(f"on {platform.node()}, process {os.getpid()},", library, here, expected)
     return _made(model.token, make or (lambda: compile_program(*pickle.loads(model.data))))  # type: ignore[no-any-return]
 
 
-def _get_ready(model: bytes, token: str, job: bytes) -> None:
-    packed_program(Packed(model, token))
+def _get_ready(model: Packed, job: bytes) -> None:
+    packed_program(model)
     pickle.loads(job)
 
 
@@ -359,13 +365,7 @@ def simulate_shard(
     model: bytes, job: bytes, tokens: tuple[str, str], versions: dict[str, str], seed: int, start: int, stop: int
 ) -> tuple[float, list[Any]]:
     """On a worker: how long a shard took [s], and what became of its blocks."""
-    for library, expected in versions.items():
-        try:
-            here = version(library)
-        except PackageNotFoundError:
-            here = NOWHERE
-        _refuse(f"on {platform.node()}, process {os.getpid()},", library, here, expected)
-    program = packed_program(Packed(model, tokens[0]))
+    program = packed_program(Packed(model, tokens[0], versions))
     draws, function = _made(tokens[1], lambda: pickle.loads(job))
     began = time.perf_counter()
     found = list(map_blocks(function, program, samples=stop, seed=seed, start=start, threads=1, draws=draws))
