@@ -104,16 +104,20 @@ def local_cluster(workers: int) -> Iterator[Any]:
     with needs_dask():
         started = distributed.LocalCluster
         usual = dask.config.get("distributed.nanny.pre-spawn-environ")
-    # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
-    environment = {name: value for name, value in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"}
-    with dask.config.set({"distributed.nanny.pre-spawn-environ": environment}):
+    settings = {
+        # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
+        "distributed.nanny.pre-spawn-environ": {name: of for name, of in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"},
+        # It gives up a worker for good that is lost and 15 s later is lost again; here all are begun again, however often.
+        "distributed.deploy.lost-worker-timeout": "1000 days",
+    }
+    with dask.config.set(settings):
         cluster = started(
             n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         )  # fmt: skip
-    with cluster, distributed.Client(cluster) as client:
-        _say_where(client)
-        yield client
+        with cluster, distributed.Client(cluster) as client:
+            _say_where(client)
+            yield client
 
 
 def _say_where(client: Any) -> None:
