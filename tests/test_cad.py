@@ -20,6 +20,7 @@ from tolcontact.discretization.analytic import Form, believed, onto
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.fitting import fitted
 from tolcontact.discretization.shape_files import BREP, SURFACES, product, reading
+from tolcontact.discretization.shape_files.reading import usual_chord
 from tolcontact.discretization.shape_files.step_text import step_text
 from tolcontact.discretization.shapes import shape
 
@@ -312,3 +313,21 @@ def test_surfaces_have_the_numbers_of_the_file(name):
         else:
             own = np.array([*form.axis, form.axis @ form.origin])
             assert min(np.abs(planes - sign * own).max(axis=1).min() for sign in (1, -1)) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("unit", "points", "chord"),
+    [
+        ("SI_UNIT(.MILLI.,.METRE.)", [(0, 0, 0), (100, 50, 10)], 0.002),
+        ("SI_UNIT(.MILLI.,.METRE.)", [(0, 0, 0), (-4.0e3, 50, 10.0)], 0.02),
+        ("SI_UNIT($,.METRE.)", [(0, 0, 0), (4, 1, 1)], 0.02),
+        ("CONVERSION_BASED_UNIT('INCH',#9)", [(0, 0, 0), (1, 200, 1)], 0.0254),
+        ("SI_UNIT(.MILLI.,.METRE.)", [], 0.002),
+        ("SI_UNIT(.MILLI.,.METRE.)", [("1e", 0, 0), (100, 50, 10)], 0.002),
+    ],
+)
+def test_triangles_are_as_fine_as_the_extent_of_a_file_asks(unit, points, chord):
+    records = [f"#{k}=CARTESIAN_POINT( 'P{k}',({','.join(map(str, at))}));" for k, at in enumerate(points * 60)]
+    records.append(f"#5001=(LENGTH_UNIT(){unit});")
+    text = step_text("\n".join(["ISO-10303-21;", *records]).encode())
+    assert usual_chord(text) == pytest.approx(chord)

@@ -38,9 +38,9 @@ class Mesh(Readable):
 
     `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m, `mesh.units`
     of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
-    2 um, and coarser if that is too many), and keep their boundary representation for `tc.Brep`; that needs the extra
-    `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number (from 1) of one, which is read in
-    its own frame; the only body of a file is read where it stands.
+    2 um, 5e-6 of the extent of files beyond 0.4 m, and coarser if that is too many), and keep their boundary representation for
+    `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number
+    (from 1) of one, which is read in its own frame; the only body of a file is read where it stands.
     """
 
     source: Any

@@ -93,13 +93,13 @@ the end of its wall, is not noticed at that pose, but afterwards (see the checks
 
 ## STEP files
 
-STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um and 0.1 rad (`tc.Mesh(file,
-chord=0.1)`: within 0.1 mm; what touches on surfaces that the file states does not depend on it), and keep their
-boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states a plane, cylinder,
-cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces that meet in a vertex come to each
-other); elsewhere they are rounded to what single precision resolves, 1e-5 mm at 100 mm and 2e-4 mm at 1 m. If that would be
-more than a million triangles, or takes too long, faces are triangulated to within 60 um and 0.5 rad instead, and a warning
-says so.
+STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um (or 5e-6 of the extent of the
+file, beyond 0.4 m) and 0.1 rad (`tc.Mesh(file, chord=0.1)`: within 0.1 mm; what touches on surfaces that the file states does
+not depend on it), and keep their boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the
+file states a plane, cylinder, cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces that
+meet in a vertex come to each other); elsewhere they are rounded to what single precision resolves, 1e-5 mm at 100 mm and 2e-4
+mm at 1 m. If that would be more than a million triangles, or takes too long, faces are triangulated 30 times as coarsely, and
+to 0.5 rad; a warning says so.
 
 An assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them, `tc.Mesh(file, body=...)` is one
 of them in the frame of its product, and `tc.parts_from(model, file)` declares all of them, or those named, as parts in their

@@ -18,6 +18,7 @@ from tolcontact.discretization.shape_files.bodies import Body, Place, Triangles,
 from tolcontact.discretization.shape_files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
+STEP_SHARE = 5e-6  # the former of larger files, in shares of their extent: more than 0.4 m
 FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
 RIGID = 1e-5  # how far a motion may stretch lengths, having passed through single precision
 OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it

@@ -32,37 +32,35 @@ class TooSlow(GeometryFault):
 
 
 @dataclass(frozen=True)
-class Request:
-    """What is asked of the reader: files, their kinds ("stl", ..., "step"), how finely STEP is cut, and the most triangles."""
+class Job:
+    """A file, its kind ("stl", ..., "step"), and how finely it is cut if it is STEP."""
 
-    files: tuple[tuple[Path, str], ...]
+    path: Path
+    kind: str
     chord: float
     angle: float
-    most: int
 
 
-def load(request: Request) -> list[dict[str, np.ndarray] | GeometryFault]:
-    """The arrays of each file, as `worker` describes them, or what is wrong with it. `count` alone: more than the most."""
+def load(jobs: Sequence[Job], most: int) -> list[dict[str, np.ndarray] | GeometryFault]:
+    """The arrays of each file, as `worker` describes them, or what is wrong with it. `count` alone: more than `most`."""
     done: list[dict[str, np.ndarray] | GeometryFault] = []
-    while len(done) < len(request.files):
-        done.extend(_by_one_process(request, request.files[len(done) :]))
+    while len(done) < len(jobs):
+        done.extend(_by_one_process(jobs[len(done) :], most))
     return done
 
 
-def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
-    """What one process makes of the first of `files`, up to the one that it fails at."""
-    allowed = [SECONDS + SECONDS_PER_MB * path.stat().st_size / 1e6 for path, _ in files]
-    jobs = {
+def _by_one_process(jobs: Sequence[Job], most: int) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
+    """What one process makes of the first of some files, up to the one that it fails at."""
+    allowed = [SECONDS + SECONDS_PER_MB * job.path.stat().st_size / 1e6 for job in jobs]
+    order = {
         "memory": MEMORY,
         "seconds": int((START + sum(allowed)) * (os.cpu_count() or 1)) + 1,
-        "chord": request.chord,
-        "angle": request.angle,
-        "most": request.most,
-        "files": [{"path": str(path.absolute()), "kind": kind} for path, kind in files],
+        "most": most,
+        "files": [{"path": str(job.path.absolute()), "kind": job.kind, "chord": job.chord, "angle": job.angle} for job in jobs],
     }
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
         folder = Path(name)
-        (folder / "jobs.json").write_text(json.dumps(jobs))
+        (folder / "jobs.json").write_text(json.dumps(order))
         with (folder / "errors").open("wb") as errors:
             try:
                 process = subprocess.Popen(
@@ -74,11 +72,11 @@ def _by_one_process(request: Request, files: Sequence[tuple[Path, str]]) -> Iter
                     env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "4"},
                 )
             except OSError as error:
-                yield from [GeometryFault(f'"{path}": its reader process cannot be started ({error})') for path, _ in files]
+                yield from [GeometryFault(f'"{job.path}": its reader process cannot be started ({error})') for job in jobs]
                 return
         try:
             _awaited(process, START, folder / "ready")
-            for k, (path, _) in enumerate(files):
+            for k, path in enumerate(job.path for job in jobs):
                 if not _awaited(process, allowed[k], folder / f"{k}.npz", folder / f"{k}.txt"):
                     kind = TooSlow if process.poll() is None else GeometryFault
                     yield kind(f'"{path}" {_end(process, folder, allowed[k])}')

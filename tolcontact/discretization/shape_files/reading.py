@@ -2,7 +2,7 @@
 
 import logging
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +18,7 @@ from tolcontact.discretization.shape_files.product import (
     BREP,
     STEP_ANGLE,
     STEP_CHORD,
+    STEP_SHARE,
     SURFACES,
     Product,
     check_numbers,
@@ -30,6 +31,10 @@ COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 
 REMEMBERED = 4  # STEP files
+IN_MM = {
+    "micrometre": 1e-3, "millimetre": 1.0, "centimetre": 10.0, "decimetre": 100.0, "metre": 1e3, "kilometre": 1e6,
+    "inch": 25.4, "foot": 304.8, "feet": 304.8,
+}  # fmt: skip
 
 log = logging.getLogger(__name__)
 
@@ -71,16 +76,15 @@ def read_files(geometries: Iterable[Box | Mesh]) -> Contents:
             texts[key] = screening.screen(key[0], MAX_TRIANGLES)
         except GeometryFault as fault:
             found[key] = fault
-    for chord in dict.fromkeys(chord for _, chord in texts):
-        for path, read_in in _loaded([path for path, asked in texts if asked == chord], chord).items():
-            key = path, chord
-            if isinstance(read_in, GeometryFault):
-                found[key] = read_in
-            elif "count" in read_in:
-                found[key] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
-            else:
-                found[key] = _content(path, read_in, texts[key])
-                _remember(states[key], found[key])
+    for key, read_in in _loaded(texts).items():
+        path, _ = key
+        if isinstance(read_in, GeometryFault):
+            found[key] = read_in
+        elif "count" in read_in:
+            found[key] = GeometryFault(screening.too_many(path, int(read_in["count"]), MAX_TRIANGLES))
+        else:
+            found[key] = _content(path, read_in, texts[key])
+            _remember(states[key], found[key])
     return found
 
 
@@ -106,20 +110,35 @@ def _remember(state: State | None, content: Content | GeometryFault) -> None:
         _known[state] = content
 
 
-def _loaded(paths: Sequence[Path], chord: float | None) -> dict[Path, dict[str, np.ndarray] | GeometryFault]:
+def _loaded(texts: Mapping[Key, StepText | None]) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
     """What the reader makes of some files. STEP files that come out too fine are cut more coarsely, unless a chord is asked."""
-    found: dict[Path, dict[str, np.ndarray] | GeometryFault] = {}
-    for coarser in COARSER if chord is None else (chord / STEP_CHORD,):
-        files = tuple((path, screening.kind(path)) for path in paths)
-        angle = min(math.sqrt(coarser) * STEP_ANGLE, LARGEST_ANGLE)
-        request = reader.Request(files, coarser * STEP_CHORD, angle, MAX_TRIANGLES)
-        found |= dict(zip(paths, reader.load(request), strict=True)) if paths else {}
-        if chord is None and coarser > 1:
-            for path in paths:
-                if not _is_too_fine(found[path]):
-                    log.warning('"%s": triangles within %g mm, since finer ones are too many', path, coarser * STEP_CHORD)
-        paths = [path for path in paths if screening.kind(path) == "step" and _is_too_fine(found[path])]
+    found: dict[Key, dict[str, np.ndarray] | GeometryFault] = {}
+    keys = list(texts)
+    for coarser in COARSER:
+        jobs = [_job(key, texts[key], coarser) for key in keys]
+        found |= dict(zip(keys, reader.load(jobs, MAX_TRIANGLES), strict=True)) if keys else {}
+        if coarser > 1:
+            for key, job in zip(keys, jobs, strict=True):
+                if not _is_too_fine(found[key]):
+                    log.warning('"%s": triangles within %.2g mm, since finer ones are too many', job.path, job.chord)
+        keys = [
+            (path, chord) for path, chord in keys if chord is None and texts[path, chord] and _is_too_fine(found[path, chord])
+        ]
     return found
+
+
+def _job(key: Key, text: StepText | None, coarser: float) -> reader.Job:
+    path, chord = key
+    if chord is None:
+        chord = coarser * (usual_chord(text) if text else STEP_CHORD)
+    else:
+        coarser = chord / STEP_CHORD
+    return reader.Job(path, screening.kind(path), chord, min(math.sqrt(coarser) * STEP_ANGLE, LARGEST_ANGLE))
+
+
+def usual_chord(text: StepText) -> float:
+    """How far triangles of a STEP file may stay off its true faces [mm], if nothing else is asked."""
+    return max(STEP_CHORD, STEP_SHARE * text.extent * IN_MM.get(text.units.removesuffix("es"), 1.0))
 
 
 def _is_too_fine(read_in: dict[str, np.ndarray] | GeometryFault) -> bool:

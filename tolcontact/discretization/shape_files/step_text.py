@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
 
+import numpy as np
+
 # Up to a semicolon that stands in no string and no comment. Possessive: no text makes it go back.
 _RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
 _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
@@ -16,6 +18,9 @@ _ENTITY = re.compile(
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
+_POINT = re.compile(
+    rb"\bCARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
+)
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
@@ -33,12 +38,14 @@ class StepText:
     """Solids in the file's order, the names of `files` that hold shapes that it refers to, and of other `documents`.
 
     units   of length, in the file's words: "millimetre", "inch"; of several those that are not of the SI; empty if not stated
+    extent  the longest side of the box that holds nearly all points (98 % along each axis), in these units; 0 if there are none
     """
 
     solids: tuple[Solid, ...]
     files: tuple[str, ...]
     documents: tuple[str, ...]
     units: str
+    extent: float
 
 
 def step_text(content: bytes) -> StepText:
@@ -71,7 +78,19 @@ def step_text(content: bytes) -> StepText:
         files,
         tuple(name for name in named if name not in files),
         next((unit for unit in units if not unit.endswith("metre")), units[0] if units else ""),
+        _extent(content),
     )
+
+
+def _extent(content: bytes) -> float:
+    """Some points may be far off: of axes, of planes that a body does not reach."""
+    numbers = np.array([corner for point in _POINT.findall(content) for corner in point], dtype="S32")
+    try:
+        points = numbers.astype(float).reshape(-1, 3)
+    except ValueError:  # damaged ones
+        return 0.0
+    found = points[np.isfinite(points).all(axis=1)]
+    return float(np.ptp(np.quantile(found, [0.01, 0.99], axis=0), axis=0).max()) if len(found) else 0.0
 
 
 def _entities(content: bytes) -> Iterator[tuple[int, bytes, bytes]]:

@@ -270,7 +270,7 @@ def work(folder: Path) -> None:
         path = Path(job["path"])
         try:
             if job["kind"] == "step":
-                arrays = read_step(path, jobs["chord"], jobs["angle"], folder)
+                arrays = read_step(path, job["chord"], job["angle"], folder)
             else:
                 arrays = read_mesh(path, job["kind"])
             count = len(arrays["faces"])
