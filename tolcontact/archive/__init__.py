@@ -81,6 +81,15 @@ direction times the displacement. `tolcontact.testing.assert_gaps_recompute` doe
 ...     print(tc.model_of(results).parts)
 (part table: box 100 x 50 x 10 mm, fixed, part block: box 50 x 25 x 10 mm at (50, 12.5, 10))
 
+Runs of one model with seeds of their own are one sample: xarray reads the rows of several archives as one dataset, lazily.
+
+>>> other = path.with_name("other.nc")
+>>> tc.run(stand, samples=200, seed=2, out=other, surfaces=16).close()
+>>> once = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "drop_variables": ["row_checksum", "summed_rows"]}
+>>> with xr.open_mfdataset([path, other], combine="nested", concat_dim="realization", **once) as both:
+...     both.sizes["realization"], both.measured.std("realization").round(2).values.ravel().tolist()
+(400, [0.17, 0.05])
+
 ## Size
 
 `keep` states what is archived of each realization: "measures" (with gaps, statuses and residuals; 75 bytes for RA1, or 75 MB a
