@@ -1,5 +1,6 @@
 """Workers of a dask cluster, as processes of their own: the same results to the last bit, whatever happens to them."""
 
+import asyncio
 import contextlib
 import os
 import random
@@ -7,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 
 import numpy as np
@@ -152,14 +154,27 @@ def test_a_worker_may_be_killed(seed, client, tmp_path):
 @pytest.mark.parametrize("seed", range(2))
 def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tmp_path):
     path, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
-    options = ["run", cases.MODELS / "ra1.py", "--solver", "daqp", "--surfaces", 4, "--samples", 150_000, "--quiet", "--out"]
+    options = [
+        "run",
+        cases.MODELS / "ra1.py",
+        "--solver",
+        "daqp",
+        "--surfaces",
+        4,
+        "--samples",
+        400_000,
+        "--keep",
+        "poses",
+        "--quiet",
+        "--out",
+    ]
     begun = subprocess.Popen(
         [*COMMAND, *map(str, [*options, path, "--workers", 2])], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
     )
     while not path.exists():
         time.sleep(0.1)
         assert begun.poll() is None
-    time.sleep(random.Random(seed).uniform(0.2, 1))
+    time.sleep(random.Random(seed).uniform(0.1, 0.7))
     children = psutil.Process(begun.pid).children(recursive=True)
     begun.send_signal(signal.SIGKILL if seed else signal.SIGINT)
     begun.wait()
@@ -199,6 +214,49 @@ def test_a_scheduler_and_workers_in_shells(dask_processes, tmp_path):
         tc.run(cases.stack(), out=path, client=own, progress=restart, **options).close()
     assert begun
     assert_same(path, whole)
+
+
+class SlowLine:
+    """Passes on what comes to a port, late and little by little."""
+
+    DELAY, RATE = 0.03, 20e6  # s, bytes/s
+
+    def __init__(self, target):
+        self.port, self._target, self.passed = free_port(), target, 0
+        threading.Thread(target=lambda: asyncio.run(self._serve()), daemon=True).start()
+
+    async def _serve(self):
+        async with await asyncio.start_server(self._connect, "127.0.0.1", self.port) as server:
+            await server.serve_forever()
+
+    async def _connect(self, reader, writer):
+        there, back = await asyncio.open_connection("127.0.0.1", self._target)
+        await asyncio.gather(self._pass_on(reader, back), self._pass_on(there, writer))
+
+    async def _pass_on(self, reader, writer):
+        with contextlib.suppress(OSError):
+            while data := await reader.read(1 << 18):
+                await asyncio.sleep(self.DELAY + len(data) / self.RATE)
+                writer.write(data)
+                await writer.drain()
+                self.passed += len(data)
+        writer.close()
+
+
+def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
+    port, own = free_port(), free_port()
+    scheduler(dask_processes, port)
+    line = SlowLine(own)
+    dask_processes(
+        "worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard", "--no-nanny",
+        "--listen-address", f"tcp://127.0.0.1:{own}", "--contact-address", f"tcp://127.0.0.1:{line.port}",
+    )  # fmt: skip
+    options = {"samples": 20_000, "solver": "daqp", "surfaces": 4}
+    tc.run(cases.stack(), out=tmp_path / "whole.nc", **options).close()
+    with running_cluster(f"tcp://127.0.0.1:{port}") as client:
+        tc.run(cases.stack(), out=tmp_path / "run.nc", client=client, **options).close()
+    assert line.passed > 10e6
+    assert_same(tmp_path / "run.nc", tmp_path / "whole.nc")
 
 
 def test_a_run_that_all_workers_left_ends(dask_processes, tmp_path, monkeypatch):

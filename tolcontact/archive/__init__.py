@@ -85,8 +85,9 @@ Runs of one model with seeds of their own are one sample: xarray reads the rows 
 
 >>> other = path.with_name("other.nc")
 >>> tc.run(stand, samples=200, seed=2, out=other, surfaces=16).close()
->>> once = {"data_vars": "minimal", "coords": "minimal", "compat": "override", "drop_variables": ["row_checksum", "summed_rows"]}
->>> with xr.open_mfdataset([path, other], combine="nested", concat_dim="realization", **once) as both:
+>>> once = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
+>>> rows = {"combine": "nested", "concat_dim": "realization", "drop_variables": ["row_checksum", "summed_rows"], **once}
+>>> with xr.open_mfdataset([path, other], **rows) as both:
 ...     both.sizes["realization"], both.measured.std("realization").round(2).values.ravel().tolist()
 (400, [0.17, 0.05])
 

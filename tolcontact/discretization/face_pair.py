@@ -36,14 +36,15 @@ class Side:
     def depth(self, points: np.ndarray) -> np.ndarray:
         """How deep `points` (point, 3) [mm] lie behind the face, in the body; outside, and beside it, at most ROUNDED.
 
-        Distance to the face [mm]. Of a body that is not closed whatever is behind the face is inside.
+        Distance to the face [mm]; 0 where a flat face is less than ROUNDED away, as most points of faces that touch are. Of a
+        body that is not closed whatever is behind the face is inside.
         """
         depth = np.zeros(len(points))
         lower, upper = self.body.bounds
         near = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
         if self._plane is not None:
             n, height = self._plane
-            near = near[points[near] @ n < height]
+            near = near[points[near] @ n < height - ROUNDED]
         if near.size:
             depth[near] = self.face.depth(points[near])
             near = near[depth[near] > 0]

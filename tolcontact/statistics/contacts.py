@@ -77,7 +77,8 @@ def touching(results: xr.DataTree) -> xr.Dataset:
             for start in range(0, some.stop, step):
                 part = slice(start, min(start + step, some.stop))
                 hits += (pair.gaps(rows, part)[:, -1] < TOUCHES)[~searched[part]].sum(axis=0)
-            values[places] = [intervals.share_of(int(k), count) for k in hits]
+            known, which = np.unique(hits, return_inverse=True)
+            values[places] = np.array([intervals.share_of(int(k), count) for k in known])[which]
     except NotKeptError:
         count = 0
     return xr.Dataset(
