@@ -18,7 +18,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, call
+from tests.helpers import COMMAND, call, start
 from tolcontact.errors import ClusterError
 from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import local_cluster, running_cluster
@@ -168,9 +168,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
         "--quiet",
         "--out",
     ]
-    begun = subprocess.Popen(
-        [*COMMAND, *map(str, [*options, path, "--workers", 2])], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL
-    )
+    begun = start([*COMMAND, *map(str, [*options, path, "--workers", 2])], stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     while not path.exists():
         time.sleep(0.1)
         assert begun.poll() is None
