@@ -76,6 +76,7 @@ def test_deviations_of_ones_own():
     [
         (np.zeros((5, 3)), "deviations are of 3 contributors; expected 12: base.A1, base.A2"),
         (np.full((5, 12), "x"), "deviations are <U1; expected numbers"),
+        (np.zeros((0, 12)), "deviations are of no realization"),
         (np.zeros((5, 12, 1)), "deviations have the dimensions realization, contributor, other; expected realization and"),
     ],
 )
@@ -83,6 +84,12 @@ def test_deviations_that_cannot_be_used(given, said):
     array = xr.DataArray(given, dims=("realization", "contributor", "other")[: given.ndim])
     with pytest.raises(tc.OptionError, match=said):
         tc.simulate(cases.ra1(), array)
+
+
+def test_what_is_no_number_of_realizations():
+    for wrong in (np.zeros((5, 12)), "5", 5.0):
+        with pytest.raises(tc.OptionError, match=f"samples is a {type(wrong).__name__}; expected a number of realizations, or"):
+            tc.simulate(cases.ra1(), wrong)
 
 
 def test_deviations_of_unknown_or_repeated_contributors():
@@ -95,7 +102,7 @@ def test_deviations_of_unknown_or_repeated_contributors():
 
 def test_without_dask_the_message_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "dask.array", None)
-    with pytest.raises(tc.OptionError, match=r"needs dask; install it with: pip install 'tolcontact\[dask\]'"):
+    with pytest.raises(tc.OptionError, match=r"need dask; install it with: pip install 'tolcontact\[dask\]'"):
         tc.simulate(cases.ra1(), 100)
 
 
@@ -149,6 +156,7 @@ def test_studies_that_cannot_be():
         ([], {}, "models are none; name at least one"),
         ([cases.ra1(), cases.ra1()], {}, 'several models are called "RA1"'),
         ([cases.ra1()], {"seeds": [1, 1]}, 'the design "RA1, seed 1" is given twice'),
+        ([cases.ra1()], {"methods": "exact"}, "method is 'exact'; expected a tc.Method, or some of its choices"),
         ([tc.build(cases.ra1())], {"solver": "daqp"}, "a Program has its solver and method"),
     ):
         with pytest.raises(tc.OptionError, match=said):

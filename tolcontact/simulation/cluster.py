@@ -144,7 +144,7 @@ def needs_dask() -> Iterator[None]:
     try:
         yield
     except ImportError as error:
-        raise OptionError("this needs dask; install it with: pip install 'tolcontact[dask]'") from error
+        raise OptionError("workers and lazy datasets need dask; install it with: pip install 'tolcontact[dask]'") from error
 
 
 def mapping(client: Any) -> MapBlocks:

@@ -70,6 +70,8 @@ def chosen(assembly: Assembly, method: Choice | None) -> Method:
     own = assembly.method or Method()
     if method is None or isinstance(method, Method):
         return method or own
+    if not isinstance(method, Mapping):
+        raise OptionError(f'method is {method!r}; expected a tc.Method, or some of its choices: {{"resolution": "exact"}}')
     known = [field.name for field in fields(Method)]
     for word in method:
         if word not in known:

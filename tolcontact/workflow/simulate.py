@@ -39,6 +39,11 @@ def simulate(
     check_counts(seed=seed)
     if isinstance(samples, xr.DataArray):
         deviations = _given(samples, program)
+    elif not isinstance(samples, int):
+        raise OptionError(
+            f"samples is a {type(samples).__name__}; expected a number of realizations, or their deviations as an "
+            f"xarray.DataArray ({words.REALIZATION}, {words.CONTRIBUTOR})"
+        )
     else:
         check_counts(samples=samples)
         deviations = lazy_draws(program, samples, seed)
@@ -111,6 +116,8 @@ def _given(deviations: xr.DataArray, program: Program) -> Any:
         raise OptionError(
             f"deviations are of {deviations.sizes[words.CONTRIBUTOR]} contributors; expected {len(known)}: {', '.join(known)}"
         )
+    if not deviations.sizes[words.REALIZATION]:
+        raise OptionError("deviations are of no realization; expected one or more")
     if deviations.dtype.kind not in "fiu":
         raise OptionError(f"deviations are {deviations.dtype}; expected numbers")
     found, array = deviations.transpose(words.REALIZATION, words.CONTRIBUTOR).astype(float).data, dask_arrays()

@@ -30,7 +30,7 @@ def study(
     not have, such as a pair of another one, is not a number there; of whole numbers, 0.
     Raises ModelError, OptionError for options that cannot be used, or for models of the same name.
     """
-    chosen = methods if isinstance(methods, Sequence) else [methods]
+    chosen = methods if isinstance(methods, Sequence) and not isinstance(methods, str) else [methods]
     drawn = [seeds] if isinstance(seeds, int) else seeds
     for word, given in {"models": models, "seeds": drawn, "methods": chosen}.items():
         if not len(given):
