@@ -109,6 +109,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
         "distributed.nanny.pre-spawn-environ": {name: of for name, of in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"},
         # It gives up a worker for good that is lost and 15 s later is lost again; here all are begun again, however often.
         "distributed.deploy.lost-worker-timeout": "1000 days",
+        "distributed.worker.profile.enabled": False,  # which takes a twentieth of their time
     }
     with dask.config.set(settings):
         cluster = started(
