@@ -10,6 +10,7 @@ import subprocess
 import sys
 import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import psutil
@@ -325,3 +326,27 @@ def test_memory_of_the_client_does_not_grow(client):
         if rows in (60, 120):
             rss.append(own.memory_info().rss)
     assert rss[1] - rss[0] < 100e6
+
+
+class LastMoment:
+    """A future that ends when one has just stopped waiting for it."""
+
+    def __init__(self, end):
+        self.status, self._end, self._asked = "pending", end, 0
+
+    def result(self, timeout=None):
+        self._asked += 1
+        if self._asked == 1:
+            self.status = "error" if isinstance(self._end, Exception) else "finished"
+            raise TimeoutError
+        if self.status == "error":
+            raise self._end
+        return self._end
+
+
+def test_a_shard_may_end_when_one_has_just_stopped_waiting():
+    shards = object.__new__(cluster._Shards)
+    shards._client = SimpleNamespace(nthreads=lambda: {"worker": 1})
+    assert shards._result(LastMoment(7)) == 7
+    with pytest.raises(TimeoutError, match="of its own"):
+        shards._result(LastMoment(TimeoutError("of its own")))

@@ -290,8 +290,8 @@ class _Shards:
             try:
                 return future.result(timeout=ANSWER)
             except TimeoutError:
-                if future.done():
-                    raise  # it is what the shard raised
+                if future.status == "error":
+                    return future.result()  # which raises what the shard raised
                 if self._client.nthreads():
                     seen = time.monotonic()
                 elif time.monotonic() > seen + PATIENCE:
