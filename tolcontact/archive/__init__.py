@@ -129,12 +129,12 @@ arguments are numbers.
 """
 
 from tolcontact.archive.analyses import check_room_for, keep
-from tolcontact.archive.header import Run, run_settings
+from tolcontact.archive.header import Run, run_settings, sizes_of_rows
 from tolcontact.archive.labelled import labelled
 from tolcontact.archive.reader import model_of, open_archive, opened
 from tolcontact.archive.room import bytes_of_rows, size_in_words
 from tolcontact.archive.rows import check_rows
-from tolcontact.archive.stored import stored
+from tolcontact.archive.stored import row_values, stored
 from tolcontact.archive.taking import taken
 from tolcontact.archive.writer import ArchiveWriter
 
@@ -149,8 +149,10 @@ __all__ = [
     "model_of",
     "open_archive",
     "opened",
+    "row_values",
     "run_settings",
     "size_in_words",
+    "sizes_of_rows",
     "stored",
     "taken",
 ]

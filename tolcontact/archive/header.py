@@ -136,6 +136,13 @@ def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
     }
 
 
+def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
+    """How many places the dimensions of a row have."""
+    return {name: len(labels) for name, labels in labels_of_rows(nominal).items()} | {
+        words.CONTRIBUTOR: len(nominal.contributors)
+    }
+
+
 def units_of_rows(program: Program) -> dict[Variable, str]:
     """Units that depend on the model; those of measures are "1" if they differ."""
     units = {measure.units for measure in program.nominal.measures} or {"mm"}

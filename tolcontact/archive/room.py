@@ -9,7 +9,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as words
-from tolcontact.archive.header import kept_rows
+from tolcontact.archive.header import kept_rows, sizes_of_rows
 from tolcontact.archive.variables import rows_together
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
@@ -36,16 +36,7 @@ def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
 
 def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
     """How many bytes a realization takes."""
-    sizes = {
-        words.REALIZATION: 1,
-        words.STATE: len(words.STATES),
-        words.PART: len(nominal.parts),
-        words.PAIR: len(nominal.pairs),
-        words.MEASURE: len(nominal.measures),
-        words.CONTRIBUTOR: len(nominal.contributors),
-        words.AXIS: 3,
-        words.BODY_AXIS: 3,
-    }
+    sizes = {words.REALIZATION: 1, **sizes_of_rows(nominal)}
     return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (words.NUMBERS, *rows))
 
 

@@ -22,6 +22,13 @@ class StoredBlock(NamedTuple):
 
 def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
     """A block, converted once for the file and for its checksums; `kept` are names of variables."""
+    values = row_values(block, kept)
+    checksums = [crc32(variable, values[variable.name]) for variable in words.BY_REALIZATION if variable.name in values]
+    return StoredBlock(block.start, block.start + len(block), values, checksums)
+
+
+def row_values(block: Block, kept: Sequence[str]) -> dict[str, np.ndarray]:
+    """The values of variables, by their names, as they are stored."""
     found = {
         words.MEASURED: block.measured,
         words.GAP_MIN: block.gap_min,
@@ -38,12 +45,8 @@ def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
     }
     if words.ROTATION.name in kept:
         found |= {words.ROTATION: pose.rotation(block.poses), words.TRANSLATION: pose.translation(block.poses)}
-    values = {
-        variable: np.ascontiguousarray(found[variable], dtype=variable.kind)
+    return {
+        variable.name: np.ascontiguousarray(found[variable], dtype=variable.kind)
         for variable in words.BY_REALIZATION
         if variable.name in kept
     }
-    checksums = [crc32(variable, data) for variable, data in values.items()]
-    return StoredBlock(
-        block.start, block.start + len(block), {variable.name: data for variable, data in values.items()}, checksums
-    )

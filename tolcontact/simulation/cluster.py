@@ -5,6 +5,7 @@ a second. A bounded number of shards is under way, so memory does not grow with 
 that are lost are simulated again by others, as dask has it; what a scheduler forgot that was started anew is sent again.
 """
 
+import functools
 import hashlib
 import logging
 import os
@@ -28,7 +29,7 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ClusterError, OptionError
 from tolcontact.simulation.block import Block
-from tolcontact.simulation.threads import Sampler, block_rows, map_blocks
+from tolcontact.simulation.threads import Sampler, block_rows, map_blocks, processors
 
 dask = lazy_loader.load("dask", error_on_import=False)
 cloudpickle = lazy_loader.load("cloudpickle", error_on_import=False)
@@ -153,6 +154,11 @@ def mapping(client: Any) -> MapBlocks:
     return map_blocks if client is None else Workers(client)
 
 
+def threads_of(client: Any) -> int:
+    """How many blocks are simulated at once: by this process, or by the workers of a client."""
+    return processors() if client is None else max(1, sum(map(int, client.nthreads().values())))
+
+
 class Workers:
     """`map_blocks` on the workers of a client. They get a program once, however often it is simulated.
 
@@ -210,8 +216,9 @@ class _Model:
         self.sent = self._client.submit(bytes, self.packed.data, pure=False)
 
 
+@functools.lru_cache(maxsize=KEPT)
 def pack_model(program: Program) -> Packed:
-    """What a program can be compiled from."""
+    """What a program can be compiled from; of the last ones, once."""
     return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
 
 
@@ -257,7 +264,7 @@ class _Shards:
     @property
     def threads(self) -> int:
         """How many shards can be simulated at once."""
-        return max(1, sum(map(int, self._client.nthreads().values())))
+        return threads_of(self._client)
 
     def begin(self, first: int) -> int:
         """Begin the shard from a realization on; where the next one begins."""

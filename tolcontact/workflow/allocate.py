@@ -73,7 +73,7 @@ def allocate(
     check_counts(samples=samples, seed=seed)
     if by not in words.GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(words.GROUPED_BY)}")
-    blocks, program = mapping(client), program_of(model, solver, method)
+    program, blocks = program_of(model, solver, method), mapping(client)
     if into is not None:
         check_room_for(into, words.OF_ALLOCATION, program)
     required = [Requirement.of_text(text, program) for text in ([require] if isinstance(require, str) else require)]

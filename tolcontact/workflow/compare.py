@@ -59,7 +59,7 @@ def compare(
     for word, named in {"solvers": solvers, "methods": resolved_by}.items():
         if not named or len(set(named)) < len(named):
             raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
-    blocks, nominal = mapping(client), discretize(assembly)
+    nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, *each) for each in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])

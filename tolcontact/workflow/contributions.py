@@ -56,7 +56,7 @@ def contributions(
     check_counts(samples=samples, seed=seed)
     if by not in GROUPED_BY:
         raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
-    blocks, program = mapping(client), program_of(model, solver, method)
+    program, blocks = program_of(model, solver, method), mapping(client)
     if into is not None:
         check_room_for(into, words.OF_CONTRIBUTIONS, program)
     some = program.draws(seed=seed, start=0, stop=SOME)

@@ -5,7 +5,7 @@ import time
 
 from tolcontact.archive import bytes_of_rows, size_in_words
 from tolcontact.compilation import Program
-from tolcontact.simulation import block_rows, processors, simulate_blocks
+from tolcontact.simulation import block_rows, simulate_blocks
 from tolcontact.vocabulary import BLOCK_ROWS
 
 try:
@@ -20,11 +20,11 @@ LONG = 60.0  # s: what takes less is not announced
 log = logging.getLogger(__name__)
 
 
-def announce(program: Program, *, samples: int, seed: int, keep: str) -> None:
-    """Log, as a warning, what `samples` more realizations will take, if that is long: from a trial with some of them."""
+def announce(program: Program, *, samples: int, seed: int, keep: str, threads: int) -> None:
+    """Log, as a warning, what `samples` more realizations will take on so many threads, if that is long: from a trial here."""
     if samples < MANY and block_rows(program) == BLOCK_ROWS:
         return
-    seconds = _of_one(program, seed) * samples / processors()
+    seconds = _of_one(program, seed) * samples / threads
     if samples >= MANY or seconds > LONG:
         nominal = program.nominal
         points = sum(len(pair.P_m) for pair in nominal.pairs)

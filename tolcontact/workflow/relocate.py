@@ -66,7 +66,7 @@ def relocate(
     Raises ModelError, ArchiveError, OptionError for a locator, a region or a measure that there is not.
     """
     check_counts(samples=samples, seed=seed)
-    blocks, assembly = mapping(client), declared(model)
+    assembly, blocks = declared(model), mapping(client)
     engine = _Engine(assembly, blocks, locator, least, solver, chosen(assembly, method), samples, seed)
     if into is not None:
         check_room_for(into, words.OF_RELOCATION, engine.program)

@@ -17,7 +17,7 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
 from tolcontact.simulation import Block
-from tolcontact.simulation.cluster import MapBlocks, mapping
+from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import BlockSums, DisplacementFields, Summary, touching
 from tolcontact.statistics import summarize as statistics_of
@@ -139,20 +139,20 @@ def run(
         raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
     check_program(model, solver, method)
     target = None if until is None else Target.of(until)
-    blocks = mapping(client)
 
     def write(path: Path) -> None:
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(plan))
         if target:
             target.check(program)
+        blocks = mapping(client)
         asked, goes_on = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
         while True:
             of_fields = DisplacementFields(program.nominal, asked.fields)
             with (
                 ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, of_fields.sizes)
             ) as writer:
-                announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep)
+                announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep, threads=threads_of(client))
                 _simulate(program, writer, of_fields, seed, blocks, progress)
                 _look_at_points(path, writer)
             more = target.next(path, program) if target else None

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as words
-from tolcontact.archive import Run, labelled, run_settings, stored
+from tolcontact.archive import Run, labelled, row_values, run_settings, sizes_of_rows
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block
@@ -48,7 +48,8 @@ def simulate(
         check_counts(samples=samples)
         deviations = lazy_draws(program, samples, seed)
     variables = [of for of in words.BY_REALIZATION if of is not words.DEVIATION]
-    records = _Records(tuple((of.name, of.kind, _shape(of, program)) for of in variables))
+    sizes = sizes_of_rows(program.nominal)
+    records = _Records(tuple((of.name, of.kind, tuple(sizes[dim] for dim in of.dims[1:])) for of in variables))
     found = lazy_realizations(program, deviations, records, records.kind)
     settings = run_settings(program, Run(seed, len(deviations), "", 0, ""))
     if isinstance(samples, xr.DataArray):
@@ -77,23 +78,9 @@ class _Records:
 
     def __call__(self, block: Block) -> np.ndarray:
         found = np.empty(len(block), self.kind)
-        for name, values in stored(block, [name for name, *_ in self.fields]).values.items():
+        for name, values in row_values(block, [name for name, *_ in self.fields]).items():
             found[name] = values
         return found
-
-
-def _shape(variable: words.Variable, program: Program) -> tuple[int, ...]:
-    """Of a variable, for one realization."""
-    nominal = program.nominal
-    sizes = {
-        words.STATE: len(words.STATES),
-        words.PART: len(nominal.parts),
-        words.PAIR: len(nominal.pairs),
-        words.MEASURE: len(nominal.measures),
-        words.AXIS: len(words.AXES),
-        words.BODY_AXIS: len(words.AXES),
-    }
-    return tuple(sizes[name] for name in variable.dims[1:])
 
 
 def _given(deviations: xr.DataArray, program: Program) -> Any:

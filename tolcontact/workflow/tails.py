@@ -55,7 +55,7 @@ def tails(
     check_counts(samples=samples, seed=seed)
     if samples < LEAST:
         raise OptionError(f"samples is {samples!r}; expected {LEAST} realizations for an event, or more")
-    blocks, program = mapping(client), program_of(model, solver, method)
+    program, blocks = program_of(model, solver, method), mapping(client)
     if into is not None:
         check_room_for(into, words.OF_TAILS, program)
     if not program.draws.varying:

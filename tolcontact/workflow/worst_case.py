@@ -60,7 +60,7 @@ def worst_case(
     Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which nothing varies.
     """
     check_counts(samples=samples, seed=seed)
-    blocks, program = mapping(client), program_of(model, solver, method)
+    program, blocks = program_of(model, solver, method), mapping(client)
     if into is not None:
         check_room_for(into, words.OF_WORST_CASE, program)
     region = Region(program.draws, seed=seed)
