@@ -63,6 +63,8 @@ def test_deviations_of_ones_own():
         .isel(contributor=slice(None, None, -1))
     )
     given = tc.simulate(program, mixed.transpose())
+    named = mixed.isel(realization=[3, 1]).assign_coords(realization=["part 4", "part 2"])
+    assert np.array_equal(tc.simulate(program, named).measured.sel(realization="part 2"), drawn.measured[1])
     assert np.array_equal(given.measured, drawn.measured) and given.attrs["sampler"] == "given" and "seed" not in given.attrs
     chunked = xr.DataArray(dask.array.from_array(mixed.sel(contributor=labels).values, chunks=(77, 5)), dims=mixed.dims)
     found = tc.simulate(program, chunked)

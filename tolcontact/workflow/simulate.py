@@ -29,6 +29,7 @@ def simulate(
 
     `samples` is their number; or it is their deviations (realization, contributor) themselves, for which the `seed` does not
     matter: an xarray of the user's own, with labels of contributors or in the order of the model, in memory or chunked.
+    Labels of its realizations stay.
     Each variable is a dask array whose chunks are simulated when they are asked for, and forgotten then: by threads here, or on
     the workers of the client of dask.distributed that was made last. `to_netcdf` and `to_zarr` stream, and so does what xarray
     computes, such as `.measured.mean("realization")`; what is asked for in two computations is simulated twice.
@@ -55,7 +56,7 @@ def simulate(
     if isinstance(samples, xr.DataArray):
         settings |= {"sampler": "given"}
         del settings["seed"]
-    return labelled(
+    rows = labelled(
         program,
         {of: found[of.name] for of in variables} | {words.DEVIATION: deviations},
         {
@@ -64,6 +65,9 @@ def simulate(
             **{name: value for name, value in settings.items() if name not in OF_ARCHIVES},
         },
     )
+    if isinstance(samples, xr.DataArray) and words.REALIZATION in samples.coords:
+        return rows.assign_coords({words.REALIZATION: samples[words.REALIZATION]})
+    return rows
 
 
 @dataclass(frozen=True)

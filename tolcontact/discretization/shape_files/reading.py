@@ -31,9 +31,8 @@ COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 
 REMEMBERED = 4  # STEP files
-IN_MM = {
-    "micrometre": 1e-3, "millimetre": 1.0, "centimetre": 10.0, "decimetre": 100.0, "metre": 1e3, "kilometre": 1e6,
-    "inch": 25.4, "foot": 304.8, "feet": 304.8,
+WORDS = {  # of STEP files, for units
+    "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
 }  # fmt: skip
 
 log = logging.getLogger(__name__)
@@ -138,7 +137,7 @@ def _job(key: Key, text: StepText | None, coarser: float) -> reader.Job:
 
 def usual_chord(text: StepText) -> float:
     """How far triangles of a STEP file may stay off its true faces [mm], if nothing else is asked."""
-    return max(STEP_CHORD, STEP_SHARE * text.extent * IN_MM.get(text.units.removesuffix("es"), 1.0))
+    return max(STEP_CHORD, STEP_SHARE * text.extent * UNITS[WORDS.get(text.units.removesuffix("es"), "mm")])
 
 
 def _is_too_fine(read_in: dict[str, np.ndarray] | GeometryFault) -> bool:
