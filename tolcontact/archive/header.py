@@ -249,6 +249,8 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
                 mesh.createDimension(words.BREP_FACE, len(known[1]))
                 write(mesh, words.BREP_OF_FACE, known[0])
                 _write_forms(mesh, words.OF_BREP_FACE, form_arrays(known[1]))
+                if known[2]:
+                    write(mesh, words.NAME_OF_BREP_FACE, known[2])
 
 
 def _write_forms(group: netCDF4.Group, variables: Mapping[str, Variable], arrays: Mapping[str, np.ndarray]) -> None:

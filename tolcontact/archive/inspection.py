@@ -37,6 +37,7 @@ OF_CONTACT = (words.MOVING_PART, words.REFERENCE_PART)
 OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (words.MESH_VERTICES, words.MESH_FACES)
+IN_MESH = (*OF_MESH, *words.KNOWN_SURFACES, words.NAME_OF_BREP_FACE)
 ONCE = {  # by group
     "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS, *words.LIMITS,
          words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
@@ -177,7 +178,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
         _need_together(group, words.KNOWN_SURFACES)
-        for variable in (*OF_MESH, *words.KNOWN_SURFACES):
+        for variable in IN_MESH:
             _check_variable(group, variable)
     for name in LABELS:
         if name in file.variables:
@@ -263,7 +264,7 @@ def _texts(stored: netCDF4.Variable) -> list[str]:
 def _check_sums(group: netCDF4.Dataset) -> None:
     """Whether what is written once, or in one go, has the checksum that is stored beside it."""
     kind = group.path.split("/")[1]
-    known = {v.name: v for v in ((*OF_MESH, *words.KNOWN_SURFACES) if "/mesh/" in group.path else ONCE.get(kind, ()))}
+    known = {v.name: v for v in (IN_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
     for name, stored in group.variables.items():
         if words.CHECKSUM in stored.ncattrs() and name in known:
             values = _declaration(stored) if known[name] is words.DECLARATION else _values(stored, known[name])

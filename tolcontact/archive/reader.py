@@ -73,4 +73,6 @@ def _mesh(of: xr.Dataset) -> Any:
     sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(words.SURFACE_KINDS)).all())
     if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
-    return with_known_surfaces(vertices, faces, brep, forms_of(arrays))
+    named = words.NAME_OF_BREP_FACE.name
+    names = tuple(map(str, of[named].values)) if named in of else ()
+    return with_known_surfaces(vertices, faces, brep, forms_of(arrays), names)

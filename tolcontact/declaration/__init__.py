@@ -34,6 +34,7 @@ A face consists of the triangles that meet every criterion you give; without any
 | `tc.Cylinder(radius, inner)` | cylinders: of one size, or holes (`inner=True`), or neither |
 | `tc.Largest("plane", "+z")` | the largest face of a kind, along a direction |
 | `tc.Brep((x, y, z))`, `tc.Brep(12)` | the face of a STEP file that passes through a point, or has a number |
+| `tc.Brep("seat")` | the faces of a STEP file that have a name, where it gives names |
 | `[0, 1, 2]` | triangles by their indices in the mesh |
 | a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
 

@@ -19,7 +19,7 @@ def said_of(selection: Any, face: Face, triangles: Callable[[Face], list[int]]) 
         Facing: lambda of: {"facing": list(of.axis), "angle": of.angle},
         Inside: lambda of: {"inside": [list(of.lower), list(of.upper)]},
         Near: lambda of: {"near": of.part.name, "within": of.within},
-        Brep: lambda of: {"brep": of.number if of.at is None else list(of.at)},
+        Brep: lambda of: {"brep": next(each for each in (of.number, of.name, list(of.at or ())) if each is not None)},
         Cylinder: lambda of: {"cylinder": _given(radius=of.radius, inner=of.inner)},
         Largest: lambda of: {"largest": of.kind, **_given(direction=of.axis and list(of.axis))},
         Triangles: lambda of: {"triangles": [int(index) for index in of.indices]},
@@ -40,7 +40,7 @@ def criterion_of(said: Said, part: Callable[[Said], Part]) -> Selection:
         "facing": lambda of: Facing(of["facing"].vector(), *(of[word].number() for word in ("angle",) if word in of)),
         "inside": lambda of: Inside(*(corner.vector() for corner in of["inside"].items(2))),
         "near": lambda of: Near(part(of["near"]), of["within"].number()),
-        "brep": lambda of: Brep(of["brep"].vector() if of["brep"].is_list else of["brep"].index(MOST)),
+        "brep": lambda of: Brep(_which(of["brep"])),
         "cylinder": lambda of: _cylinder(of["cylinder"]),
         "largest": lambda of: Largest(of["largest"].text(), *(_way(of[word]) for word in ("direction",) if word in of)),
         "triangles": lambda of: Triangles(tuple(index.index(MOST) for index in of["triangles"])),
@@ -49,6 +49,10 @@ def criterion_of(said: Said, part: Callable[[Said], Part]) -> Selection:
         if kind in said:
             return read(said)
     raise said.wrong(f"one of {', '.join(kinds)}")
+
+
+def _which(said: Said) -> Any:
+    return said.vector() if said.is_list else said.text() if said.is_text else said.index(MOST)
 
 
 def _cylinder(said: Said) -> Cylinder:

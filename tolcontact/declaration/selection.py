@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from tolcontact.declaration.vectors import DIRECTIONS, Vector, is_finite, is_length, vector
 from tolcontact.declaration.vectors import direction as _direction
+from tolcontact.errors import shown
 from tolcontact.readable import Readable
 from tolcontact.vocabulary import SURFACE_KINDS
 
@@ -121,23 +122,30 @@ class Near(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Brep(Readable):
-    """The face of a STEP file's boundary representation that has a number (`tolcontact faces` lists them), or a point [mm]."""
+    """The face of a STEP file's boundary representation that has a number (`tolcontact faces` lists them), or a point [mm].
+
+    Or those that have a name, where the file gives names.
+    """
 
     number: int | None
     at: Vector | None
+    name: str | None
 
     def __init__(self, which: Any) -> None:
         number = int(which) if hasattr(which, "__index__") and not isinstance(which, bool) else None
         object.__setattr__(self, "number", number)
-        object.__setattr__(self, "at", None if number is not None else vector(which))
+        object.__setattr__(self, "name", which if isinstance(which, str) else None)
+        object.__setattr__(self, "at", None if number is not None or self.name is not None else vector(which))
 
     def faults(self) -> Iterator[str]:
         if self.at is not None and not is_finite(self.at):
-            yield "a B-rep face needs its number, or a point on it, three finite numbers"
+            yield "a B-rep face needs its number, its name, or a point on it, three finite numbers"
+        if self.name == "":
+            yield "a B-rep face has an empty name; give its number, or a point on it"
 
     def __str__(self) -> str:
         if self.at is None:
-            return f"B-rep face {self.number}"
+            return f"B-rep face {self.number if self.name is None else shown(repr(self.name))}"
         return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in self.at))
 
 

@@ -104,8 +104,10 @@ to 0.5 rad; a warning says so.
 An assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them, `tc.Mesh(file, body=...)` is one
 of them in the frame of its product, and `tc.parts_from(model, file)` declares all of them, or those named, as parts in their
 places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
-directions, radii and areas. Where a file states no simple surface, a plane, cylinder, cone or sphere is fitted to the vertices
-if none is farther off than 1 um, and how far is stated. References to other files are rejected.
+directions, radii and areas, and with their names where the file gives any: `tc.Brep("...")` chooses by them. (Where the faces
+of a body have several colours they are out of the file's order, and their names are not known.) Where a file states no simple
+surface, a plane, cylinder, cone or sphere is fitted to the vertices if none is farther off than 1 um, and how far is stated.
+References to other files are rejected.
 
 ## Files from others
 

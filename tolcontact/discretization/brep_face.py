@@ -1,7 +1,7 @@
 """The faces of a part, described: those of a STEP file's boundary representation, or smooth pieces. Lengths in mm."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -10,7 +10,8 @@ from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fitting import fitted
-from tolcontact.discretization.shape_files import BREP, SURFACES
+from tolcontact.discretization.shape_files import BREP, FACE_NAMES, SURFACES
+from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
 FIT = 1e-3  # [mm] a face none of whose vertices is farther off a plane, cylinder, cone or sphere is on one
@@ -29,6 +30,7 @@ class FaceInFile(Readable):
     is_inner    whether a round face is a hollow: its outside lies towards its axis or centre
     area        [mm2], of its triangles
     residual    [mm] how far its vertices lie off it at most, if it was fitted to them; 0 if the file states it
+    name        what the file calls it, which may be what it calls others; empty if it has no name
     """
 
     number: int
@@ -39,9 +41,11 @@ class FaceInFile(Readable):
     is_inner: bool
     area: float
     residual: float = 0.0
+    name: str = ""
 
     def __str__(self) -> str:
-        words = [f"{self.number}. {'inner ' if self.is_inner else ''}{self.kind}"]
+        called = f'"{shown(self.name)}", ' if self.name else ""
+        words = [f"{self.number}. {called}{'inner ' if self.is_inner else ''}{self.kind}"]
         if self.radius is not None:
             words.append(f"radius {self.radius:.6g} mm")
         if self.direction is not None:
@@ -69,7 +73,9 @@ def described(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         surfaces = enumerate(zip(groups, stated, strict=True), start=1)
-        mesh.metadata[DESCRIBED] = tuple(_described(mesh, number, own, form) for number, (own, form) in surfaces)
+        found = (_described(mesh, number, own, form) for number, (own, form) in surfaces)
+        names = mesh.metadata.get(FACE_NAMES) or [""] * len(stated)
+        mesh.metadata[DESCRIBED] = tuple(replace(face, name=name) for face, name in zip(found, names, strict=True))
     return mesh.metadata[DESCRIBED]  # type: ignore[no-any-return]
 
 

@@ -13,8 +13,9 @@ from tolcontact.declaration.vectors import Vector
 from tolcontact.discretization.brep_face import FaceInFile, described, numbered
 from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.known_forms import known_forms
-from tolcontact.discretization.shape_files import BREP, SURFACES
+from tolcontact.discretization.shape_files import BREP, FACE_NAMES, SURFACES
 from tolcontact.discretization.surface import Surface
+from tolcontact.errors import shown
 
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
@@ -135,6 +136,14 @@ def _is_along(face: FaceInFile, direction: Vector | None) -> bool:
 
 def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
     brep = _breps(face, mesh)
+    if selection.name is not None:
+        names = mesh.metadata[FACE_NAMES]
+        if selection.name not in names:
+            known = ", ".join(f'"{shown(name)}"' for name in [name for name in dict.fromkeys(names) if name][:SHOWN])
+            has = f"its faces are called {known}" if known else "its file gives no face of it a name"
+            more = ", ..." if len(set(names) - {""}) > SHOWN else ""
+            raise GeometryFault(f"face {face}: the part has no such face; {has}{more}")
+        return np.isin(brep, np.flatnonzero(np.array(names) == selection.name))
     if selection.at is None:
         count = len(mesh.metadata[SURFACES])
         if selection.number is None or not 1 <= selection.number <= count:

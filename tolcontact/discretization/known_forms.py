@@ -1,5 +1,7 @@
 """Which triangles of a face stand for surfaces that are known exactly: a file states them, or they are fitted to vertices."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import trimesh
 
@@ -7,7 +9,7 @@ from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.brep_face import FIT
 from tolcontact.discretization.edges import smooth_pieces
 from tolcontact.discretization.fitting import fitted
-from tolcontact.discretization.shape_files import BREP, SURFACES
+from tolcontact.discretization.shape_files import BREP, FACE_NAMES, SURFACES
 
 ALIKE = 10  # times as far as they were fitted may faces be off each other's surface that are taken for one
 SAME = 1e-9  # of a part's size: faces that are no farther off each other's surface are parts of one
@@ -64,17 +66,20 @@ def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> Form | None:
     return None if form is None or form.kind == "plane" else form
 
 
-def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[Form | None]] | None:
-    """Of a mesh from a STEP file the B-rep face of each triangle (face,), from 0, and their surfaces; else None."""
+def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[Form | None], Sequence[str]] | None:
+    """Of a mesh from a STEP file the B-rep face of each triangle (face,), from 0, their surfaces, and names if there are any.
+
+    None of other meshes.
+    """
     brep = mesh.face_attributes.get(BREP)
-    return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES])
+    return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES])
 
 
 def with_known_surfaces(
-    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[Form | None]
+    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[Form | None], names: Sequence[str]
 ) -> trimesh.Trimesh:
     """A mesh that knows them again."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.face_attributes[BREP] = brep
-    mesh.metadata[SURFACES] = surfaces
+    mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES] = surfaces, names
     return mesh

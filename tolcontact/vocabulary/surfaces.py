@@ -26,6 +26,7 @@ def _of_form(word: str, dim: str, whose: str) -> dict[str, Variable]:
 
 BREP_OF_FACE = Variable("brep_of_face", (FACE,), "i4", "number of the B-rep face of each triangle, counted from 0")
 OF_BREP_FACE = _of_form("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
+NAME_OF_BREP_FACE = Variable("surface_name", (BREP_FACE,), str, "what the file calls a B-rep face; empty: it has no name")
 
 POINT_OF_ROUND = Variable(
     "point_of_round", (ROUND_POINT,), "i4", "number of the contact point that is one of round faces, counted from 0"

@@ -25,6 +25,7 @@ class Body:
     place         (4, 4): from its own frame to that of the file [mm]
     triangles     (face,) those of its shape that are its own; none if they are not known
     lower, upper  (3,) corners in its place; None if its triangles are not known
+    face_names    of its B-rep faces, "" of those without one; empty if there are none, or if they cannot be told apart
     """
 
     name: str
@@ -34,6 +35,7 @@ class Body:
     lower: np.ndarray | None = None
     upper: np.ndarray | None = None
     is_open: bool = False
+    face_names: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         called = ("open, " if self.is_open else "") + (f'"{clipped(self.name, 60)}"' if self.name else "without a name")
@@ -50,6 +52,7 @@ class Triangles:
     shape, brep          (face,) the shape, in whose own frame it is, and the B-rep face within it
     products             (shape,) what the file calls each shape
     coloured             (shape,) bool: of several colours, by which its B-rep faces are ordered, and not by solids
+    kinds                (shape,): the kind of each B-rep face's surface, "" if it is not known
     """
 
     corners: np.ndarray
@@ -58,6 +61,7 @@ class Triangles:
     brep: np.ndarray
     products: np.ndarray
     coloured: np.ndarray
+    kinds: Sequence[Sequence[str]]
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,7 @@ def bodies(triangles: Triangles, places: Sequence[Place], solids: Sequence[Solid
         if place.shape not in of_shape:
             of_shape[place.shape] = _runs(triangles, np.flatnonzero(triangles.shape == place.shape))
         name = place.path[-1] if place.path and place.path[-1] else str(triangles.products[place.shape])
-        found.extend(_body(triangles, place, name, *run) for run in of_shape[place.shape])
+        found.extend(_body(triangles, place, name, own, solids, is_open) for own, is_open in of_shape[place.shape])
     if len(places) == 1 and len(found) < len(solids):
         return list(_told_apart([Body(solid.name) for solid in solids]))
     return list(_told_apart(found))
@@ -89,13 +93,13 @@ def bodies(triangles: Triangles, places: Sequence[Place], solids: Sequence[Solid
 def _of_one_place(triangles: Triangles, place: Place, solids: Sequence[Solid]) -> list[Body] | None:
     """The bodies of a file in which one shape stands at one place; None if its text does not tell which they are."""
     count = int(triangles.brep.max()) + 1
-    if len(solids) == 1 and solids[0].faces >= count:
+    if len(solids) == 1 and len(solids[0].faces) >= count:
         name = solids[0].name or str(triangles.products[place.shape])
-        return [_body(triangles, place, name, np.arange(len(triangles.faces)))]
-    if sum(solid.faces for solid in solids) == count and not triangles.coloured[place.shape]:
-        first = np.cumsum([0, *(solid.faces for solid in solids)])
+        return [_body(triangles, place, name, np.arange(len(triangles.faces)), solids)]
+    if sum(len(solid.faces) for solid in solids) == count and not triangles.coloured[place.shape]:
+        first = np.cumsum([0, *(len(solid.faces) for solid in solids)])
         label = np.searchsorted(first, triangles.brep, side="right") - 1
-        return [_body(triangles, place, solid.name, np.flatnonzero(label == k)) for k, solid in enumerate(solids)]
+        return [_body(triangles, place, solid.name, np.flatnonzero(label == k), [solid]) for k, solid in enumerate(solids)]
     return None
 
 
@@ -118,11 +122,27 @@ def listed(found: Sequence[Body]) -> str:
     return first + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
 
 
-def _body(triangles: Triangles, place: Place, name: str, chosen: np.ndarray, is_open: bool = False) -> Body:
+def _body(
+    triangles: Triangles, place: Place, name: str, chosen: np.ndarray, solids: Sequence[Solid], is_open: bool = False
+) -> Body:
+    """The body of the `chosen` triangles, which is one of the `solids` of the file's text if it is any."""
     if not len(chosen):
         return Body(name, place.path, place.place)
     corners = triangles.corners[chosen].reshape(-1, 3) @ place.place[:3, :3].T + place.place[:3, 3]
-    return Body(name, place.path, place.place, chosen, corners.min(axis=0), corners.max(axis=0), is_open)
+    kinds = [triangles.kinds[place.shape][number] for number in np.unique(triangles.brep[chosen])]
+    names = () if triangles.coloured[place.shape] else _face_names(kinds, solids)
+    return Body(name, place.path, place.place, chosen, corners.min(axis=0), corners.max(axis=0), is_open, names)
+
+
+def _face_names(kinds: Sequence[str], solids: Sequence[Solid]) -> tuple[str, ...]:
+    """What the only solid calls its faces that has as many, and surfaces of these kinds; of several such, if all agree."""
+    alike = {
+        tuple(face.name for face in solid.faces)
+        for solid in solids
+        if len(solid.faces) == len(kinds)
+        and all(kind in ("", face.kind) for kind, face in zip(kinds, solid.faces, strict=True))
+    }
+    return alike.pop() if len(alike) == 1 else ()
 
 
 def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]]:

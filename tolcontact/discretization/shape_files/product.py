@@ -24,6 +24,7 @@ RIGID = 1e-5  # how far a motion may stretch lengths, having passed through sing
 OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # attribute of a mesh: the B-rep face of each triangle
 SURFACES = "surfaces"  # and the surface of each B-rep face, None if the file states none
+FACE_NAMES = "face_names"  # and what the file calls each; none if it calls no face anything
 
 log = logging.getLogger(__name__)
 
@@ -68,7 +69,7 @@ class Product:
         """The triangles of a body: in its own frame if it is named, in its place if it is the only one.
 
         B-rep faces are numbered from 0 within the body, in the file's order: attribute BREP of its triangles; SURFACES in the
-        metadata is what is known of each.
+        metadata is what is known of each, FACE_NAMES what the file calls them.
         """
         body = self.body(wanted)
         own = body.triangles
@@ -84,6 +85,7 @@ class Product:
         mesh.units = "mm"
         mesh.face_attributes[BREP] = brep.ravel()
         mesh.metadata[SURFACES] = surfaces
+        mesh.metadata[FACE_NAMES] = body.face_names if any(body.face_names) else ()
         self._check_closed(mesh, brep)
         return mesh
 
@@ -92,8 +94,8 @@ class Product:
         if gaps:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-                f"{len(np.unique(brep))} of {self.text.solids[0].faces} faces could be read); repair it in CAD, or export it "
-                "again"
+                f"{len(np.unique(brep))} of {len(self.text.solids[0].faces)} faces could be read); repair it in CAD, or "
+                "export it again"
             )
 
 
@@ -131,8 +133,9 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         for stands, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
     ]
     triangles = Triangles(
-        np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"]
-    )
+        np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"],
+        [["" if form is None else form.kind for form in of] for of in known],
+    )  # fmt: skip
     return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(triangles, places, text.solids)), text)
 
 

@@ -16,6 +16,7 @@ from tolcontact.discretization.fault import GeometryFault
 from tolcontact.discretization.shape_files import reader, screening
 from tolcontact.discretization.shape_files.product import (
     BREP,
+    FACE_NAMES,
     STEP_ANGLE,
     STEP_CHORD,
     STEP_SHARE,
@@ -182,7 +183,8 @@ def _in_memory(geometry: Mesh) -> trimesh.Trimesh:
     check_numbers(own.vertices, str(geometry))
     own.merge_vertices(merge_tex=True, merge_norm=True)
     if BREP in getattr(source, "face_attributes", {}):  # from an archive
-        own.face_attributes[BREP], own.metadata[SURFACES] = source.face_attributes[BREP], source.metadata[SURFACES]
+        own.face_attributes[BREP] = source.face_attributes[BREP]
+        own.metadata |= {name: source.metadata[name] for name in (SURFACES, FACE_NAMES)}
     return own
 
 

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,10 +12,15 @@ import numpy as np
 _RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
 _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
 _INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
+_KINDS = {
+    b"PLANE": "plane", b"CYLINDRICAL_SURFACE": "cylinder", b"CONICAL_SURFACE": "cone", b"SPHERICAL_SURFACE": "sphere",
+    b"TOROIDAL_SURFACE": "torus",
+}  # fmt: skip
 _ENTITY = re.compile(
-    rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL"
-    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|LENGTH_UNIT)\s*\("
+    rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL|ADVANCED_FACE|%b"
+    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|LENGTH_UNIT)\s*\(" % b"|".join(_KINDS)
 )
+_NAMELESS = ("NONE", "")  # what systems write where a face has no name
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
@@ -25,12 +31,19 @@ _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
 
+class NamedFace(NamedTuple):
+    """A B-rep face: its `name`, "" if it has none, and the `kind` of its surface, one of SURFACE_KINDS, "" of any other."""
+
+    name: str = ""
+    kind: str = ""
+
+
 @dataclass(frozen=True)
 class Solid:
-    """A solid with its `name`, and how many B-rep faces its shells have, those of its cavities, too."""
+    """A solid with its `name`, and the B-rep `faces` of its shells in their order, those of its cavities, too."""
 
     name: str
-    faces: int
+    faces: tuple[NamedFace, ...]
 
 
 @dataclass(frozen=True)
@@ -52,14 +65,22 @@ def step_text(content: bytes) -> StepText:
     """What a STEP file's `content` states; of damaged ones, what is still legible."""
     solids: list[tuple[str, list[int]]] = []
     shells: dict[int, list[int]] = {}
+    faces: dict[int, tuple[str, int]] = {}
+    kinds: dict[int, str] = {}
     oriented: dict[int, list[int]] = {}
     named: list[str] = []
     units: list[str] = []
     for number, entity, record in _entities(content):
+        if entity in _KINDS:
+            kinds[number] = _KINDS[entity]
+            continue
         strings = [_decoded(string) for string in _STRING.findall(record)]
         references = [int(reference) for reference in re.findall(rb"#(\d+)", _STRING.sub(b"", record))]
         if entity == b"CLOSED_SHELL":
             shells[number] = references
+        elif entity == b"ADVANCED_FACE":
+            name = strings[0].strip() if strings else ""
+            faces[number] = "" if name in _NAMELESS else name, references[-1] if references else 0
         elif entity == b"ORIENTED_CLOSED_SHELL":
             oriented[number] = references
         elif entity in (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT"):
@@ -73,8 +94,12 @@ def step_text(content: bytes) -> StepText:
     named.extend(_decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
     named = [name for name in dict.fromkeys(named) if name.strip()]
     files = tuple(name for name in named if _suffix(name) in SHAPES)
+    named_faces = {number: NamedFace(name, kinds.get(surface, "")) for number, (name, surface) in faces.items()}
     return StepText(
-        tuple(Solid(name, _count(references, shells, oriented)) for name, references in solids),
+        tuple(
+            Solid(name, tuple(named_faces.get(face, NamedFace()) for face in _faces(references, shells, oriented)))
+            for name, references in solids
+        ),
         files,
         tuple(name for name in named if name not in files),
         next((unit for unit in units if not unit.endswith("metre")), units[0] if units else ""),
@@ -103,9 +128,9 @@ def _entities(content: bytes) -> Iterator[tuple[int, bytes, bytes]]:
             yield int(instance[1]), outside[1], instance[2]
 
 
-def _count(references: list[int], shells: Mapping[int, list[int]], oriented: Mapping[int, list[int]]) -> int:
+def _faces(references: list[int], shells: Mapping[int, list[int]], oriented: Mapping[int, list[int]]) -> list[int]:
     own = [inner for reference in references for inner in oriented.get(reference, [reference])]
-    return sum(len(shells.get(shell, ())) for shell in own)
+    return [face for shell in own for face in shells.get(shell, ())]
 
 
 def _decoded(string: bytes) -> str:
