@@ -22,6 +22,11 @@ def named(text, names):
     return re.sub(r"ADVANCED_FACE\(''", lambda _: f"ADVANCED_FACE('{next(given)}'", text)
 
 
+def counted(text):
+    """A STEP file whose faces are called f0, f1, ..."""
+    return named(text, (f"f{k}" for k in itertools.count()))
+
+
 def one_block(path, names):
     path.write_text(named(step_of(("solid", (0, 0, 0), (10, 20, 30))), names))
     model = tc.Assembly("one")
@@ -66,22 +71,53 @@ def test_names_come_with_the_archive(tmp_path):
         assert again.measured.equals(results.measured) and again.gap_min.equals(results.gap_min)
 
 
+def names_in(path, text, *bodies):
+    path.write_text(text)
+    return [[face.name for face in tc.faces_in(path, number)] for number in bodies]
+
+
 def test_bodies_of_an_assembly_have_their_own_names(tmp_path):
-    """The pin's six faces, then those of three solids; two of these are alike, but not in their names."""
-    numbers = itertools.count()
-    path = tmp_path / "stack.step"
-    path.write_text(re.sub(r"ADVANCED_FACE\(''", lambda _: f"ADVANCED_FACE('f{next(numbers)}'", assembly(("set", (0, 0, 0)))))
-    found = [[face.name for face in tc.faces_in(path, number)] for number in (1, 2, 3)]
-    assert found == [[f"f{k}" for k in part] for part in (range(6), range(6, 12), range(12, 24))]
-    path.write_text(named(assembly(("pin", (0, 0, 0)), ("pin", (0, 0, 5))), DIRECTIONS))
-    for number in (1, 2):
-        assert [face.name for face in tc.faces_in(path, number)] == list(DIRECTIONS)
-    # In an assembly, where blocks could be either of two, no name is given.
-    numbers = itertools.count()
-    text = assembly(("pin", (0, 0, 0)), ("set", (100, 0, 0)))
-    path.write_text(re.sub(r"ADVANCED_FACE\(''", lambda _: f"ADVANCED_FACE('f{next(numbers)}'", text))
-    assert {face.name for face in tc.faces_in(path, 1)} == {""}
-    assert [face.name for face in tc.faces_in(path, 4)] == [f"f{k}" for k in range(18, 30)]
+    path, several = tmp_path / "stack.step", [[f"f{k}" for k in part] for part in (range(6), range(6, 12), range(12, 24))]
+    assert names_in(path, counted(assembly(("set", (0, 0, 0)))), 1, 2, 3) == several
+    assert names_in(path, named(assembly(("pin", (0, 0, 0)), ("pin", (0, 0, 5))), DIRECTIONS), 1, 2) == 2 * [list(DIRECTIONS)]
+    later = [[f"f{k + 6}" for k in range(12, 24)]]
+    assert names_in(path, counted(assembly(("pin", (0, 0, 0)), ("set", (100, 0, 0)))), 1, 4) == several[:1] + later
+
+
+def test_names_that_are_not_sure_are_left_out(tmp_path):
+    """Of solids that are alike in their own frames, but not in their names; of a shell that has a face twice."""
+    made, path = Step(), tmp_path / "unsure.step"
+    solids = [made.solid((0, 0, 0), (5, 5, 5)) for _ in range(2)]
+    whole = made.product("whole")
+    for k, solid in enumerate(solids):
+        made.place(made.product(f"pin {k}", [solid]), whole, f"pin {k}", (10 * k, 0, 0))
+    assert names_in(path, counted(str(made)), 1, 2) == 2 * [6 * [""]]
+    twice = Step()
+    shell = twice.shell(corners((0, 0, 0), (10, 20, 30)))
+    first = int(re.search(r"\(#(\d+)", twice.lines[shell - 1])[1])
+    again = twice.add(twice.lines[first - 1])
+    twice.lines[shell - 1] = twice.lines[shell - 1].replace("))", f",#{again}))")
+    twice.product("twice", [twice.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
+    assert names_in(path, counted(str(twice)), 1) == [7 * [""]]  # the kernel moves both to the end
+
+
+@pytest.mark.parametrize(("assigned", "size"), [("inch", 25.4), ("millimetre", 1.0)])
+def test_surfaces_are_compared_in_the_units_of_the_shapes(assigned, size, tmp_path):
+    """Inches are defined by mm, and a file in mm may state other lengths in inches."""
+    made = Step()
+    number = next(k for k, line in enumerate(made.lines, start=1) if "LENGTH_UNIT" in line)
+    millimetre = made.add(made.lines[number - 1])
+    length = made.add("DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)")
+    measure = made.add(f"LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#{millimetre})")
+    inch = f"(CONVERSION_BASED_UNIT('inch',#{measure})LENGTH_UNIT()NAMED_UNIT(#{length}))"
+    if assigned == "inch":
+        made.lines[number - 1] = inch
+    else:
+        made.add(inch)
+    made.product("block", [made.solid((1, 1, 1), (2, 3, 4))])
+    assert names_in(tmp_path / "inches.step", named(str(made), DIRECTIONS), 1) == [list(DIRECTIONS)]
+    (body,) = tc.bodies_in(tmp_path / "inches.step")
+    assert body.units == assigned and body.upper == pytest.approx((2 * size, 3 * size, 4 * size))
 
 
 def test_faces_that_are_out_of_order_have_no_names(tmp_path):

@@ -9,11 +9,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.edges import edges
 from tolcontact.discretization.fault import clipped
-from tolcontact.discretization.shape_files.step_text import Solid
+from tolcontact.discretization.shape_files.step_text import NamedFace, Solid
 
 SHOWN = 12  # bodies that a message lists
+SAME = 1e-6  # [mm], and of what lies farther off than 1 mm its share: a surface and what a text says of it differ by less
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +54,8 @@ class Triangles:
     shape, brep          (face,) the shape, in whose own frame it is, and the B-rep face within it
     products             (shape,) what the file calls each shape
     coloured             (shape,) bool: of several colours, by which its B-rep faces are ordered, and not by solids
-    kinds                (shape,): the kind of each B-rep face's surface, "" if it is not known
+    forms                (shape,): the surface of each B-rep face, None if it is not known
+    unit                 [mm] of length in the file's text
     """
 
     corners: np.ndarray
@@ -61,7 +64,8 @@ class Triangles:
     brep: np.ndarray
     products: np.ndarray
     coloured: np.ndarray
-    kinds: Sequence[Sequence[str]]
+    forms: Sequence[Sequence[Form | None]]
+    unit: float
 
 
 @dataclass(frozen=True)
@@ -129,20 +133,34 @@ def _body(
     if not len(chosen):
         return Body(name, place.path, place.place)
     corners = triangles.corners[chosen].reshape(-1, 3) @ place.place[:3, :3].T + place.place[:3, 3]
-    kinds = [triangles.kinds[place.shape][number] for number in np.unique(triangles.brep[chosen])]
-    names = () if triangles.coloured[place.shape] else _face_names(kinds, solids)
+    forms = [triangles.forms[place.shape][number] for number in np.unique(triangles.brep[chosen])]
+    names = () if triangles.coloured[place.shape] else _face_names(forms, solids, triangles.unit)
     return Body(name, place.path, place.place, chosen, corners.min(axis=0), corners.max(axis=0), is_open, names)
 
 
-def _face_names(kinds: Sequence[str], solids: Sequence[Solid]) -> tuple[str, ...]:
-    """What the only solid calls its faces that has as many, and surfaces of these kinds; of several such, if all agree."""
+def _face_names(forms: Sequence[Form | None], solids: Sequence[Solid], unit: float) -> tuple[str, ...]:
+    """What the only solid calls its faces that has as many, with these surfaces in this order; of several such, if all agree.
+
+    The kernel puts faces in another order where it mends a shell.
+    """
     alike = {
         tuple(face.name for face in solid.faces)
         for solid in solids
-        if len(solid.faces) == len(kinds)
-        and all(kind in ("", face.kind) for kind, face in zip(kinds, solid.faces, strict=True))
+        if len(solid.faces) == len(forms) and all(_is_on(f, form, unit) for f, form in zip(solid.faces, forms, strict=True))
     }
     return alike.pop() if len(alike) == 1 else ()
+
+
+def _is_on(face: NamedFace, form: Form | None, unit: float) -> bool:
+    """Whether a face of the file's text may have a surface: nothing that is known of both contradicts it."""
+    if form is None:
+        return True
+    if face.kind != form.kind or face.location is None:
+        return False
+    apart = unit * np.array(face.location) - form.origin
+    along = float(apart @ form.axis) * form.axis
+    off = along if form.kind == "plane" else apart - along if form.kind in ("cylinder", "cone") else apart
+    return float(np.linalg.norm(off)) < SAME * max(1.0, float(np.abs(form.origin).max()))
 
 
 def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]]:

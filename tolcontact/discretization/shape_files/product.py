@@ -134,7 +134,7 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     ]
     triangles = Triangles(
         np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"],
-        [["" if form is None else form.kind for form in of] for of in known],
+        known, text.unit,
     )  # fmt: skip
     return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(triangles, places, text.solids)), text)
 

@@ -32,9 +32,6 @@ COARSER = (1, 30)  # times the usual chord, one after the other
 MAX_TRIANGLES = 1_000_000  # with contact on all of them some 3 GiB on the way through
 
 REMEMBERED = 4  # STEP files
-WORDS = {  # of STEP files, for units
-    "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
-}  # fmt: skip
 
 log = logging.getLogger(__name__)
 
@@ -138,7 +135,7 @@ def _job(key: Key, text: StepText | None, coarser: float) -> reader.Job:
 
 def usual_chord(text: StepText) -> float:
     """How far triangles of a STEP file may stay off its true faces [mm], if nothing else is asked."""
-    return max(STEP_CHORD, STEP_SHARE * text.extent * UNITS[WORDS.get(text.units.removesuffix("es"), "mm")])
+    return max(STEP_CHORD, STEP_SHARE * text.extent * text.unit)
 
 
 def _is_too_fine(read_in: dict[str, np.ndarray] | GeometryFault) -> bool:

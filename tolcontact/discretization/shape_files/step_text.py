@@ -1,12 +1,14 @@
 """What the text of a STEP file (ISO 10303-21) states about its solids, and about files that it refers to."""
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import NamedTuple
 
 import numpy as np
+
+from tolcontact.declaration.geometry import UNITS
 
 # Up to a semicolon that stands in no string and no comment. Possessive: no text makes it go back.
 _RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
@@ -17,25 +19,33 @@ _KINDS = {
     b"TOROIDAL_SURFACE": "torus",
 }  # fmt: skip
 _ENTITY = re.compile(
-    rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL|ADVANCED_FACE|%b"
-    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|LENGTH_UNIT)\s*\(" % b"|".join(_KINDS)
+    rb"\b(MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP|(?:ORIENTED_)?CLOSED_SHELL|ADVANCED_FACE|AXIS2_PLACEMENT_3D|%b"
+    rb"|DOCUMENT_FILE|APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT|GLOBAL_UNIT_ASSIGNED_CONTEXT|LENGTH_UNIT)\s*\("
+    % b"|".join(_KINDS)
 )
 _NAMELESS = ("NONE", "")  # what systems write where a face has no name
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
 _POINT = re.compile(
-    rb"\bCARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
+    rb"#(\d++)\s*+=\s*+CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
 )
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
+_WORDS = {
+    "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
+}  # fmt: skip
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
 
 class NamedFace(NamedTuple):
-    """A B-rep face: its `name`, "" if it has none, and the `kind` of its surface, one of SURFACE_KINDS, "" of any other."""
+    """A B-rep face: its `name`, "" if it has none, and the `kind` of its surface, one of SURFACE_KINDS, "" of any other.
+
+    location   a point of a plane or of the axis, or the centre, in the file's units; None if it is not known
+    """
 
     name: str = ""
     kind: str = ""
+    location: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True)
@@ -50,8 +60,9 @@ class Solid:
 class StepText:
     """Solids in the file's order, the names of `files` that hold shapes that it refers to, and of other `documents`.
 
-    units   of length, in the file's words: "millimetre", "inch"; of several those that are not of the SI; empty if not stated
+    units   of lengths of shapes, in the file's words: "millimetre", "inch"; empty if not stated
     extent  the longest side of the box that holds nearly all points (98 % along each axis), in these units; 0 if there are none
+    unit    [mm] of length; that of mm if none is stated
     """
 
     solids: tuple[Solid, ...]
@@ -60,20 +71,23 @@ class StepText:
     units: str
     extent: float
 
+    @property
+    def unit(self) -> float:
+        return UNITS[_WORDS.get(self.units.removesuffix("es"), "mm")]
+
 
 def step_text(content: bytes) -> StepText:
     """What a STEP file's `content` states; of damaged ones, what is still legible."""
     solids: list[tuple[str, list[int]]] = []
     shells: dict[int, list[int]] = {}
     faces: dict[int, tuple[str, int]] = {}
-    kinds: dict[int, str] = {}
+    surfaces: dict[int, tuple[str, int]] = {}
+    placements: dict[int, int] = {}
     oriented: dict[int, list[int]] = {}
     named: list[str] = []
-    units: list[str] = []
+    units: dict[int, str] = {}
+    assigned: list[int] = []
     for number, entity, record in _entities(content):
-        if entity in _KINDS:
-            kinds[number] = _KINDS[entity]
-            continue
         strings = [_decoded(string) for string in _STRING.findall(record)]
         references = [int(reference) for reference in re.findall(rb"#(\d+)", _STRING.sub(b"", record))]
         if entity == b"CLOSED_SHELL":
@@ -81,20 +95,30 @@ def step_text(content: bytes) -> StepText:
         elif entity == b"ADVANCED_FACE":
             name = strings[0].strip() if strings else ""
             faces[number] = "" if name in _NAMELESS else name, references[-1] if references else 0
+        elif entity in _KINDS:
+            surfaces[number] = _KINDS[entity], references[0] if references else 0
+        elif entity == b"AXIS2_PLACEMENT_3D":
+            placements[number] = references[0] if references else 0
         elif entity == b"ORIENTED_CLOSED_SHELL":
             oriented[number] = references
         elif entity in (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT"):
             named.extend(strings[:1])
         elif entity == b"LENGTH_UNIT":
             metres = _METRES.search(record)
-            units += [f"{(metres[1] or b'').decode().lower()}metre"] if metres else [name.lower() for name in strings[:1]]
+            units[number] = f"{(metres[1] or b'').decode()}metre".lower() if metres else "".join(strings[:1]).lower()
+        elif entity == b"GLOBAL_UNIT_ASSIGNED_CONTEXT":
+            assigned += references
         else:
             solids.append((strings[0] if strings else "", references))
     links = re.search(rb"\bREFERENCE\s*;(.*?)\bENDSEC\s*;", content, re.DOTALL)
     named.extend(_decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
     named = [name for name in dict.fromkeys(named) if name.strip()]
     files = tuple(name for name in named if _suffix(name) in SHAPES)
-    named_faces = {number: NamedFace(name, kinds.get(surface, "")) for number, (name, surface) in faces.items()}
+    points = _points(content) if any(name for name, _ in faces.values()) else {}
+    named_faces = {}
+    for number, (name, surface) in faces.items():
+        kind, placement = surfaces.get(surface, ("", 0))
+        named_faces[number] = NamedFace(name, kind, points.get(placements.get(placement, 0)))
     return StepText(
         tuple(
             Solid(name, tuple(named_faces.get(face, NamedFace()) for face in _faces(references, shells, oriented)))
@@ -102,14 +126,27 @@ def step_text(content: bytes) -> StepText:
         ),
         files,
         tuple(name for name in named if name not in files),
-        next((unit for unit in units if not unit.endswith("metre")), units[0] if units else ""),
+        _of_shapes([units[number] for number in assigned if number in units] or list(units.values())),
         _extent(content),
     )
 
 
+def _of_shapes(units: Sequence[str]) -> str:
+    """The unit of a file that assigns several to its shapes: inches are said in mm before they are assigned."""
+    return next((unit for unit in units if not unit.endswith("metre")), units[0] if units else "")
+
+
+def _points(content: bytes) -> dict[int, tuple[float, ...]]:
+    """The points of a file by their numbers; none of a damaged one."""
+    try:
+        return {int(number): tuple(map(float, corner)) for number, *corner in _POINT.findall(content)}
+    except ValueError:
+        return {}
+
+
 def _extent(content: bytes) -> float:
     """Some points may be far off: of axes, of planes that a body does not reach."""
-    numbers = np.array([corner for point in _POINT.findall(content) for corner in point], dtype="S32")
+    numbers = np.array([corner for _, *point in _POINT.findall(content) for corner in point], dtype="S32")
     try:
         points = numbers.astype(float).reshape(-1, 3)
     except ValueError:  # damaged ones
