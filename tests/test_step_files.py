@@ -143,3 +143,17 @@ def test_coloured_faces_of_a_step_file_are_still_faces(tmp_path):
     meshes = {part: shape(part.geometry).mesh}
     for at, area in (((5, 10, 0), 200), ((5, 10, 30), 200), ((0, 10, 15), 600), ((5, 0, 15), 300)):
         assert patch(part.face(tc.Brep(at)), meshes).mesh.area == pytest.approx(area)
+
+
+def test_a_face_that_stands_twice_counts_once(tmp_path, caplog):
+    made = Step()
+    shell = made.shell(corners((0, 0, 0), (10, 20, 30)))
+    first = int(re.search(r"\(#(\d+)", made.lines[shell - 1])[1])
+    again = made.add(made.lines[first - 1])
+    made.lines[shell - 1] = made.lines[shell - 1].replace("))", f",#{again}))")
+    made.product("twice", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
+    (tmp_path / "twice.step").write_text(str(made))
+    with caplog.at_level("INFO"):
+        mesh = shape(tc.Mesh(tmp_path / "twice.step")).mesh
+    assert mesh.is_watertight and mesh.volume == pytest.approx(6000) and len(tc.faces_in(tmp_path / "twice.step")) == 6
+    assert "2 triangles that stand twice are left out" in caplog.text

@@ -113,12 +113,9 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     own = np.zeros(len(mesh.vertices), dtype=np.int64)
     own[np.asarray(mesh.faces).ravel()] = np.repeat(arrays["piece"], 3)
     mesh = _merged(mesh, own)
-    # Of edges shorter than that step, triangles with two corners in one place are left. They are none.
-    whole = (mesh.faces != np.roll(mesh.faces, 1, axis=1)).all(axis=1)
-    shape, brep = arrays["piece"][whole], arrays["brep"][whole]
-    if not whole.all():
-        log.info('"%s": %d triangles on edges of no length are left out', path, int((~whole).sum()))
-        mesh.update_faces(whole)
+    own = _mended(path, mesh.faces)
+    mesh.update_faces(own)
+    shape, brep = arrays["piece"][own], arrays["brep"][own]
     vertices, off = np.array(mesh.vertices), OFF * float(arrays["chord"])
     known: list[list[Form | None]] = []
     for k, said in enumerate(arrays["surfaces"]):
@@ -137,6 +134,22 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         known, text.unit,
     )  # fmt: skip
     return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(triangles, places, text.solids)), text)
+
+
+def _mended(path: Path, faces: np.ndarray) -> np.ndarray:
+    """Indices of the triangles (face, 3) that are one, and once; what is left out is mentioned.
+
+    Of edges shorter than coordinates resolve, triangles with two corners in one place are left; of a face that stands twice in
+    its shell, triangles that stand twice.
+    """
+    whole = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    lowest = np.argmin(faces[whole], axis=1)
+    turned = np.take_along_axis(faces[whole], (lowest[:, None] + np.arange(3)) % 3, axis=1)
+    _, first = np.unique(turned, axis=0, return_index=True)
+    for count, what in ((len(faces) - len(whole), "on edges of no length"), (len(whole) - len(first), "that stand twice")):
+        if count:
+            log.info('"%s": %d triangles %s are left out', path, count, what)
+    return whole[np.sort(first)]
 
 
 def check_numbers(vertices: np.ndarray, who: str) -> None:
