@@ -35,7 +35,7 @@ def off(product: Product) -> dict[str, float]:
 def read(path: Path) -> dict:
     """What became of a file."""
     start = time.perf_counter()
-    content = read_files([tc.Mesh(path)])[path]
+    (content,) = read_files([tc.Mesh(path)]).values()
     record = {"seconds": time.perf_counter() - start, "MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3}
     if isinstance(content, GeometryFault):
         return record | {"message": str(content).replace(str(path), path.name)}

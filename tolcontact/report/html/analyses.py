@@ -12,7 +12,7 @@ from tolcontact.report.text.allocation import allocation_tables
 from tolcontact.report.text.relocation import relocation_table
 from tolcontact.report.text.sensitivities import LEVERAGE_COLUMNS, SENSITIVITY_COLUMNS, leverage_rows, sensitivity_rows
 from tolcontact.report.text.tails import TAIL_COLUMNS, tail_rows
-from tolcontact.report.text.worst_case import WORST_COLUMNS, worst_rows
+from tolcontact.report.text.worst_case import WORST_COLUMNS, worst_remarks, worst_rows
 from tolcontact.statistics import kept_analysis
 
 MOST = 15  # bars of a chart
@@ -25,7 +25,7 @@ def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
 
 
 def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
-    """Sensitivities, worst cases, rare events and allocation, with titles, columns and rows."""
+    """Sensitivities, worst cases, rare events and allocation, with titles, columns and rows; some with remarks below."""
     slopes = kept_analysis(results, words.OF_SENSITIVITIES)
     if slopes is not None:
         count = grouped(slopes.attrs["realizations"])
@@ -39,7 +39,7 @@ def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
         for measure in worst["measure"].values:
             of = worst.sel(measure=measure)
             title = f"Worst cases of {measure} [{of['measure_units'].values}], the first of the single realizations above"
-            yield {"title": title, "columns": WORST_COLUMNS, "rows": list(worst_rows(of))}
+            yield {"title": title, "columns": WORST_COLUMNS, "rows": list(worst_rows(of)), "remarks": list(worst_remarks(of))}
     rare = kept_analysis(results, words.OF_TAILS)
     if rare is not None:
         yield {"title": "Rare events", "columns": TAIL_COLUMNS, "rows": tail_rows(rare)}

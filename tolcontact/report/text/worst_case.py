@@ -36,7 +36,7 @@ def _sections(found: xr.Dataset) -> Iterator[Text | FigureTable]:
         of = found.sel(measure=measure)
         yield Text(f"\n{measure} [{of['measure_units'].values}]", style="bold")
         yield FigureTable(WORST_COLUMNS, list(worst_rows(of)))
-        yield from _remarks(of)
+        yield from map(Text, worst_remarks(of))
         yield FigureTable(["corrected", *ENDS], list(_combination(of.isel(state=CORRECTED))))
 
 
@@ -53,13 +53,14 @@ def _figure(value: float) -> str:
     return f"{value:.6g}" if math.isfinite(value) else "none"
 
 
-def _remarks(of: xr.Dataset) -> Iterator[Text]:
+def worst_remarks(of: xr.Dataset) -> Iterator[str]:
+    """What has to be known of the worst cases of a measure."""
     sign = np.array([-1.0, 1.0])
     beyond = float((sign * (of["worst"] - of["bound"]).values).max())
     if beyond > 0:
-        yield Text(f"Up to {beyond:.2g} beyond the bound: so much is of second order in the deviations.")
+        yield f"Up to {beyond:.2g} beyond the bound: so much is of second order in the deviations."
     if float(of["unseen"].max()) > UNSURE:
-        yield Text("Searches ended at several values: there may be worse ones; more --samples look farther.")
+        yield "Searches ended at several values: there may be worse ones; more --samples look farther."
 
 
 def _combination(of: xr.Dataset) -> Iterator[list[str]]:
