@@ -25,6 +25,7 @@ def pile(*ranges, tolerance=1.0):
     return a
 
 
+@pytest.mark.slow
 def test_ranges_of_a_sum_are_those_of_lagrange():
     """min sum c / r with sum (r T / 6)^2 = s^2: r^3 is proportional to c / T^2."""
     widths, costs = np.array([0.6, 0.3, 0.9]), np.array([1.0, 4.0, 2.0])

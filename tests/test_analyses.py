@@ -22,6 +22,7 @@ def archive(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_an_archive_keeps_what_was_asked_of_its_model(archive):
     kept = {
         "contributions": tc.contributions(cases.ra1(), samples=1024, into=archive, **FAST),

@@ -17,6 +17,7 @@ from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
 
 
+@pytest.mark.slow
 def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(archive):
     done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", archive])
     assert done.returncode == 0 and len(done.stdout.split()) == 300, done.stderr
@@ -64,6 +65,7 @@ def test_fields_are_those_of_the_archived_poses(archive):
         assert np.abs(field.six_sigma.sel(state=state).values[:7] - 6 * u.std(axis=0, ddof=1)).max() < 1e-11
 
 
+@pytest.mark.slow
 def test_it_may_be_read_while_its_results_are_open(tmp_path):
     """The netCDF library crashed on that while labels were text of variable length."""
     assert run(script("read_while_open", tmp_path / "open.nc")).returncode == 0

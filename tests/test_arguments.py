@@ -30,6 +30,7 @@ def test_what_speaks_of_an_archive_needs_one(option, program, tmp_path):
     assert done.returncode == 2 and "--out FILE.nc" in done.stderr
 
 
+@pytest.mark.slow
 def test_a_model_may_be_given_as_assembly_function_or_path(tmp_path):
     path = tmp_path / "model.py"
     path.write_text((cases.MODELS / "ra1.py").read_text())

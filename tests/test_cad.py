@@ -213,6 +213,7 @@ def test_the_command_line_lists_bodies_and_faces(file):
     assert sum(face["area"] for face in faces) == pytest.approx(150)
 
 
+@pytest.mark.slow
 def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(monkeypatch, caplog):
     whole = len(shape(tc.Mesh(COVER)).mesh.faces)
     monkeypatch.setattr(reading, "_known", {})

@@ -129,6 +129,7 @@ def told(make, **options):
     return program, run, [str(one.message) for one in caught if one.category is ContactWarning]
 
 
+@pytest.mark.slow
 def test_a_shaft_on_sampled_points_is_off_and_a_warning_says_by_how_much():
     """Of round faces that were overruled by a number of points."""
     program, run, warned = told(cases.shaft_in_a_v(1000, points=200), samples=100, solver="daqp", method=SEATED)

@@ -100,6 +100,7 @@ def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
         assert words in told
 
 
+@pytest.mark.slow
 def test_a_model_script_runs_by_itself(tmp_path):
     model = write_model(tmp_path)
     model.write_text(model.read_text() + "\nif __name__ == '__main__':\n    tc.main(assembly)\n")

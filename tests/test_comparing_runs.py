@@ -98,6 +98,7 @@ def test_intervals_of_paired_shares_cover():
     assert 463 <= inside <= 492
 
 
+@pytest.mark.slow
 def test_the_command_compares_archives(archive, tmp_path):
     again = tmp_path / "again.nc"
     tc.run(cases.stack(), samples=100, seed=4, solver="daqp", out=again, surfaces=0).close()

@@ -42,6 +42,7 @@ def test_contact_points_follow_the_spacing_and_not_the_tessellation(n):
         assert np.abs(pair.P_m[:, :2] - corner).max(axis=1).min() < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solid", ["sphere", "cylinder"])
 def test_points_on_curved_faces_lie_on_them_and_look_outward(solid):
     """A shell around a ball or a bar: its points are projected onto it."""

@@ -39,6 +39,7 @@ def test_figures_are_those_of_the_rows():
         assert float(together.sel(combination="none")) == pytest.approx((~carries.any(axis=1)).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lid", "door"])
 def test_points_touch_where_the_least_gap_is_closed(name):
     """A pair whose least gap is closed has a point that touches, and no other has."""

@@ -189,6 +189,7 @@ CORRELATED = ["upper.A3", "middle.A1", "upper.A1"]
 MATRIX = [[1, 0.8, -0.3], [0.8, 1, 0.1], [-0.3, 0.1, 1]]
 
 
+@pytest.mark.slow
 def test_shapley_effects_divide_what_is_correlated():
     """Against the closed form: also of a locator that the measure does not follow; it is correlated with one it follows."""
     rho, first, second = 0.5, 1, 2  # Owen, Prieur (2017), two numbers
@@ -266,6 +267,7 @@ def test_a_model_in_which_nothing_varies_is_refused():
         tc.contributions(a)
 
 
+@pytest.mark.slow
 def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
     """The clutch's roller floats: without contact its angle does not vary."""
     done = call(tmp_path, "contributions", cases.MODELS / "clutch.py", "--samples", "64", "--solver", "daqp")

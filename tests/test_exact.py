@@ -108,6 +108,7 @@ def test_conflicts_do_not_loosen_two_sided_locators():
     assert np.abs(moved[stuck | (block.status == Status.RESOLVED)]).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_searching_again_follows_curved_surfaces():
     """A roller set down beside the top of another: its axis must end 20 mm from the other's, to the mesh's chord error."""
     away = {}

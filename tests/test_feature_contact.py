@@ -7,6 +7,7 @@ from tolcontact.method import OBJECTIVES
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", ["fixed", "iterated"])
 @pytest.mark.parametrize("objective", sorted(OBJECTIVES))
 def test_faces_of_features_are_resolved_by_every_objective(objective, search, tmp_path):

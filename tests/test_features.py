@@ -131,6 +131,7 @@ def test_supports_follow_their_faces_too():
     assert_gaps_recompute(results)
 
 
+@pytest.mark.slow
 def test_one_feature_deviates_once_whatever_uses_it():
     """The pair does not say that its faces are features; the archive alone gives the gaps again."""
     a = tc.Assembly("stack")

@@ -21,6 +21,7 @@ def pile(sections: int) -> tc.Assembly:
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sections", [8, 200, 700])
 def test_the_field_of_a_part_with_any_number_of_vertices_is_that_of_its_poses(sections):
     tree = tc.run(pile(sections), samples=300, solver="daqp", surfaces=0)

@@ -19,6 +19,7 @@ def drawn(results, label):
     return results["sample"].deviation.sel(contributor=label).values
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 @pytest.mark.parametrize("frame", [None, MOVED], ids=["still", "moved"])
 @pytest.mark.parametrize("sections", [24, 90])
@@ -45,6 +46,7 @@ def test_a_peg_is_pushed_to_the_side_of_its_hole():
         assert np.abs(measured.sel(measure=f"bore {axis}").values - bore).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_hinge_pin_tilts_between_its_knuckles():
     reach, width = 40.0, 8.0
     results = tc.run(floating.hinge(reach=reach, width=width), samples=300, solver="daqp")
@@ -60,6 +62,7 @@ def test_a_hinge_pin_tilts_between_its_knuckles():
         assert lift[k] == pytest.approx(best, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_lid_finds_its_place_over_four_studs():
     results = tc.run(floating.lid_on_studs(position=0.1, clearance=0.3), samples=150, solver="daqp")
     assert_resolved(results)
@@ -86,6 +89,7 @@ def room_left(q, holes, studs, room):
     return room - np.linalg.norm(q[:2] + (PLACES + holes) @ turn.T - (PLACES + studs), axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("material", ["", "M"])
 def test_the_share_that_cannot_be_assembled_is_that_of_an_independent_computation(material):
     """Two hole patterns, position at maximum material or without: the least of the largest misfits, by shifting and turning."""
@@ -124,6 +128,7 @@ def most_room(holes, studs, room) -> float:
     return float(-found.fun)
 
 
+@pytest.mark.slow
 def test_a_part_that_nothing_holds_is_not_certified():
     a = floating.floating_peg_in_a_hole()
     a.force("pull out", at=a.parts[1].point(0, 0, 0), vector=(0, 0, 0.001))

@@ -73,6 +73,7 @@ def test_an_earlier_format_is_not_resumed_and_the_file_is_left_alone(stored):
     assert stored.read_bytes() == before and [*stored.parent.iterdir()] == [stored]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", [FORMAT], indirect=True, ids=lambda number: f"format {number}")
 def test_the_present_format_is_resumed(stored):
     settings = {"seed": 1, "solver": "daqp", "method": EXACT, "surfaces": 4, "fields": 16_384}

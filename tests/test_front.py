@@ -60,6 +60,7 @@ def test_faults_are_listed_without_a_run():
     assert "force" in fault
 
 
+@pytest.mark.slow
 def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tmp_path):
     model = cases.model("tower", 2)
     assert model.method == ALL_POINTS

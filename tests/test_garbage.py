@@ -47,6 +47,7 @@ def left(tmp_path):
     assert collector in collected_by
 
 
+@pytest.mark.slow
 def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left):
     def drop(rows):
         del left[:20]
@@ -56,6 +57,7 @@ def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left
     assert_gaps_recompute(tmp_path / "ra1.nc")
 
 
+@pytest.mark.slow
 def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(tmp_path, left):
     program = tc.build(cases.stack(), solver="daqp")
     sizes = DisplacementFields(program.nominal, "none").sizes

@@ -20,6 +20,7 @@ CHAPTERS = (
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", PACKAGES)
 def test_examples_of_the_guide_run(package):
     text = importlib.import_module(package).__doc__

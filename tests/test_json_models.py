@@ -67,6 +67,7 @@ def with_everything(folder):
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["plain", "everything", "shaft", "lid", "model"])
 def test_models_come_back_exactly(name, tmp_path):
     models = {
@@ -90,6 +91,7 @@ def test_models_come_back_exactly(name, tmp_path):
         assert_same_run(*(tc.run(each, samples=200, surfaces=0, method={"resolution": "exact"}) for each in (model, again)))
 
 
+@pytest.mark.slow
 def test_what_is_left_out_has_the_value_that_a_script_would_have(tmp_path):
     (tmp_path / "stand.json").write_text(json.dumps(PLAIN))
     done = run(["tolcontact", "run", tmp_path / "stand.json", "--samples", "50"])
@@ -125,6 +127,7 @@ def test_errors_state_the_place(document, said, tmp_path):
     assert said in str(refused.value) and "odd, größer.json" in str(refused.value)
 
 
+@pytest.mark.slow
 def test_what_is_no_json_is_said(tmp_path):
     path = tmp_path / "model.json"
     path.write_text('{"name": ')

@@ -18,6 +18,7 @@ def rows_of(results, name):
     return (results["sample"].to_dataset() if name == "deviation" else results.to_dataset())[name]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "samples", "options"),
     [
@@ -108,6 +109,7 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch):
         tc.simulate(cases.ra1(), 100)
 
 
+@pytest.mark.slow
 def test_what_is_written_is_streamed(tmp_path):
     """Netcdf and zarr hold what a run gives, and memory does not grow with their size."""
     program, own = tc.build(cases.ra1(), solver="daqp"), psutil.Process()
@@ -134,6 +136,7 @@ def test_workers_compute_the_same():
         assert np.array_equal(found.values, here)
 
 
+@pytest.mark.slow
 def test_a_study_is_one_graph_over_designs():
     models = {"narrow": cases.one_dimensional(2), "wide": cases.one_dimensional(6), "stack": cases.stack()}
     methods = [{"resolution": "linearized"}, {"resolution": "exact"}]

@@ -23,6 +23,7 @@ METHODS = {
 RA2 = {RAW: (-0.0014, 12.5187, 4.3534), CORRECTED: (-0.0664, 5.8544, 0.9521)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", METHODS)
 def test_every_model_resolves_all_its_contacts(name):
     program, run = simulate(cases.model(name), samples=100, solver="daqp", method=METHODS[name])
@@ -135,6 +136,7 @@ def test_a_clutch_jams_at_the_angle_of_its_formula(solver):
     assert abs(angle.mean() - 7.01477) < 4 * error and abs(angle.std() - 0.21971) < 4 * error
 
 
+@pytest.mark.slow
 def test_lids_at_maximum_material_fit():
     program, run = simulate(cases.model("lid"), samples=150, solver="daqp", method=cases.model("lid").method)
     assert np.isin(run["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
@@ -147,6 +149,7 @@ def test_lids_at_maximum_material_fit():
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "samples"), [("hinge", 60), ("spindle", 100)])
 def test_shafts_in_several_bores_rest_in_all_of_them(name, samples):
     model = cases.model(name)

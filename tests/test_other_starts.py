@@ -31,6 +31,7 @@ def peg() -> tc.Assembly:
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
 def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_projected_anew():
     """Along planes at fixed points it rolls into the wall. In the end it touches where the force points to."""

@@ -92,6 +92,7 @@ def test_few_replicates_have_the_intervals_of_independent_realizations():
     assert intervals.share(nothing) == intervals.share_of(0, 20 * REPLICATE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", STRATIFIED)
 def test_a_run_by_a_plan_is_narrower_and_its_archive_says_so(name, tmp_path):
     options = {"samples": 4096, "seed": 2, "solver": "daqp", "fields": "none", "surfaces": 4}
@@ -112,6 +113,7 @@ def test_a_run_by_a_plan_is_narrower_and_its_archive_says_so(name, tmp_path):
         assert np.array_equal(longer["sample"].deviation.values[:4096], kept) and longer.sizes["realization"] == 8192
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_until_an_interval_is_narrow_enough(tmp_path):
     options = {"samples": 300, "solver": "daqp", "fields": "none", "surfaces": 4}
     results = tc.run(cases.ra1(), until="corner height: 6 sigma +-2 %", **options)
@@ -157,6 +159,7 @@ def test_a_measure_may_have_a_colon_in_its_name():
     assert tc.run(a, samples=64, solver="daqp", until="gap: left: mean +-10").sizes["realization"] == 64
 
 
+@pytest.mark.slow
 def test_the_command_has_plans_and_targets(tmp_path):
     done = call(
         tmp_path, "run", cases.MODELS / "ra1.py", "--samples", "512", "--solver", "daqp", "--plan", "latin hypercube",

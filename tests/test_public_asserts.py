@@ -110,6 +110,7 @@ def test_the_last_bit_counts_and_nan_equals_nan(results):
         assert_same_run(results, other)
 
 
+@pytest.mark.slow
 def test_runs_of_other_models_or_sizes_are_not_the_same(archive, results):
     with pytest.raises(AssertionError, match=r"labels of part differ: \['bottom', 'middle', 'upper'\] and \['base', 'top'\]"):
         assert_same_run(archive, tc.run(cases.ra1(points=9), samples=20, solver="daqp"))

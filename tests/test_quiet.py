@@ -69,6 +69,7 @@ def test_what_a_users_measure_prints_is_not_lost(capsys):
     assert capsys.readouterr().out == "called\n"
 
 
+@pytest.mark.slow
 def test_it_runs_without_streams():
     assert run(script("run_without_streams")).returncode == 0
 

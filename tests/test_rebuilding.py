@@ -11,6 +11,7 @@ from tests.helpers import ALL_POINTS, SEATED
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 
 
+@pytest.mark.slow
 def test_a_model_is_rebuilt_from_its_archive_and_gives_the_same_results(tmp_path):
     tc.run(cases.everything_of_meshes(tmp_path), samples=200, seed=2, solver="daqp", out=tmp_path / "first.nc").close()
     (tmp_path / "block.stl").unlink()

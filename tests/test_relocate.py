@@ -56,6 +56,7 @@ def test_fewer_are_outside_after_than_before():
     assert float(found["change"].sel(interval="estimate")) == pytest.approx(after - before)
 
 
+@pytest.mark.slow
 def test_with_contact_and_a_scheme_on_faces():
     """RA1: a 3-2-1 scheme becomes six locators, and nothing else changes."""
     a = cases.model("ra1")

@@ -122,6 +122,7 @@ def test_where_no_page_can_be_is_said_before_anything_is_done(name, said, archiv
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.slow
 def test_formats_of_before_have_a_page(tmp_path):
     for number, stored in STORED.items():
         path = tmp_path / f"format_{number}.nc"

@@ -69,6 +69,7 @@ def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_las
     assert found == written
 
 
+@pytest.mark.slow
 def test_a_resumed_run_goes_on_after_the_newest_checkpoint(tmp_path, monkeypatch):
     monkeypatch.setattr(writer, "CHECKPOINTS_EVERY", 0.0)
     path, settings = tmp_path / "run.nc", {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}

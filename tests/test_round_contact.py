@@ -100,6 +100,7 @@ def test_a_pin_in_a_slot_touches_an_edge_of_its_side():
     assert np.abs(np.min(apart, axis=0) - 4).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", round_cases.EVERY)
 def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, tmp_path):
     with tc.run(
@@ -111,6 +112,7 @@ def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, t
         assert float(results["surface"].surface_penetration.max()) < 1e-7
 
 
+@pytest.mark.slow
 def test_linearized_steps_start_from_the_exact_gaps():
     results = tc.run(cases.peg_in_a_hole(), samples=200, solver="daqp", method=tc.Method(objective="all points"))
     assert_gaps_recompute(results)
@@ -139,6 +141,7 @@ def test_a_ball_in_a_socket_lies_where_its_weight_points_to():
     assert np.abs(apart - 0.2 * np.array([2, 1, -5]) / np.sqrt(30)).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_a_bolt_finds_the_hole_of_its_own_size_in_a_file_from_others():
     """Both of radius 5, in halves that are fitted to vertices: nothing is left but the hole's axis."""
     a = tc.Assembly("bolt", method=tc.Method(resolution="exact", objective="all points"))

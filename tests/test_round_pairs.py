@@ -3,6 +3,7 @@
 import warnings
 
 import numpy as np
+import pytest
 import trimesh
 from typer.testing import CliRunner
 
@@ -14,6 +15,7 @@ from tolcontact.discretization import discretize
 from tolcontact.discretization.faces import patch
 
 
+@pytest.mark.slow
 def test_check_says_which_pairs_are_round():
     listed = CliRunner().invoke(app, ["check", str(cases.MODELS / "cover.py")]).stdout
     assert "contact seat: 78 contact points\n" in listed
@@ -76,6 +78,7 @@ def grooved(radius, half, sides=40):
     return strip(list(zip(radius * np.cos(azimuths), radius * np.sin(azimuths), strict=True)))
 
 
+@pytest.mark.slow
 def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     floor = strip([(-20, 0), (20, 0)])
     assert pair_between(BALL, (), floor, (ANY,), at=(0, 0, 5)).round

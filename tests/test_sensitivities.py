@@ -86,6 +86,7 @@ def test_a_clutch_follows_its_drawing_as_its_formula_says():
         assert abs(estimate - slope) < 0.01 * abs(slope) and upper - lower < 0.02 * abs(slope)
 
 
+@pytest.mark.slow
 def test_they_are_differences_of_the_engine():
     a = cases.model("lid")
     program = tc.build(a, solver="daqp", method=a.method)

@@ -45,12 +45,14 @@ def test_a_file_that_brings_its_reader_down_is_a_fault(tmp_path):
     assert "rotten.step" in said and "damaged" in said and "export it again" in said
 
 
+@pytest.mark.slow
 def test_a_file_that_stalls_its_reader_is_a_fault(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())
     said = alone(tmp_path, "endless.step")
     assert "endless.step" in said and "not read within 2 s" in said
 
 
+@pytest.mark.slow
 def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
     (tmp_path / "rotten.step").write_text(crashing())
     (tmp_path / "rotten too.step").write_text(crashing())

@@ -14,6 +14,7 @@ from tolcontact.discretization.shapes import shape
 from tolcontact.errors import UnitsWarning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "glb"])
 def test_meshes_are_read_in_the_units_of_their_kind(suffix, tmp_path):
     path = tmp_path / f"block.{suffix}"
@@ -127,6 +128,7 @@ def lid_on(path, units=None):
     return a
 
 
+@pytest.mark.slow
 def test_a_mesh_in_inches_taken_as_mm_is_warned_of_by_its_size(tmp_path):
     path = tmp_path / "lid.stl"
     trimesh.creation.box(bounds=[[0, 0, 0], [8, 6, 1]]).export(path)  # inches

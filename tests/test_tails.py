@@ -62,6 +62,7 @@ def limited(limit):
     return a
 
 
+@pytest.mark.slow
 def test_a_limit_far_out_is_exceeded_as_often_as_the_closed_form_says():
     found = tc.tails(limited(4.5), samples=8000, solver="daqp")
     assert found.event.values.tolist() == ["kept outside limits"]
@@ -70,6 +71,7 @@ def test_a_limit_far_out_is_exceeded_as_often_as_the_closed_form_says():
     assert int(found.simulated[0]) == int(found.by_status.sum()) < 16_000
 
 
+@pytest.mark.slow
 def test_ra1_as_a_run_counts_it():
     """An event that a run of 200 000 realizations still sees."""
     a = cases.ra1()
@@ -81,6 +83,7 @@ def test_ra1_as_a_run_counts_it():
     assert lower < high and low < upper and 0 < high < 1e-3
 
 
+@pytest.mark.slow
 def test_parts_are_led_to_where_they_do_not_go_together():
     """CASES C6, rotations alone: the least inflation of all deviations at which parts do not go together, by looking at all."""
     program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
@@ -123,6 +126,7 @@ def test_what_is_drawn_anew_cannot_be_followed():
         tc.tails(a)
 
 
+@pytest.mark.slow
 def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
     a = limited(2.5)
     a.population(pd.DataFrame({"z": np.linspace(-3, 3, 200)}), {"block.Z": "z"})
@@ -130,6 +134,7 @@ def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
     assert lower <= (np.linspace(-3, 3, 200) > 2.5).mean() <= upper
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_table_json_and_csv(tmp_path, monkeypatch):
     monkeypatch.setattr("tolcontact.statistics.tails.REPLICATES", 3)
     model = tmp_path / "model.py"

@@ -154,6 +154,7 @@ def test_a_read_only_archive_is_not_replaced(tmp_path):
         tc.run(cases.stack(), samples=10, solver="daqp", out=path, overwrite=True)
 
 
+@pytest.mark.slow
 def test_numbers_of_realizations_are_whole_after_growth(tmp_path):
     path = tmp_path / "grown.nc"
     for samples in (5000, 12_000):

@@ -59,6 +59,7 @@ def test_words_of_step_files_and_boxes_choose_nothing_else():
             assert chosen(part, words).tolist() == np.flatnonzero(found.face_of == face.number - 1).tolist()
 
 
+@pytest.mark.slow
 def test_the_command_shows_models_step_files_and_archives(tmp_path):
     for what in (cases.MODELS / "ra1.py", cases.MODELS / "cover.step"):
         done = call(tmp_path, "view", what, "--out", tmp_path / "page.html")
@@ -72,6 +73,7 @@ def test_the_command_shows_models_step_files_and_archives(tmp_path):
     assert (done.returncode, done.stdout) == (2, "") and not (tmp_path / "no.html").exists()
 
 
+@pytest.mark.slow
 def test_gaps_of_the_nominal_assembly_are_those_of_the_drawing(tmp_path):
     a = cases.model("cover")
     write_view(a, discretize(a), [], tmp_path / "cover.html")

@@ -42,6 +42,7 @@ def test_a_third_of_the_checked_rows_are_the_deepest_and_a_third_those_with_most
     assert {*deepest, *busiest} < set(rows)
 
 
+@pytest.mark.slow
 def test_the_other_checked_rows_are_drawn(archive):
     """Without penetration and with few carrying points nothing is special: what is drawn depends on the seed."""
     runs = [tc.run(cases.stack(), samples=300, seed=seed, solver="daqp", surfaces=12) for seed in (3, 4)]
@@ -156,6 +157,7 @@ def test_resuming_another_run_is_refused(wrong, told, archive):
         tc.run(cases.stack(), out=archive, resume=True, **{**same, **wrong})
 
 
+@pytest.mark.slow
 def test_resuming_a_model_whose_mesh_was_replaced_is_refused(tmp_path):
     def model(width):
         trimesh.creation.box(bounds=[[0, 0, 0], [width, 10, 10]]).export(tmp_path / "block.stl")
@@ -205,6 +207,7 @@ def test_checksums_are_those_of_little_endian_numbers_and_of_utf8_texts(archive)
         assert int(field["checksum"][...]) == found
 
 
+@pytest.mark.slow
 def test_the_fields_of_a_run_that_broke_off_are_at_most_some_seconds_old(tmp_path):
     """Nobody can be asked to finish what a crash ended: fields are written as the run goes on."""
 

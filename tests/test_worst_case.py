@@ -49,6 +49,7 @@ def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float,
         assert values(found, of="bound") == pytest.approx([47, 53], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_searches")
 def test_a_clutch_has_the_worst_cases_of_its_formula():
     """CASES C7."""
@@ -72,6 +73,7 @@ def small_ra1(**method):
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", ["linearized", "exact"])
 def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(resolution):
     """Two methods that share no code: searches on the engine, and a mixed-integer program; 2e-5 mm are of second order."""
@@ -81,6 +83,7 @@ def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(reso
     assert values(found)[1] - values(found)[0] > 0.03
 
 
+@pytest.mark.slow
 def test_contact_alone_keeps_no_part_down():
     found = tc.worst_case(small_ra1(), samples=512, solver="daqp")
     least, largest = values(found, of="bound")
@@ -176,6 +179,7 @@ def test_a_zone_grows_with_the_size_that_it_is_left():
     assert far[size] == pytest.approx(-0.2) and far[shifts] @ (0.6, 0.8) == pytest.approx(0.1 / 2, abs=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["lid", "hinge", "clutch"])
 def test_steps_end_where_the_region_ends(name):
     found, labels = region(cases.model(name))
@@ -202,6 +206,7 @@ def test_measured_parts_are_one_of_their_rows():
     assert found.worst.sel(state="raw").values.ravel() == pytest.approx([-1, 2], abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_searches")
 def test_what_cannot_be_assembled_does_not_count():
     a = cases.square_pins()
@@ -220,6 +225,7 @@ def test_nothing_that_varies_is_refused():
         tc.worst_case(a, samples=1)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("few_searches")
 def test_the_command_prints_a_table_json_and_csv(tmp_path):
     options = ("worst", cases.MODELS / "clutch.py", "--samples", "16", "--solver", "daqp")
