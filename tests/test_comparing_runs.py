@@ -99,6 +99,17 @@ def test_intervals_of_paired_shares_cover():
 
 
 @pytest.mark.slow
+def test_measures_are_in_the_order_of_the_first_run():
+    def measured(*names):
+        a = cases.stack()
+        for name in names:
+            a.measure(name, a.parts[-1].point(0, 0, 10), along="z")
+        return tc.run(a, samples=20, seed=1, solver="daqp", surfaces=0)
+
+    found = tc.compare_runs({"one": measured("a", "b", "c"), "other": measured("c", "d", "a")})
+    assert [name for name in found["measure"].values if name in "abcd"] == ["a", "c"]
+
+
 def test_the_command_compares_archives(archive, tmp_path):
     again = tmp_path / "again.nc"
     tc.run(cases.stack(), samples=100, seed=4, solver="daqp", out=again, surfaces=0).close()

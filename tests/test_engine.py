@@ -13,7 +13,7 @@ from tolcontact.compilation import contact_qp
 from tolcontact.compilation.functions import InterpretedFunction, adaptive
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
-from tolcontact.contact.scan import PairScan, pair_scan
+from tolcontact.contact.scan import PairScan, _cluster, pair_scan
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import _corners, gap_map
@@ -169,3 +169,23 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
 @pytest.mark.parametrize(("coordinates", "corners"), [([[3.0, 1.0, 2.0, 5.0]], [1, 3]), ([], [0]), ([[2.0, 2.0]], [0])])
 def test_on_a_line_the_two_ends_can_be_the_deepest(coordinates, corners):
     assert _corners(np.array(coordinates)).tolist() == corners
+
+
+@pytest.mark.parametrize("solver", ["daqp", "qpoases", "osqp", "highs", "piqp", "proxqp"])
+def test_a_block_does_not_depend_on_those_before_it(solver):
+    """Whatever a solver remembers of the last problems."""
+    program = tc.build(cases.ra1(), solver=solver)
+    *_, last = simulate_blocks(program, samples=96, seed=4, block=32, threads=1)
+    (alone,) = simulate_blocks(program, samples=96, seed=4, start=64, block=32)
+    assert (last.status == Status.RESOLVED).any()
+    assert np.array_equal(last.poses, alone.poses) and np.array_equal(last.reaction, alone.reaction)
+
+
+def test_clusters_are_neighbours():
+    """Four heaps far from each other, of points in any order."""
+    rng = np.random.default_rng(1)
+    heap = rng.integers(4, size=200)
+    points = 100 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, -1, 1]])[heap] + rng.normal(size=(200, 3))
+    label = _cluster(points, 4)
+    assert sorted({(a, b) for a, b in zip(heap, label, strict=True)}) == sorted(dict(zip(heap, label, strict=True)).items())
+    assert sorted(set(label)) == [0, 1, 2, 3]

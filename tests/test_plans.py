@@ -169,3 +169,13 @@ def test_the_command_has_plans_and_targets(tmp_path):
     with tc.open_archive(tmp_path / "a.nc") as results:
         assert results.attrs["sampler"] == LATIN_HYPERCUBE != MONTE_CARLO and results.sizes["realization"] > 512
     assert call(tmp_path, "run", cases.MODELS / "ra1.py", "--plan", "sobel").returncode == 2
+
+
+def test_replicates_that_hit_alike_have_the_interval_of_independent_realizations():
+    """Their spread is nothing, which is no reason to be sure: 4096 coins that come up in turns."""
+    coins = np.tile([True, False], 2048)
+    hits = Sample(lambda: [coins], together=256)
+    assert hits.map(lambda piece: piece.astype(float)).widening == 0
+    own = intervals.share(hits)
+    expected = stats.binomtest(2048, 4096).proportion_ci(0.95, method="exact")
+    assert (own.value, own.lower, own.upper) == pytest.approx((0.5, expected.low, expected.high), abs=1e-9)

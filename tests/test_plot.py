@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 
 import tolcontact as tc
 from tests import cases
@@ -20,6 +21,9 @@ def test_a_histogram_has_all_realizations_and_the_limits(results):
         heights = np.array([patch.get_height() for patch in container])
         assert heights.sum() == pytest.approx(100) and len(heights) == 40
         assert np.average(edges + container[0].get_width() / 2, weights=heights) == pytest.approx(values.mean(), abs=0.1)
+        (curve,) = (line for line in axes.lines if line.get_label() == f"normal, {state}")
+        normal = stats.norm(values.mean(), values.std(ddof=1)).pdf(curve.get_xdata())
+        assert curve.get_ydata() == pytest.approx(100 * container[0].get_width() * normal)
     limits = [line.get_xdata()[0] for line in axes.lines if line.get_label() == "_limit"]
     assert limits == [-0.5, 0.5] and axes.get_xlabel() == "corner height [mm]"
 

@@ -68,6 +68,23 @@ def test_a_ball_beside_walls_of_every_kind():
     check_gaps(RoundPoints.of(points), rng, turn=3e-2)
 
 
+def test_a_wall_beside_a_hollow_has_gaps_of_its_own():
+    """One that is tangent to the hollow, and before another ball; and one that is no plane, before the same ball."""
+    hollow = Form("cylinder", np.zeros(3), np.array([0, 0, 1.0]), radius=20.0)
+    tangent = Form("plane", np.array([20.0, 0, 0]), np.array([-1.0, 0, 0]))
+    beside = Form("cylinder", np.array([32.0, 0, 0]), np.array([-1.0, 0, 0]), radius=5.0)  # along x: its end is not seen
+    ball, other, x = np.array([18.0, 0, 0]), np.array([10.0, 0, 0]), np.array([1.0, 0, 0])
+    points = RoundPoints.of(
+        [
+            RoundPoint(hollow, True, ball, NONE, NONE, 2.0, True, x, np.pi),
+            RoundPoint(tangent, False, other, NONE, NONE, 2.0, True, x, np.pi),
+            RoundPoint(beside, False, np.array([18.0, 9, 0]), NONE, NONE, 2.0, True, x, np.pi),
+        ]
+    )
+    gaps = round_gaps(points)(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), np.zeros(3))[0]
+    assert gaps.full().ravel() == pytest.approx([0, 8, 2], abs=1e-9)
+
+
 def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     """Gaps beyond the end of the wall are those of its last tangent planes; and there is no wall where it is open."""
     rng, points, out = np.random.default_rng(4), [], []
