@@ -1,6 +1,8 @@
 """The fast ways give what the plain ones give."""
 
+import inspect
 import itertools
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
@@ -18,8 +20,10 @@ from tolcontact.discretization import discretize
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import _corners, gap_map
 from tolcontact.mechanics.groups import contact_groups
+from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.blocks import _observe, simulate_block
+from tolcontact.simulation.threads import LEAST_ROWS, block_rows
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import RAW, Status
 
@@ -158,10 +162,16 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
         )
         assert (active == expected[0]).all()
         assert np.allclose(moments, expected[1], rtol=1e-12, atol=1e-9)
-        for poses in (relative[:, index], later[:, index]):
-            assert (compiled.least(poses, block.deviations) == plain.least(poses, block.deviations)).all()
-            for mask in (None, plain.gaps(relative[:, index], block.deviations) < activity):
-                (points, depth), expected = (scan.deepest(poses, block.deviations, mask) for scan in (compiled, plain))
+        level = np.tile(AT_REST, (3, 1))  # all points of a flat face are as deep: the first one counts
+        level[:, 9:] = -0.05 * program.nominal.pairs[index].n_r[0]
+        for poses in (relative[:, index], later[:, index], level):
+            assert (
+                compiled.least(poses, block.deviations[: len(poses)]) == plain.least(poses, block.deviations[: len(poses)])
+            ).all()
+            for mask in (None, plain.gaps(relative[:, index], block.deviations)[: len(poses)] < activity):
+                (points, depth), expected = (
+                    scan.deepest(poses, block.deviations[: len(poses)], mask) for scan in (compiled, plain)
+                )
                 assert (points == expected[0]).all() and (depth == expected[1]).all()
         assert plain.deepest(relative[:, index], block.deviations)[1].max() > 0.01
 
@@ -179,6 +189,19 @@ def test_a_block_does_not_depend_on_those_before_it(solver):
     (alone,) = simulate_blocks(program, samples=96, seed=4, start=64, block=32)
     assert (last.status == Status.RESOLVED).any()
     assert np.array_equal(last.poses, alone.poses) and np.array_equal(last.reaction, alone.reaction)
+
+
+@pytest.mark.parametrize(
+    ("bodies", "rows"),
+    [(0, 4096), (1, 4096), (24, 4096), (25, 2048), (48, 512), (100, 32), (1000, LEAST_ROWS)],
+)
+def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
+    """What a block takes, its rows times the cube of its bodies, is at most that of 4096 rows of 24 bodies."""
+    group = SimpleNamespace(group=SimpleNamespace(free=range(bodies)))
+    program = SimpleNamespace(groups=[group] if bodies else [], method=SimpleNamespace(is_exact=False))
+    found = inspect.unwrap(block_rows)(program)
+    assert found == rows
+    assert found * bodies**3 <= 4096 * 24**3 or found == LEAST_ROWS
 
 
 def test_clusters_are_neighbours():
