@@ -43,3 +43,10 @@ def test_the_turn_between_two_poses_is_their_angle(angle):
     axis = RNG.normal(size=3)
     Y = poses.pose(R @ Rotation.from_rotvec(angle * axis / np.linalg.norm(axis)).as_matrix(), t + 1)
     assert poses.turn(X, Y) == pytest.approx(np.full(6, angle), abs=1e-7)
+
+
+def test_half_a_turn_is_an_angle_in_spite_of_rounding():
+    R, t, X = some(500)
+    half = poses.pose(R @ Rotation.from_rotvec(np.pi * R[:, 0]).as_matrix(), t)
+    apart = ((X - half)[:, :9] ** 2).sum(axis=1)
+    assert (apart > 8).any() and poses.turn(X, half) == pytest.approx(np.pi, abs=1e-6)
