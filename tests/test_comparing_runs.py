@@ -173,3 +173,18 @@ def test_what_is_no_run_is_refused(runs, archive):
         tc.compare_runs(archive)
     with pytest.raises(tc.OptionError, match='run "b" is a int'):
         tc.compare_runs({"a": runs["one"], "b": 3})
+
+
+def test_one_limit_is_enough_to_be_outside():
+    def limited(**limits):
+        a = cases.stack()
+        a.measure("height", a.parts[-1].point(0, 0, 10), along="z", **limits)
+        return tc.run(a, samples=200, seed=1, solver="daqp", surfaces=0)
+
+    wide, narrow, none = limited(limits=(None, 0.3)), limited(limits=(None, 0.0)), limited()
+    change = tc.compare_runs({"wide": wide, "narrow": narrow}).change.sel(run="narrow", measure="height", state="raw")
+    raw = wide["measured"].sel(measure="height", state="raw").values
+    share = change.sel(change_of=change["change_of"].values[2], interval="estimate")
+    assert float(share) == pytest.approx((raw > 0.0).mean() - (raw > 0.3).mean()) and float(share) > 0.1
+    change = tc.compare_runs({"wide": wide, "none": none}).change.sel(run="none", measure="height", state="raw")
+    assert np.isnan(float(change.sel(change_of=change["change_of"].values[2], interval="estimate")))

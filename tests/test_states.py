@@ -3,7 +3,8 @@
 import numpy as np
 
 from tolcontact.compilation import ACCURACY
-from tolcontact.contact.state import State
+from tolcontact.contact import repeated_steps
+from tolcontact.contact.state import State, Task
 
 
 def state(residual, slack, *, doubtful=False):
@@ -34,3 +35,19 @@ def test_a_conflict_is_penetration_beyond_the_accuracy_in_any_pair():
 def test_answers_are_ranked_certified_before_conflicts_before_none():
     answers = [state(0.0, [0.0]), state(0.0, [0.01]), state(1.0, [0.0]), state(0.0, [0.0], doubtful=True)]
     assert [int(answer.rank[0]) for answer in answers] == [0, 1, 2, 2]
+
+
+def test_the_better_of_two_states_is_kept(monkeypatch):
+    """Realization by realization: the one with less penetration, and less that locators are off, which counts more."""
+    inside = np.array([[0.1, 0.0], [0.5, 0.2], [0.0, 0.0], [0.3, 0.4]])
+    monkeypatch.setattr(repeated_steps, "least_gaps", lambda *_: -inside)
+    poses = np.zeros((4, 1, 12))
+    relative = np.zeros((4, 2, 12))
+    task = Task(poses, relative, np.zeros((4, 1)), np.zeros((4, 0, 0)), [], [])
+    best, here = (State.start(poses + number, relative, 2, 0) for number in (1.0, 2.0))
+    best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
+    here.astray[:] = [0, 0, 1e-3, 0]
+    found = repeated_steps._better(best, task, here)
+    assert found.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
+    assert found.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
+    assert repeated_steps._better(None, task, here).slack.tolist() == inside.tolist()
