@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.compilation import contact_qp
+from tolcontact.compilation.curvature import _is_convex
 from tolcontact.compilation.functions import InterpretedFunction, adaptive
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
@@ -212,3 +213,16 @@ def test_clusters_are_neighbours():
     label = _cluster(points, 4)
     assert sorted({(a, b) for a, b in zip(heap, label, strict=True)}) == sorted(dict(zip(heap, label, strict=True)).items())
     assert sorted(set(label)) == [0, 1, 2, 3]
+
+
+def test_curvature_counts_only_where_every_block_is_positive_definite():
+    Q = ca.SX.sym("Q", 12, 12)
+    is_convex = ca.Function("is_convex", [Q], [_is_convex(Q)])
+    one = np.eye(12)
+    for k, value in itertools.product(range(12), (-1.0, 0.0, np.nan)):
+        other = one.copy()
+        other[k, k] = value
+        assert not is_convex(other)
+    other = one + 0.1
+    other[:6, 6:] = other[6:, :6] = 100.0  # freedoms of several together are not looked at
+    assert is_convex(one) and is_convex(other)
