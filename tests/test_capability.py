@@ -214,3 +214,9 @@ def test_summaries_are_printed_as_json_and_csv(tmp_path):
     assert [float(cell) for cell in row[3:]] == expected.tolist()
     done = call(tmp_path, "summary", path, "--csv", "--json")
     assert (done.returncode, done.stdout) == (2, "") and "choose one" in done.stderr
+
+
+def test_what_is_just_on_a_limit_is_inside():
+    x = Sample(lambda: [np.array([-1.0, 0.0, 1.0, 1.0])])
+    assert capability.below(x, -1.0).value == 0 and capability.below(x, 0.0).value == 0.25
+    assert capability.above(x, 1.0).value == 0 and capability.above(x, 0.0).value == 0.5

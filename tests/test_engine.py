@@ -22,7 +22,7 @@ from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.gap_map import _corners, gap_map
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.poses import AT_REST
-from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation import simulate_blocks, threads
 from tolcontact.simulation.blocks import _observe, simulate_block
 from tolcontact.simulation.threads import LEAST_ROWS, block_rows
 from tolcontact.variation.draws import draw
@@ -203,6 +203,14 @@ def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
     found = inspect.unwrap(block_rows)(program)
     assert found == rows
     assert found * bodies**3 <= 4096 * 24**3 or found == LEAST_ROWS
+
+
+def test_one_curved_group_is_enough_for_small_blocks(monkeypatch):
+    flat, curved = (SimpleNamespace(group=SimpleNamespace(free=range(1))) for _ in range(2))
+    monkeypatch.setattr(threads, "curved_pairs", lambda _, group: [0] if group is curved.group else [])
+    for is_exact, groups, rows in ((True, [flat, curved], 512), (True, [flat], 4096), (False, [flat, curved], 4096)):
+        program = SimpleNamespace(groups=groups, method=SimpleNamespace(is_exact=is_exact), nominal=None)
+        assert inspect.unwrap(block_rows)(program) == rows
 
 
 def test_clusters_are_neighbours():

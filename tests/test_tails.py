@@ -13,7 +13,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, call
 from tolcontact.simulation import map_blocks
-from tolcontact.statistics.tails import tail_probability
+from tolcontact.statistics import tails as tails_of_scores
+from tolcontact.statistics.tails import REPLICATES, tail_probability
 from tolcontact.variation.uniforms import uniform
 
 module = importlib.import_module("tolcontact.workflow.tails")
@@ -152,3 +153,14 @@ def test_the_command_prints_a_table_json_and_csv(tmp_path, monkeypatch):
     assert {"event", "estimate", "lower", "upper"} <= set(table)
     assert call(tmp_path, *options, "--csv", "--json").returncode == 2
     assert call(tmp_path, "tails", model, "--samples", "10").returncode == 2
+
+
+def test_the_interval_of_estimates_is_that_of_their_logarithm(monkeypatch):
+    """Student's t for as many estimates as there are, less one; at most 1."""
+    for scale in (1e-6, 0.4):
+        found = iter([(scale, 3), *((scale * value, 3) for value in np.linspace(0.5, 1.5, REPLICATES))])
+        monkeypatch.setattr(tails_of_scores, "_descent", lambda *_, found=found: next(found))
+        own = tails_of_scores.tail_probability(lambda x: x[:, 0], 1, samples=1000, rng=np.random.default_rng(1))
+        values = np.linspace(0.5, 1.5, REPLICATES)
+        reach = np.exp(stats.t.ppf(0.975, REPLICATES - 1) * stats.sem(values))
+        assert own == pytest.approx((scale, scale / reach, min(scale * reach, 1.0)))
