@@ -42,6 +42,8 @@ def test_a_known_shift_is_found_exactly_from_the_same_draws(runs):
     assert shift == pytest.approx([0.25] * 3, abs=1e-4)  # parts turn, a little
     assert of.change.sel(change_of="ratio of 6 sigma", interval="estimate").values == pytest.approx(1, abs=1e-3)
     assert of.furthest.values == pytest.approx(0.25, abs=1e-3)
+    back = tc.compare_runs({"higher": runs["higher"], "one": runs["one"]}).sel(run="one", measure="thickness")
+    assert back.furthest.values == pytest.approx(of.furthest.values, abs=1e-9)  # all of it downward
     assert np.isnan(found.furthest.sel(run="other")).all() and np.isnan(found.change.sel(run="one")).all()
 
 

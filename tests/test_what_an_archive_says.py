@@ -92,6 +92,11 @@ def test_units_of_measures():
     mixed = tc.run(a, samples=5, solver="daqp")
     assert mixed["measured"].attrs["units"] == "1" and mixed["measure_units"].values.tolist() == ["mm", "rad"]
     assert np.isnan(mixed["measure_tolerance"].values).all()
+    turned = tc.Assembly("turned")
+    only = turned.part("only", tc.Box(10, 10, 10))
+    turned.locate(only, tc.three_two_one(only.face("-z"), only.face("-y"), only.face("-x"), inset=1), tolerance=0.1)
+    turned.measure("tilt", lambda poses: poses.rotation(only)[2, 0], units="rad")
+    assert tc.run(turned, samples=5)["measured"].attrs["units"] == "rad"
 
 
 def test_the_sample_names_every_locator_with_its_tolerance_and_stiffness():

@@ -119,3 +119,18 @@ def test_capability_and_shifts():
     other = tc.Size(10, 0.1, -0.02, distribution=norm(0.03, 0.01))
     drawn = Draws(discretize(toleranced.ring_with("bore", other)))(seed=1, start=0, stop=SAMPLES)[:, -1]
     assert drawn.mean() == pytest.approx(0.03, abs=3e-4) and drawn.std() == pytest.approx(0.01, rel=0.02)
+
+
+def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
+    """Tolerances of one feature share its freedoms: spreads are then those of the stricter one, whatever its rule is."""
+
+    def shares(**rule):
+        a = tc.Assembly("plate")
+        block = a.part("block", tc.Box(40, 30, 20), fixed=True)
+        block.feature("base", block.face("-z"), datum="A")
+        top = block.feature("top", block.face("+z"), tc.Profile(0.4, "A"), tc.Parallelism(0.1, "A", **rule))
+        a.measure("height", top.point(0, 0, 20), along="z")
+        return tc.check_population(a, samples=200).stated_share.values
+
+    assert shares() == pytest.approx([0.9973, 0.9973], abs=1e-4)
+    assert np.isnan(shares(cp=1.5)).all()
