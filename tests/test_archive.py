@@ -12,6 +12,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
 from tolcontact.archive import bytes_of_rows
+from tolcontact.archive.writer import opened_locked
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.vocabulary import BY_REALIZATION
@@ -121,3 +122,8 @@ def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
         rows = [v for group in (file, file["sample"]) for v in group.variables.values() if "realization" in v.dimensions]
         stored = sum(v.dtype.itemsize * v.size for v in rows)
     assert bytes_of_rows(program.nominal, keep, 50) == stored
+
+
+def test_values_are_not_masked(archive):
+    with opened_locked(archive, "r") as file:
+        assert all(type(file[name][:5]) is np.ndarray for name in ("status", "measured", "contact/moving_point"))

@@ -107,3 +107,16 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
     for k, far in enumerate(out):
         evaluate = round_gaps(RoundPoints.of([points[k]]))
         assert float(evaluate(np.concatenate([np.eye(3).ravel(), far]), np.zeros(2), 0)[0]) > 40
+
+
+def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
+    """In the middle of a hollow all directions are as near; what curvature counts there is that of a thousandth of the ball."""
+    axis, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
+    for wall, centre, expected in (
+        (Form("cone", np.zeros(3), axis, angle=0.6), np.array([0, 0, 20.0]), np.cos(0.6)),
+        (Form("cylinder", np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
+    ):
+        evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]))
+        *_, bow, wrap = (each.full() for each in evaluate(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), [1]))
+        assert np.isfinite(bow).all()
+        assert np.abs(wrap)[9:, 9:].max() == pytest.approx(expected / (1e-3 * 2.0), rel=1e-6)
