@@ -151,6 +151,7 @@ def test_runs_without_a_measure_in_common_are_refused(runs):
         tc.compare_runs({"stack": runs["one"], "alone": tc.run(a, samples=10, surfaces=0)})
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_page_of_a_comparison_is_read(runs, width, tmp_path, open_page):  # noqa: F811 (a fixture)

@@ -60,6 +60,7 @@ def test_archives_without_poses_say_nothing_of_points():
     assert int(results["contact/touching_realizations"]) == 0 and np.isnan(results["contact/touching"]).all()
 
 
+@pytest.mark.slow
 @needs_browser
 def test_the_page_shows_where_contact_is(tmp_path, open_page):  # noqa: F811 (a fixture)
     results = tc.run(cases.ra1(), samples=200, solver="daqp", surfaces=0)

@@ -170,6 +170,7 @@ def picture(page):
     return page.evaluate("document.getElementById('scene').toDataURL()")
 
 
+@pytest.mark.slow
 @needs_browser
 @pytest.mark.parametrize("width", [1280, 390])
 def test_the_page_is_used(archive, page, width, open_page):
@@ -206,6 +207,7 @@ def test_the_page_is_used(archive, page, width, open_page):
     assert opened.evaluate("stage.parts[0].materials[0].clippingPlanes.length") == 1
 
 
+@pytest.mark.slow
 @needs_browser
 def test_a_histogram_is_read_in_the_page(archive, page, open_page):
     opened = open_page(page)
@@ -216,6 +218,7 @@ def test_a_histogram_is_read_in_the_page(archive, page, open_page):
     assert sum(y) == 500 and mean == pytest.approx(float(expected.sel(statistic="mean", interval="estimate")), abs=x[1] - x[0])
 
 
+@pytest.mark.slow
 @needs_browser
 def test_measures_are_shown_against_contributors_and_each_other(archive, page, open_page):
     opened = open_page(page)
@@ -230,6 +233,7 @@ def test_measures_are_shown_against_contributors_and_each_other(archive, page, o
     assert same_x == same_y
 
 
+@pytest.mark.slow
 @needs_browser
 def test_odd_names_are_texts(tmp_path, open_page):
     a = tc.Assembly("odd &amp; <b>bold</b>")

@@ -92,6 +92,7 @@ def test_faults_are_listed_and_sound_parts_shown(tmp_path):
     assert "nowhere.stl" in page and [part["name"] for part in data_of(page)["scene"]["parts"]] == ["bottom", "middle", "upper"]
 
 
+@pytest.mark.slow
 @needs_browser
 def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
     a = tc.Assembly("box")
@@ -107,6 +108,7 @@ def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
     assert said.startswith("part box\n") and 'face("+z")\npoint(' in said and said.endswith("on it")
 
 
+@pytest.mark.slow
 @needs_browser
 def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa: F811
     a = tc.Assembly("box")
@@ -123,6 +125,7 @@ def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa:
         assert found == pytest.approx([100, 0, 20] if own[1] < 1 else own, abs=0.3) and ("on it" in words) == (own[1] > 1)
 
 
+@pytest.mark.slow
 @needs_browser
 def test_features_are_named_where_they_are(tmp_path, open_page):  # noqa: F811
     a = cases.model("lid")
