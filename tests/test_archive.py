@@ -85,6 +85,7 @@ def test_an_archive_without_finished_realizations_has_no_statistics(archive, tmp
         tc.summarize(tree)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", ["measures", "poses", "all"])
 def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path):
     tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=tmp_path / "some.nc", keep=keep).close()

@@ -112,6 +112,7 @@ def test_measures_are_in_the_order_of_the_first_run():
     assert [name for name in found["measure"].values if name in "abcd"] == ["a", "c"]
 
 
+@pytest.mark.slow
 def test_the_command_compares_archives(archive, tmp_path):
     again = tmp_path / "again.nc"
     tc.run(cases.stack(), samples=100, seed=4, solver="daqp", out=again, surfaces=0).close()

@@ -87,6 +87,7 @@ def test_a_shared_cause_drives_all_that_it_names():
     assert_same_run(results, tc.run(tc.model_of(results), samples=300))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["frame", "dataset", "csv", "mapping"])
 def test_rows_of_a_population_stay_together(kind, tmp_path):
     rng = np.random.default_rng(0)

@@ -177,6 +177,7 @@ def test_solvers_come_to_the_same_exact_poses(make, solver):
     assert np.abs(run["poses"] - reference["poses"]).max() < (1e-9 if solver == "qpoases" else 1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "active_set"), [(cases.jaws, "closed"), (cases.jaws, "initial"), (cases.tab, "closed")])
 def test_searching_again_changes_nothing_where_points_stay_over_planes(make, active_set):
     runs = []

@@ -99,6 +99,7 @@ def test_a_small_part_is_near_a_large_one_wherever_it_stands(at):
     assert patch(pad.face(tc.Near(plate, 0.1)), meshes).mesh.area == pytest.approx(16)
 
 
+@pytest.mark.slow
 def test_what_is_near_on_a_large_barrel_is_not_the_whole_barrel():
     a = tc.Assembly("barrel")
     barrel = a.part("barrel", tc.Mesh(trimesh.creation.cylinder(200, 10, sections=700)), fixed=True)

@@ -155,6 +155,7 @@ def test_one_feature_deviates_once_whatever_uses_it():
     assert_same_run(results, rebuilt)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 @pytest.mark.parametrize("points", [None, 60])
 def test_diameters_vary_as_offsets(points, solver):
@@ -267,6 +268,7 @@ def test_a_summary_says_that_a_datum_shift_is_not_drawn():
     assert "datum shift of ring.bore: not drawn; the contact of the datum features decides it" in said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shift", [0.0, 123.4])
 @pytest.mark.parametrize("turn", [(0, 0, 0), (0.3, 0.5, -0.2)])
 def test_shapes_of_single_precision_have_the_same_freedoms(shift, turn, tmp_path):

@@ -33,6 +33,7 @@ def test_a_shaft_in_a_v_comes_to_where_its_diameter_and_the_walls_say(frame, sol
     assert np.abs(results.measured.sel(state="raw", measure="height").values).max() < 1e-9  # the nominal place
 
 
+@pytest.mark.slow
 def test_a_peg_is_pushed_to_the_side_of_its_hole():
     results = tc.run(floating.floating_peg_in_a_hole(), samples=1000, solver="daqp")
     assert_resolved(results)

@@ -36,6 +36,7 @@ def test_there_is_an_archive_of_every_format():
     assert sorted(STORED) == [*range(1, FORMAT + 1)], "write the missing one with tests/scripts/write_archive.py"
 
 
+@pytest.mark.slow
 def test_it_is_opened_and_summarized(stored):
     summary = tc.summarize(stored)
     corner = summary["statistic_value"].sel(measure="corner", interval="estimate")
@@ -48,6 +49,7 @@ def test_it_is_opened_and_summarized(stored):
     assert_gaps_recompute(stored)
 
 
+@pytest.mark.slow
 def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
     model = model_in(stored)
     assert tc.build(model).nominal.locators.labels[:6] == tuple(f"block.{name}" for name in ("A1", "A2", "A3", "B1", "B2", "C"))
@@ -57,6 +59,7 @@ def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
         assert (now["status"].values == then["status"].values).all()
 
 
+@pytest.mark.slow
 def test_it_is_read_without_this_package(stored):
     done = run([sys.executable, "-I", SCRIPTS / "read_plainly.py", stored])
     assert (done.returncode, done.stdout) == (0, "1 1 1 1 1 1 1 1\n"), done.stderr

@@ -80,6 +80,7 @@ def test_extreme_realizations_are_shown_first(archive, page):
     assert len(shown["names"]) == 300
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("settings", "said"),
     [

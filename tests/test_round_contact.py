@@ -190,6 +190,7 @@ def pinned(chord):
     return a
 
 
+@pytest.mark.slow
 def test_how_finely_a_step_file_is_triangulated_changes_nothing():
     runs, triangles = [], []
     for chord in (None, 0.3):

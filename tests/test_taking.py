@@ -133,6 +133,7 @@ def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by,
     assert "of 10 000 000 realizations are done; continue with --resume" in summary.stdout
 
 
+@pytest.mark.slow
 def test_a_run_that_is_stopped_before_it_began_leaves_nothing(tmp_path):
     begun = begin(tmp_path, "--samples", 10_000, "--out", "never.nc")
     lock = tmp_path / ".never.nc.lock"

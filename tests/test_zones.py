@@ -43,6 +43,7 @@ def test_spreads_are_those_of_the_table(name):
     assert spreads == pytest.approx([1 / factor] * len(spreads), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_share_inside_is_that_of_draws():
     rng = np.random.default_rng(0)
     for entries, components in ((1, 3), (2, 4), (3, 3), (1, 6)):
