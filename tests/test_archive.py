@@ -11,7 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
-from tolcontact.archive import bytes_of_rows
+from tolcontact.archive import bytes_of_rows, checked
 from tolcontact.archive.writer import opened_locked
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
@@ -128,3 +128,12 @@ def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
 def test_values_are_not_masked(archive):
     with opened_locked(archive, "r") as file:
         assert all(type(file[name][:5]) is np.ndarray for name in ("status", "measured", "contact/moving_point"))
+
+
+def test_rows_are_not_looked_at_where_none_are_to_be_checked(archive, monkeypatch):
+    looked = []
+    monkeypatch.setattr(checked, "_pieces", lambda _, rows: iter(looked.append(rows) or ()))
+    with opened_locked(archive, "r") as file:
+        assert len(checked.choose(file, 0, seed=1)) == 0 and looked == [0]
+        checked.choose(file, 5, seed=1)
+        assert looked == [0, len(file.dimensions["realization"])]

@@ -16,6 +16,7 @@ from tolcontact.compilation.curvature import _is_convex
 from tolcontact.compilation.functions import InterpretedFunction, adaptive
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
+from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, _cluster, pair_scan
 from tolcontact.discretization import discretize
 from tolcontact.mechanics.gap import gap_matrix
@@ -175,6 +176,17 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
                 )
                 assert (points == expected[0]).all() and (depth == expected[1]).all()
         assert plain.deepest(relative[:, index], block.deviations)[1].max() > 0.01
+
+
+@pytest.mark.parametrize(("offset", "tilt"), [(-1000.0, 1.0), (-0.5, 1e-3), (0.5, 1e-3)])
+def test_no_gap_of_a_box_is_below_its_bound_in_spite_of_rounding(offset, tilt):
+    rng = np.random.default_rng(3)
+    lower, upper = np.sort(rng.normal(scale=50, size=(2, 1, 500)), axis=0)  # each box has points in both of its ends
+    boxes, (middle, reach) = np.array([(upper + lower) / 2, (upper - lower) / 2]), np.empty((2, 500))
+    for slope in tilt * rng.normal(size=20):
+        kernel._bounds(boxes, 0, 500, np.array([offset, slope]), middle, reach)
+        gaps = offset + slope * np.concatenate([lower, upper])
+        assert (gaps >= middle - reach).all() and (gaps <= middle + reach).all()
 
 
 @pytest.mark.parametrize(("coordinates", "corners"), [([[3.0, 1.0, 2.0, 5.0]], [1, 3]), ([], [0]), ([[2.0, 2.0]], [0])])
