@@ -113,6 +113,13 @@ def test_archived_gaps_of_round_faces_recompute_and_the_model_runs_again(name, t
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("name", ["peg", "V", "cone", "slot"])
+def test_steps_along_walls_that_are_known_come_to_rest_soon(name):
+    """Before Newton's steps begin, the ninth: gaps of round faces have their curvature from the first one on."""
+    _, run = simulate(round_cases.EVERY[name](), samples=60, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all() and run["iterations"].max() <= 8
+
+
 def test_linearized_steps_start_from_the_exact_gaps():
     results = tc.run(cases.peg_in_a_hole(), samples=200, solver="daqp", method=tc.Method(objective="all points"))
     assert_gaps_recompute(results)
