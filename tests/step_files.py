@@ -89,6 +89,12 @@ class Step:
         shell = self.shell(square, "OPEN_SHELL", [(0, 1, 2, 3)])
         return self.add(f"SHELL_BASED_SURFACE_MODEL('',(#{shell}))")
 
+    def double(self, shell):
+        """Let the first face of a shell stand in it a second time."""
+        first = int(re.search(r"\(#(\d+)", self.lines[shell - 1])[1])
+        again = self.add(self.lines[first - 1])
+        self.lines[shell - 1] = self.lines[shell - 1].replace("))", f",#{again}))")
+
     def paint(self, shell, red):
         """Give the first face of a shell a colour of its own."""
         face = int(re.search(r"\(#(\d+)", self.lines[shell - 1])[1])

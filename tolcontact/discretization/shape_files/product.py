@@ -113,9 +113,9 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     own = np.zeros(len(mesh.vertices), dtype=np.int64)
     own[np.asarray(mesh.faces).ravel()] = np.repeat(arrays["piece"], 3)
     mesh = _merged(mesh, own)
-    own = _mended(path, mesh.faces)
-    mesh.update_faces(own)
-    shape, brep = arrays["piece"][own], arrays["brep"][own]
+    whole = _mended(path, mesh.faces)
+    mesh.update_faces(whole)
+    shape, brep = arrays["piece"][whole], arrays["brep"][whole]
     vertices, off = np.array(mesh.vertices), OFF * float(arrays["chord"])
     known: list[list[Form | None]] = []
     for k, said in enumerate(arrays["surfaces"]):
@@ -145,7 +145,7 @@ def _mended(path: Path, faces: np.ndarray) -> np.ndarray:
     whole = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     lowest = np.argmin(faces[whole], axis=1)
     turned = np.take_along_axis(faces[whole], (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    _, first = np.unique(turned, axis=0, return_index=True)
+    first, _ = trimesh.grouping.unique_rows(turned)
     for count, what in ((len(faces) - len(whole), "on edges of no length"), (len(whole) - len(first), "that stand twice")):
         if count:
             log.info('"%s": %d triangles %s are left out', path, count, what)
