@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 import tolcontact as tc
 from tests.step_files import Step, assembly, corners, step_of
 from tests.test_cad import COVER
+from tests.test_json_models import load_model, written
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.discretization.fault import GeometryFault
@@ -72,6 +73,17 @@ def test_names_come_with_the_archive(tmp_path):
         assert discretize(rebuilt).triangles(rebuilt.parts[0].face(tc.Brep("to +z"))) == seat
         again = tc.run(tc.model_of(results), samples=50, seed=1, solver="daqp")
         assert again.measured.equals(results.measured) and again.gap_min.equals(results.gap_min)
+
+
+def test_names_come_with_json(tmp_path):
+    model, block = one_block(tmp_path / "named.step", DIRECTIONS)
+    pin = model.part("pin", tc.Box(4, 4, 4), at=(3, 8, 30))
+    model.locate(pin, tc.three_two_one(pin.face("-z"), pin.face("-y"), pin.face("-x"), inset=0.5), tolerance=0.2)
+    model.contact("seat", moving=pin.face("-z"), reference=block.face(tc.Brep("+z")))
+    document = written(model, tmp_path / "first.json")
+    again = load_model(tmp_path / "first.json")
+    assert again.pairs[0].reference.selections == (tc.Brep("+z"),)
+    assert written(again, tmp_path / "second.json") == document
 
 
 def names_in(path, text, *bodies):

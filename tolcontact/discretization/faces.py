@@ -141,7 +141,7 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
         if selection.name not in names:
             known = ", ".join(f'"{shown(name)}"' for name in [name for name in dict.fromkeys(names) if name][:SHOWN])
             has = f"its faces are called {known}" if known else "its file gives no face of it a name"
-            more = ", ..." if len(set(names) - {""}) > SHOWN else ""
+            more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > SHOWN else ""
             raise GeometryFault(f"face {face}: the part has no such face; {has}{more}")
         return np.isin(brep, np.flatnonzero(np.array(names) == selection.name))
     if selection.at is None:
