@@ -149,7 +149,7 @@ def _mended(path: Path, faces: np.ndarray) -> np.ndarray:
     for count, what in ((len(faces) - len(whole), "on edges of no length"), (len(whole) - len(first), "that stand twice")):
         if count:
             log.info('"%s": %d triangles %s are left out', path, count, what)
-    return whole[np.sort(first)]
+    return np.asarray(whole[np.sort(first)])
 
 
 def check_numbers(vertices: np.ndarray, who: str) -> None:
