@@ -5,9 +5,9 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.discretization.faces import patch
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.faces import patch
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.shapes import shape
 
 HOUSING = cases.MODELS / "housing.step"
 

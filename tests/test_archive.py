@@ -11,7 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
-from tolcontact.archive import bytes_of_rows, checked
+from tolcontact.archive import bytes_of_rows, surface_rows
 from tolcontact.archive.writer import opened_locked
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
@@ -132,8 +132,8 @@ def test_values_are_not_masked(archive):
 
 def test_rows_are_not_looked_at_where_none_are_to_be_checked(archive, monkeypatch):
     looked = []
-    monkeypatch.setattr(checked, "_pieces", lambda _, rows: iter(looked.append(rows) or ()))
+    monkeypatch.setattr(surface_rows, "_pieces", lambda _, rows: iter(looked.append(rows) or ()))
     with opened_locked(archive, "r") as file:
-        assert len(checked.choose(file, 0, seed=1)) == 0 and looked == [0]
-        checked.choose(file, 5, seed=1)
+        assert len(surface_rows.choose(file, 0, seed=1)) == 0 and looked == [0]
+        surface_rows.choose(file, 5, seed=1)
         assert looked == [0, len(file.dimensions["realization"])]

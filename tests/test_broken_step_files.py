@@ -6,8 +6,8 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files import read_files, reader
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files import read_files, reader
 
 pytestmark = pytest.mark.slow
 WHOLE = (cases.MODELS / "cover.step").read_text()

@@ -16,13 +16,13 @@ from tests import cases
 from tests.step_files import assembly, step_block
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
-from tolcontact.discretization.analytic import Form, believed, onto
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.fitting import fitted
-from tolcontact.discretization.shape_files import BREP, SURFACES, product, reading
-from tolcontact.discretization.shape_files.reading import usual_chord
-from tolcontact.discretization.shape_files.step_text import step_text
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.analytic_surfaces import Form, believed, onto
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files import BREP, SURFACES, product, reading
+from tolcontact.geometry.files.reading import usual_chord
+from tolcontact.geometry.files.step_text import step_text
+from tolcontact.geometry.fitting import fitted
+from tolcontact.geometry.shapes import shape
 
 COVER = cases.MODELS / "cover.step"
 TILTED = np.array([1.0, 2.0, 2.0]) / 3

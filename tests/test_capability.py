@@ -11,7 +11,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call, simulate
 from tolcontact.simulation import simulate_blocks
-from tolcontact.statistics import capability, shape
+from tolcontact.statistics import capability, moments
 from tolcontact.statistics.sample import Sample
 
 PERCENTS = (0.00135, 0.5, 0.99865)
@@ -107,7 +107,7 @@ def test_constant_measures_have_shares_and_no_capability():
 )
 def test_skewness_and_kurtosis_are_those_of_the_distribution(distribution, skew, kurt):
     x = Sample.of(distribution.ppf(np.random.default_rng(2).random(400_000)))
-    for (value, low, high), expected in ((shape.skewness(x), skew), (shape.kurtosis(x), kurt)):
+    for (value, low, high), expected in ((moments.skewness(x), skew), (moments.kurtosis(x), kurt)):
         assert abs(value - expected) < 2 * (high - low)
         assert low < value < high and high - low < 0.6
 

@@ -16,10 +16,10 @@ from tolcontact.compilation import plugins, usable_plugins
 from tolcontact.compilation.plugins import PLUGINS, Plugin
 from tolcontact.compilation.polishing import polished
 from tolcontact.discretization import discretize
-from tolcontact.discretization.faces import patch
-from tolcontact.discretization.overlap import overlap_corners
-from tolcontact.discretization.shapes import shape
 from tolcontact.errors import ContactWarning, OptionError
+from tolcontact.geometry.faces import patch
+from tolcontact.geometry.overlap import overlap_corners
+from tolcontact.geometry.shapes import shape
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SOLVERS = ("daqp", "qpoases")

@@ -7,8 +7,8 @@ import trimesh
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.discretization.spreading import spread
-from tolcontact.discretization.surface import Surface
+from tolcontact.geometry.spreading import spread
+from tolcontact.geometry.surface import Surface
 
 
 def face(width, height):

@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.compilation import contact_qp
-from tolcontact.compilation.curvature import _is_convex
 from tolcontact.compilation.functions import InterpretedFunction, adaptive
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
+from tolcontact.compilation.newton import _is_convex
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, _cluster, pair_scan

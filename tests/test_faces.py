@@ -6,10 +6,10 @@ import trimesh
 
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
-from tolcontact.discretization.faces import patch
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files.reading import STEP_CHORD
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.faces import patch
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files.reading import STEP_CHORD
+from tolcontact.geometry.shapes import shape
 
 
 def test_a_brep_face_is_found_by_a_point_on_it():

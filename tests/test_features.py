@@ -13,7 +13,7 @@ from tests import cases
 from tests.cases import Frame, toleranced
 from tests.cases.round_contact import BARREL
 from tolcontact.discretization import discretize
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.shapes import shape
 from tolcontact.report import summary_text
 from tolcontact.simulation import simulate_block
 from tolcontact.simulation.surfaces import check_surfaces

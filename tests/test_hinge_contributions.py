@@ -6,7 +6,7 @@ import pytest
 import tolcontact as tc
 from models import hinge
 from tolcontact.simulation import simulate_block
-from tolcontact.statistics.contributions import sobol_indices
+from tolcontact.statistics.sobol_indices import sobol_indices
 
 GROUPS = ("base.bore 1", "base.bore 2", "leaf.bore 1", "leaf.bore 2", "pin.barrel")
 ENDS = np.array([-hinge.WIDTH / 2, hinge.WIDTH / 2])

@@ -9,8 +9,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tolcontact.statistics import intervals
+from tolcontact.statistics.moments import skewness
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.shape import skewness
 from tolcontact.variation.plans import Plan
 from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, PLANS, REPLICATE, SOBOL
 

@@ -16,7 +16,7 @@ from tests import cases
 from tests.helpers import call
 from tests.test_formats import STORED
 from tolcontact.report import grouped, write_page
-from tolcontact.report.html import coarse
+from tolcontact.report.html import decimation
 from tolcontact.statistics import intervals
 
 CHROMIUM = shutil.which("chromium")
@@ -252,8 +252,8 @@ def test_odd_names_are_texts(tmp_path, open_page):
 
 
 def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
-    monkeypatch.setattr(coarse, "TRIANGLES", 2000)
-    monkeypatch.setattr(coarse, "LEAST", 100)
+    monkeypatch.setattr(decimation, "TRIANGLES", 2000)
+    monkeypatch.setattr(decimation, "LEAST", 100)
     a = tc.Assembly("ball")
     ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=50)))
     small = a.part("small", tc.Box(10, 20, 10), at=(200, 0, 0), fixed=True)
@@ -273,7 +273,7 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
 def test_a_plate_with_finely_divided_holes_is_drawn_with_fewer_triangles():
     """Slivers between far corners and short edges, which the first simplification leaves as they are."""
     ring = trimesh.creation.annulus(20, 2000, 10, sections=8000)
-    vertices, faces, nearest = coarse.coarser(np.asarray(ring.vertices), np.asarray(ring.faces), 3000)
+    vertices, faces, nearest = decimation.coarser(np.asarray(ring.vertices), np.asarray(ring.faces), 3000)
     assert len(faces) <= 3000 and nearest.max() < len(ring.vertices)
     off = trimesh.Trimesh(vertices, faces, process=False)
     assert off.area == pytest.approx(ring.area, rel=1e-3) and np.abs(off.bounds - ring.bounds).max() < 0.5

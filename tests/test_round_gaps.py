@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from studies.certificates.judge import as_archived
 from tests.cases import round_contact as round_cases
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
-from tolcontact.discretization.analytic import Form
 from tolcontact.discretization.round_points import NONE
+from tolcontact.geometry.analytic_surfaces import Form
 from tolcontact.mechanics.round_gap import round_gaps
 
 
@@ -55,7 +55,7 @@ def unit(rng):
 def test_a_ball_beside_walls_of_every_kind():
     """Gaps another way, and derivatives by differences; of hollow walls from as far away as a ball that touches them is."""
     rng, points = np.random.default_rng(3), []
-    for kind, is_hollow, on_moving in itertools.product(words.SURFACE_KINDS, (False, True), (False, True)):
+    for kind, is_hollow, on_moving in itertools.product(terms.SURFACE_KINDS, (False, True), (False, True)):
         if kind in ("plane", "torus") and is_hollow:
             continue
         w = unit(rng)

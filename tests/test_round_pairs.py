@@ -12,7 +12,7 @@ from tests import cases
 from tests.cases import round_contact as round_cases
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
-from tolcontact.discretization.faces import patch
+from tolcontact.geometry.faces import patch
 
 
 @pytest.mark.slow

@@ -11,8 +11,8 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tests.test_ra1 import BASE, MEASURED, TOP, plane_weights
+from tolcontact.analyses.designs import SteppedDraws
 from tolcontact.simulation import simulate_block
-from tolcontact.variation import SteppedDraws
 
 
 @pytest.fixture(scope="module")

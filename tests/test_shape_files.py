@@ -11,9 +11,9 @@ import trimesh
 import tolcontact as tc
 from tests.shapes import BLOCK, refusal
 from tests.step_files import step_block
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files.reading import MAX_TRIANGLES
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files.reading import MAX_TRIANGLES
+from tolcontact.geometry.shapes import shape
 
 STL, ASCII_STL = BLOCK.export(file_type="stl"), BLOCK.export(file_type="stl_ascii").encode()
 

@@ -18,7 +18,7 @@ from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import step_block
 from tolcontact.discretization import discretize
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.shapes import shape
 
 
 def crashing():
@@ -67,7 +67,7 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
 
 def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path, monkeypatch):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
-    monkeypatch.setattr("tolcontact.discretization.shape_files.reader.MEMORY", 350 * 2**20)
+    monkeypatch.setattr("tolcontact.geometry.files.reader.MEMORY", 350 * 2**20)
     assert "takes more than 0.342 GiB of memory" in refusal(tmp_path / "fine.obj")
 
 

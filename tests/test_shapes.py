@@ -9,9 +9,9 @@ import trimesh
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
 from tolcontact.discretization import discretize
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shapes import shape
 from tolcontact.errors import UnitsWarning
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.shapes import shape
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from tests import cases
 from tolcontact import poses as pose
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.declaration import movers
 from tolcontact.discretization import discretize
 from tolcontact.statistics import DisplacementFields, intervals, sample
@@ -114,16 +114,16 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
     for first, last in ((0, 1), (1, 400), (400, 700)):
         fields.merge(fields.sums(poses[first:last], first))
     for index, (part, field) in enumerate(zip(nominal.parts, fields.fields(), strict=True)):
-        assert field[words.FIELD_REALIZATIONS] == 700 and field[words.MAGNITUDE_REALIZATIONS] == magnitudes
+        assert field[terms.FIELD_REALIZATIONS] == 700 and field[terms.MAGNITUDE_REALIZATIONS] == magnitudes
         for state in (0, 1) if movers(nominal.assembly, part.part) else (0,):
             u = displacements(part, poses[:, state, index])
             few = u[:magnitudes, :, 3]
-            assert np.abs(field[words.FIELD_MEAN][state, :, :3] - u[..., :3].mean(axis=0)).max() < 1e-9
-            assert np.abs(field[words.FIELD_SIX_SIGMA][state, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
-            assert np.abs(field[words.FIELD_MEAN][state, :, 3] - few.mean(axis=0)).max() < 1e-9
-            assert np.abs(field[words.FIELD_SIX_SIGMA][state, :, 3] - 6 * few.std(axis=0, ddof=1)).max() < 1e-9
+            assert np.abs(field[terms.FIELD_MEAN][state, :, :3] - u[..., :3].mean(axis=0)).max() < 1e-9
+            assert np.abs(field[terms.FIELD_SIX_SIGMA][state, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
+            assert np.abs(field[terms.FIELD_MEAN][state, :, 3] - few.mean(axis=0)).max() < 1e-9
+            assert np.abs(field[terms.FIELD_SIX_SIGMA][state, :, 3] - 6 * few.std(axis=0, ddof=1)).max() < 1e-9
             expected = [intervals.standard_deviation(few[:, v], times=6)[1:] for v in range(0, few.shape[1], 50)]
-            assert np.allclose(field[words.FIELD_INTERVAL][state, ::50], expected, rtol=1e-6, atol=1e-9)
+            assert np.allclose(field[terms.FIELD_INTERVAL][state, ::50], expected, rtol=1e-6, atol=1e-9)
 
 
 def test_sums_of_fields_go_on_from_where_they_were():
@@ -145,8 +145,8 @@ def test_without_magnitudes_components_stay_exact():
     fields.merge(fields.sums(poses, 0))
     field = fields.fields()[1]
     u = displacements(nominal.parts[1], poses[:, 1, 1])
-    assert np.abs(field[words.FIELD_SIX_SIGMA][1, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
-    assert np.isnan(field[words.FIELD_SIX_SIGMA][1, :, 3]).all() and field[words.MAGNITUDE_REALIZATIONS] == 0
+    assert np.abs(field[terms.FIELD_SIX_SIGMA][1, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
+    assert np.isnan(field[terms.FIELD_SIX_SIGMA][1, :, 3]).all() and field[terms.MAGNITUDE_REALIZATIONS] == 0
 
 
 def test_intervals_are_those_of_scipys_distributions():

@@ -7,8 +7,8 @@ import pytest
 import tolcontact as tc
 from tests.shapes import refusal
 from tests.step_files import Step, assembly, corners, step_block, step_of
-from tolcontact.discretization.faces import patch
-from tolcontact.discretization.shapes import shape
+from tolcontact.geometry.faces import patch
+from tolcontact.geometry.shapes import shape
 
 SEVERAL = {
     "solids apart": (

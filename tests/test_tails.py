@@ -13,11 +13,11 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED, call
 from tolcontact.simulation import map_blocks
-from tolcontact.statistics import tails as tails_of_scores
-from tolcontact.statistics.tails import REPLICATES, tail_probability
+from tolcontact.statistics import rare_events
+from tolcontact.statistics.rare_events import REPLICATES, tail_probability
 from tolcontact.variation.uniforms import uniform
 
-module = importlib.import_module("tolcontact.workflow.tails")
+module = importlib.import_module("tolcontact.analyses.tails")
 
 TWELVE = np.ones(12) / np.sqrt(12)
 TAILS = {
@@ -137,7 +137,7 @@ def test_measured_parts_and_correlations_are_drawn_as_in_a_run():
 
 @pytest.mark.slow
 def test_the_command_prints_a_table_json_and_csv(tmp_path, monkeypatch):
-    monkeypatch.setattr("tolcontact.statistics.tails.REPLICATES", 3)
+    monkeypatch.setattr("tolcontact.statistics.rare_events.REPLICATES", 3)
     model = tmp_path / "model.py"
     model.write_text(
         "import tolcontact as tc\n\n\ndef assembly():\n    a = tc.Assembly('m')\n    b = a.part('b', tc.Box(10, 10, 10))\n"
@@ -159,8 +159,8 @@ def test_the_interval_of_estimates_is_that_of_their_logarithm(monkeypatch):
     """Student's t for as many estimates as there are, less one; at most 1."""
     for scale in (1e-6, 0.4):
         found = iter([(scale, 3), *((scale * value, 3) for value in np.linspace(0.5, 1.5, REPLICATES))])
-        monkeypatch.setattr(tails_of_scores, "_descent", lambda *_, found=found: next(found))
-        own = tails_of_scores.tail_probability(lambda x: x[:, 0], 1, samples=1000, rng=np.random.default_rng(1))
+        monkeypatch.setattr(rare_events, "_descent", lambda *_, found=found: next(found))
+        own = rare_events.tail_probability(lambda x: x[:, 0], 1, samples=1000, rng=np.random.default_rng(1))
         values = np.linspace(0.5, 1.5, REPLICATES)
         reach = np.exp(stats.t.ppf(0.975, REPLICATES - 1) * stats.sem(values))
         assert own == pytest.approx((scale, scale / reach, min(scale * reach, 1.0)))

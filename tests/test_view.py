@@ -10,9 +10,10 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tests.test_report import browser, data_of, needs_browser, open_page, picture  # noqa: F401 (fixtures)
-from tolcontact.discretization import discretize, seen
-from tolcontact.discretization.faces import patch, triangles
-from tolcontact.discretization.shapes import shape
+from tolcontact.discretization import discretize
+from tolcontact.geometry import seen
+from tolcontact.geometry.faces import patch, triangles
+from tolcontact.geometry.shapes import shape
 from tolcontact.report import write_view
 
 

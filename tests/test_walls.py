@@ -13,19 +13,24 @@ ROOMS = {
     "casadi": ("mechanics/", "compilation/"),
     "matplotlib": ("plot/",),
     "jinja2": ("report/html/",),
-    "fast_simplification": ("report/html/coarse.py",),
+    "fast_simplification": ("report/html/decimation.py",),
     "pyvista": ("plot/",),
     "numba": ("compiled.py",),
     "jaxtyping": ("arrays.py",),
     "llvmlite": ("compilation/functions/native.py",),
     "netCDF4": ("archive/",),
-    "h5py": ("archive/laid_out.py",),
+    "h5py": ("archive/raw_file.py",),
     "typer": ("cli/",),
-    "trimesh": ("discretization/",),
-    "igl": ("discretization/", "report/html/coarse.py"),
-    "cascadio": ("discretization/shape_files/worker.py",),
+    "trimesh": ("geometry/", "discretization/"),
+    "igl": ("geometry/", "report/html/decimation.py"),
+    "cascadio": ("geometry/files/worker.py",),
 }
-NOT_IN = {"xarray": ("declaration/", "discretization/", "variation/", "mechanics/", "compilation/", "contact/", "simulation/")}
+NOT_IN = {
+    "xarray": (
+        "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "compilation/", "contact/",
+        "simulation/",
+    )
+}  # fmt: skip
 # Rooms that a room does not import from, though they stand before it.
 NEVER = {
     "statistics": ("contact", "simulation"),
@@ -36,8 +41,9 @@ NEVER = {
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
-    "compiled", "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation",
-    "recomputed", "statistics", "archive", "report", "plot", "workflow", "testing", "cli", "__init__", "__main__",
+    "compiled", "declaration", "geometry", "features", "discretization", "variation", "mechanics", "compilation", "contact",
+    "simulation", "recomputed", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__",
+    "__main__",
 )  # fmt: skip
 
 

@@ -15,10 +15,10 @@ import tolcontact as tc
 from tests import cases
 from tests.cases.fasteners import fasteners
 from tests.helpers import call
+from tolcontact.analyses.allowed_space import Region
 from tolcontact.simulation import map_blocks
-from tolcontact.variation import Region
 
-module = importlib.import_module("tolcontact.workflow.worst_case")
+module = importlib.import_module("tolcontact.analyses.worst_case")
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def few_searches(monkeypatch):
     """Two for each value, which end at coarse steps: where far ends are the answer, that is enough."""
     monkeypatch.setattr(module, "BEST", 1)
     monkeypatch.setattr(module, "OTHERS", 2)
-    monkeypatch.setattr(importlib.import_module("tolcontact.workflow.extreme_search"), "FINEST", 0.1)
+    monkeypatch.setattr(importlib.import_module("tolcontact.analyses.extreme_search"), "FINEST", 0.1)
 
 
 def values(found, measure=0, state="corrected", of="worst"):

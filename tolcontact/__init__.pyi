@@ -1,4 +1,5 @@
 from . import plot
+from .analyses import allocate, contributions, relocate, sensitivities, tails, worst_case
 from .archive import model_of
 from .cli import command_line, main
 from .compilation import Program
@@ -35,7 +36,6 @@ from .declaration import (
     Variable,
     three_two_one,
 )
-from .discretization import bodies_in, faces_in, parts_from
 from .errors import (
     ArchiveError,
     ClusterError,
@@ -46,27 +46,22 @@ from .errors import (
     TolcontactError,
     UnitsWarning,
 )
+from .geometry import bodies_in, faces_in, parts_from
 from .method import Method
 from .simulation import simulate_blocks
 from .version import __version__
 from .vocabulary import Status
 from .workflow import (
-    allocate,
     build,
     check,
     check_population,
     compare,
     compare_runs,
-    contributions,
     open_archive,
-    relocate,
     run,
-    sensitivities,
     simulate,
     study,
     summarize,
-    tails,
-    worst_case,
     write_model,
 )
 

@@ -5,21 +5,21 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
 
 
 def pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
     """The realizations, so many at once that they fit into memory whatever their number."""
-    for start in range(0, rows.sizes[words.REALIZATION], words.PIECE_ROWS):
-        yield rows.isel({words.REALIZATION: slice(start, start + words.PIECE_ROWS)})
+    for start in range(0, rows.sizes[terms.REALIZATION], terms.PIECE_ROWS):
+        yield rows.isel({terms.REALIZATION: slice(start, start + terms.PIECE_ROWS)})
 
 
 def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
     """Their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
-    for piece in pieces(rows[[words.STATUS.name]]):
-        status = piece[words.STATUS.name].values
-        if status.min(initial=0) < words.UNFINISHED or status.max(initial=0) >= len(words.STATUS_MEANINGS):
+    for piece in pieces(rows[[terms.STATUS.name]]):
+        status = piece[terms.STATUS.name].values
+        if status.min(initial=0) < terms.UNFINISHED or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
             raise ArchiveError("the archive is damaged: some statuses are unknown; run the model again")
         yield status
 
@@ -28,7 +28,7 @@ def finished(results: xr.DataTree) -> int:
     """How many rows, from the first on, were written completely."""
     rows = 0
     for piece in statuses(results.to_dataset()):
-        unfinished = np.flatnonzero(piece == words.UNFINISHED)
+        unfinished = np.flatnonzero(piece == terms.UNFINISHED)
         if unfinished.size:
             return rows + int(unfinished[0])
         rows += len(piece)

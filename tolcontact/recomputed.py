@@ -11,7 +11,7 @@ import numpy as np
 import xarray as xr
 from scipy.spatial.transform import Rotation
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 
 DIRECTIONS = 72  # that are tried
 NARROWINGS = 60
@@ -25,11 +25,11 @@ class NotKeptError(LookupError):
 
 def archived_points(contact: Mapping[str, np.ndarray], own: np.ndarray) -> "list[ArchivedPoint]":
     """Those of the contact points `own` (point,) that are of round faces; `contact`: variables of that group, by name."""
-    if words.POINT_OF_ROUND.name not in contact:
+    if terms.POINT_OF_ROUND.name not in contact:
         return []
-    chosen = np.flatnonzero(np.isin(contact[words.POINT_OF_ROUND.name], own))
+    chosen = np.flatnonzero(np.isin(contact[terms.POINT_OF_ROUND.name], own))
     wall, body = (
-        {name: contact[variable.name][chosen] for name, variable in of.items()} for of in (words.OF_WALL, words.OF_ROUND)
+        {name: contact[variable.name][chosen] for name, variable in of.items()} for of in (terms.OF_WALL, terms.OF_ROUND)
     )
     return [
         ArchivedPoint(*({name: values[k] for name, values in of.items()} for of in (wall, body))) for k in range(len(chosen))
@@ -57,7 +57,7 @@ class ArchivedPoint(NamedTuple):
             R = R.swapaxes(-1, -2)
             t = -np.einsum("...ij,...j->...i", R, t)
         centre, axis = R @ self.body["centre"] + t, R @ self.body["axis"]
-        if words.SURFACE_KINDS[self.wall["kind"]] == "plane":
+        if terms.SURFACE_KINDS[self.wall["kind"]] == "plane":
             return self._beside(-self.wall["axis"], centre, axis)
         if self.body["axis"].any():
             return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
@@ -96,7 +96,7 @@ class ArchivedPoint(NamedTuple):
 
     def _inside(self, apart: np.ndarray) -> np.ndarray:
         """Distance (...) [mm] from the nearest tangent plane of a hollow wall."""
-        if words.SURFACE_KINDS[self.wall["kind"]] == "sphere":
+        if terms.SURFACE_KINDS[self.wall["kind"]] == "sphere":
             along = apart @ self.body["towards"]
             across = np.linalg.norm(apart - along[..., None] * self.body["towards"], axis=-1)
             beyond = np.maximum(np.arctan2(across, along) - self.body["opening"], 0)
@@ -107,7 +107,7 @@ class ArchivedPoint(NamedTuple):
 
     def _distance(self, apart: np.ndarray) -> np.ndarray:
         """Distance (...) [mm] from the wall's surface, positive outside, of what is `apart` (..., 3) from its point."""
-        kind, wall = words.SURFACE_KINDS[self.wall["kind"]], self.wall
+        kind, wall = terms.SURFACE_KINDS[self.wall["kind"]], self.wall
         if kind == "sphere":
             return np.asarray(np.linalg.norm(apart, axis=-1) - wall["radius"])
         along = apart @ wall["axis"]
@@ -127,21 +127,21 @@ class ArchivedFaces:
 
     def displacement(self, face: int, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """tau (realization, 3) [mm] and rho (realization, 3) [rad] for deviations (realization, contributor)."""
-        found = deviations @ self._contact[words.FACE_TWIST.name][face].T
+        found = deviations @ self._contact[terms.FACE_TWIST.name][face].T
         return found[:, :3], found[:, 3:]
 
     def height(self, face: int, deviations: np.ndarray) -> np.ndarray:
         """How much farther out the face lies (realization,) [mm]; 0 of face -1."""
         if face < 0:
             return np.zeros(len(deviations))
-        return np.asarray(deviations @ self._contact[words.FACE_HEIGHT.name][face])
+        return np.asarray(deviations @ self._contact[terms.FACE_HEIGHT.name][face])
 
     def placed(self, face: int, deviations: np.ndarray, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where a face is, R and t, of a part at R (realization, state, 3, 3), t (realization, state, 3) [mm]."""
         if face < 0:
             return R, t
         tau, rho = self.displacement(face, deviations)
-        turned, centre = Rotation.from_rotvec(rho).as_matrix(), self._contact[words.FACE_CENTRE.name][face]
+        turned, centre = Rotation.from_rotvec(rho).as_matrix(), self._contact[terms.FACE_CENTRE.name][face]
         moved = tau + centre - turned @ centre
         return R @ turned[:, None], np.einsum("...ij,...j->...i", R, moved[:, None]) + t
 
@@ -149,11 +149,11 @@ class ArchivedFaces:
         """How far locators move their parts (realization, locator) [mm]."""
         found = deviations[:, locators].copy()
         for place, locator in enumerate(locators):
-            face = int(self._sample[words.FACE_OF_LOCATOR.name][locator]) if words.FACE_OF_LOCATOR.name in self._sample else -1
+            face = int(self._sample[terms.FACE_OF_LOCATOR.name][locator]) if terms.FACE_OF_LOCATOR.name in self._sample else -1
             if face >= 0:
                 tau, rho = self.displacement(face, deviations)
-                arm = self._sample[words.LOCATOR_POINT.name][locator] - self._contact[words.FACE_CENTRE.name][face]
-                inward = self._sample[words.LOCATOR_DIRECTION.name][locator]
+                arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
+                inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
                 found[:, place] += self.height(face, deviations) - (tau + np.cross(rho, arm)) @ inward
         return found
 
@@ -166,25 +166,25 @@ class ArchivedPair:
 
     def __init__(self, tree: xr.DataTree, pair: int) -> None:
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
-        own = contact[words.PAIR_OF_POINT.name] == pair
-        points = (words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL)
+        own = contact[terms.PAIR_OF_POINT.name] == pair
+        points = (terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL)
         self.moving_point, self.reference_point, self.normal = (contact[variable.name][own] for variable in points)
         self.moving_part, self.reference_part = (
-            int(contact[variable.name][pair]) for variable in (words.MOVING_PART, words.REFERENCE_PART)
+            int(contact[variable.name][pair]) for variable in (terms.MOVING_PART, terms.REFERENCE_PART)
         )
-        self.locators = contact[words.LOCATOR_OF_POINT.name][own]
+        self.locators = contact[terms.LOCATOR_OF_POINT.name][own]
         self.round = archived_points(contact, np.flatnonzero(own))
         sample = {str(name): values.values for name, values in tree.children["sample"].to_dataset().data_vars.items()}
         self.faces = ArchivedFaces(contact, sample)
         self.moving_face, self.reference_face = (
             int(contact[variable.name][pair]) if variable.name in contact else -1
-            for variable in (words.FACE_OF_MOVING, words.FACE_OF_REFERENCE)
+            for variable in (terms.FACE_OF_MOVING, terms.FACE_OF_REFERENCE)
         )
         self.places = np.arange(own.sum())
         if self.round:
-            of_round = contact[words.POINT_OF_ROUND.name]
+            of_round = contact[terms.POINT_OF_ROUND.name]
             self.places = of_round[np.isin(of_round, np.flatnonzero(own))] - np.flatnonzero(own)[0]
-        self.facing = contact[words.FACING.name][own] if words.FACING.name in contact else None
+        self.facing = contact[terms.FACING.name][own] if terms.FACING.name in contact else None
 
     @property
     def _is_drawn(self) -> bool:
@@ -197,7 +197,7 @@ class ArchivedPair:
         Raises NotKeptError, with the name of a variable that they need and the archive does not have.
         """
         moving, reference = (_pose(rows, some, part) for part in (self.moving_part, self.reference_part))
-        drawn = _needed(rows, words.DEVIATION.name, some) if self._is_drawn else np.zeros((1, 0))
+        drawn = _needed(rows, terms.DEVIATION.name, some) if self._is_drawn else np.zeros((1, 0))
         R_m, t_m = self.faces.placed(self.moving_face, drawn, *moving)
         R_r, t_r = self.faces.placed(self.reference_face, drawn, *reference)
         of_moving, of_reference = (self.faces.height(face, drawn) for face in (self.moving_face, self.reference_face))
@@ -230,7 +230,7 @@ def _pose(rows: Rows, some: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
     """R (realization, state, 3, 3) and t (realization, state, 3) [mm]; of the ground, part -1, one that moves nothing."""
     if part < 0:
         return np.eye(3)[None, None], np.zeros((1, 1, 3))
-    return _needed(rows, words.ROTATION.name, some)[:, :, part], _needed(rows, words.TRANSLATION.name, some)[:, :, part]
+    return _needed(rows, terms.ROTATION.name, some)[:, :, part], _needed(rows, terms.TRANSLATION.name, some)[:, :, part]
 
 
 def _needed(rows: Rows, name: str, some: slice) -> np.ndarray:

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.archive import open_archive
 from tolcontact.errors import OptionError
 from tolcontact.recomputed import ArchivedPair, NotKeptError, Rows
@@ -35,14 +35,14 @@ def assert_resolved(results: Results) -> None:
     Raises AssertionError with the number of the others, by status, and the first of each.
     """
     with _opened(results) as tree:
-        status, numbers = _rows(tree)[words.STATUS.name].values, _numbers(tree)
-    others = ~np.isin(status, words.CERTIFIED)
+        status, numbers = _rows(tree)[terms.STATUS.name].values, _numbers(tree)
+    others = ~np.isin(status, terms.CERTIFIED)
     if others.any():
         by_status = [f"{_meaning(one)} {_some(numbers[status == one])}" for one in np.unique(status[others])]
         raise AssertionError(f"{others.sum()} of {status.size} realizations are not resolved: {', '.join(by_status)}")
 
 
-def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) -> None:
+def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) -> None:
     """The least gaps `gap_min` (realization, state, pair) [mm] are those of the archived points, poses and deviations.
 
     They are computed again with nothing but what the archive holds: n'(x_m - x_r), with x = R p + t, p a nominal contact point
@@ -59,9 +59,9 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
     """
     with _opened(results) as tree:
         rows, numbers = _rows(tree), _numbers(tree)
-        archived, held = rows[words.GAP_MIN.name], _holds_its_points(rows)
+        archived, held = rows[terms.GAP_MIN.name], _holds_its_points(rows)
         largest, place = 0.0, ""
-        for number, name in enumerate(archived[words.PAIR].values):
+        for number, name in enumerate(archived[terms.PAIR].values):
             pair = ArchivedPair(tree, number)
             at_once = max(1, AT_ONCE // len(pair.normal))
             for start in range(0, len(held), at_once):
@@ -71,10 +71,10 @@ def assert_gaps_recompute(results: Results, *, within: float = words.ROUNDED) ->
                 if apart.max(initial=0.0) > largest:
                     largest = float(apart.max())
                     row, state = np.argwhere(apart == largest)[0]
-                    place = f'realization {numbers[some][held[some]][row]}, {words.STATES[state]}, contact pair "{name}"'
+                    place = f'realization {numbers[some][held[some]][row]}, {terms.STATES[state]}, contact pair "{name}"'
     if largest > within:
         raise AssertionError(
-            f'"{words.GAP_MIN.name}" is not the smallest gap of the archived contact points: it differs by {largest:.3g} mm in '
+            f'"{terms.GAP_MIN.name}" is not the smallest gap of the archived contact points: it differs by {largest:.3g} mm in '
             f"{place}; {within:.3g} mm are allowed"
         )
 
@@ -87,15 +87,15 @@ def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None =
 
     Raises AssertionError with the number of variables that differ, and the first realization of the first of them.
     """
-    known = [variable.name for variable in words.BY_REALIZATION]
+    known = [variable.name for variable in terms.BY_REALIZATION]
     if unknown := [name for name in variables or () if name not in known]:
         raise OptionError(f"no realization has {', '.join(map(repr, unknown))}; expected some of: {', '.join(known)}")
     with _opened(a) as one, _opened(b) as other:
-        for dim in (words.PART, words.PAIR, words.MEASURE):
+        for dim in (terms.PART, terms.PAIR, terms.MEASURE):
             labels = [[str(label) for label in tree.coords[dim].values] for tree in (one, other)]
             if labels[0] != labels[1]:
                 raise AssertionError(f"the labels of {dim} differ: {labels[0]} and {labels[1]}")
-        sizes = [tree.sizes[words.REALIZATION] for tree in (one, other)]
+        sizes = [tree.sizes[terms.REALIZATION] for tree in (one, other)]
         if sizes[0] != sizes[1]:
             raise AssertionError(f"the runs have {sizes[0]} and {sizes[1]} realizations")
         both = _rows(one), _rows(other)
@@ -128,11 +128,11 @@ def _rows(tree: xr.DataTree) -> Rows:
 
 def _numbers(tree: xr.DataTree) -> np.ndarray:
     """Numbers (realization,) of the realizations."""
-    return np.asarray(tree.to_dataset()[words.REALIZATION].values)
+    return np.asarray(tree.to_dataset()[terms.REALIZATION].values)
 
 
 def _meaning(status: int) -> str:
-    known = dict(enumerate(words.STATUS_MEANINGS)) | {words.UNFINISHED: "unfinished"}
+    known = dict(enumerate(terms.STATUS_MEANINGS)) | {terms.UNFINISHED: "unfinished"}
     return known.get(int(status), f"status {status}")
 
 
@@ -144,9 +144,9 @@ def _some(numbers: np.ndarray) -> str:
 
 def _holds_its_points(rows: Rows) -> np.ndarray:
     """Of which realizations (realization,) the archive holds the contact points that `gap_min` is of."""
-    held = rows[words.STATUS.name].values != words.UNFINISHED
-    if words.SEARCHED.name in rows:
-        held &= rows[words.SEARCHED.name].values != 1
+    held = rows[terms.STATUS.name].values != terms.UNFINISHED
+    if terms.SEARCHED.name in rows:
+        held &= rows[terms.SEARCHED.name].values != 1
     return np.asarray(held)
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files import read_files
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files import read_files
 
 FAR = 1e3  # [mm] at which turned normals are compared
 SIZES = {"INCH": 25.4, "MILLI": 1.0, "$,.METRE.": 1e3}  # [mm] of units, by what their entities have in them

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.discretization.fault import GeometryFault
-from tolcontact.discretization.shape_files import read_files
-from tolcontact.discretization.shape_files.product import Product
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.files import read_files
+from tolcontact.geometry.files.product import Product
 
 PATIENCE = 600.0  # s
 

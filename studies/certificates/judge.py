@@ -17,7 +17,7 @@ import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
-from tolcontact.discretization.curvature import chord_height
+from tolcontact.geometry.curvature import chord_height
 from tolcontact.recomputed import ArchivedPoint
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status

@@ -8,7 +8,7 @@ from pathlib import Path
 import tolcontact as tc
 from tests import cases
 from tests.helpers import contents
-from tolcontact.archive import laid_out, writer
+from tolcontact.archive import raw_file, writer
 
 writer.CHECKPOINTS_EVERY = 0.0
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
@@ -20,7 +20,7 @@ def run(path, **options):
     tc.run(program, samples=9000, seed=3, out=path, keep="measures", surfaces=4, **options).close()
 
 
-class Dying(laid_out.LaidOut):
+class Dying(raw_file.LaidOut):
     """A file whose process dies at one of its writes."""
 
     left = 0

@@ -4,7 +4,7 @@ import sys
 
 import tolcontact as tc
 from tolcontact.discretization import discretize
-from tolcontact.discretization.shape_files import reader
+from tolcontact.geometry.files import reader
 
 reader.SECONDS = float(sys.argv[1])
 a = tc.Assembly("strange")

@@ -129,13 +129,13 @@ arguments are numbers.
 """
 
 from tolcontact.archive.analyses import check_room_for, keep
+from tolcontact.archive.archive_lock import taken
+from tolcontact.archive.dataset import labelled
+from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
 from tolcontact.archive.header import Run, run_settings, sizes_of_rows
-from tolcontact.archive.labelled import labelled
 from tolcontact.archive.reader import model_of, open_archive, opened
-from tolcontact.archive.room import bytes_of_rows, size_in_words
-from tolcontact.archive.rows import check_rows
-from tolcontact.archive.stored import row_values, stored
-from tolcontact.archive.taking import taken
+from tolcontact.archive.row_checksums import check_rows
+from tolcontact.archive.stored_block import row_values, stored
 from tolcontact.archive.writer import ArchiveWriter
 
 __all__ = [

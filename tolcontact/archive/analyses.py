@@ -6,16 +6,16 @@ from pathlib import Path
 
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
+from tolcontact.archive.archive_lock import taken
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.resuming import check_same_model
-from tolcontact.archive.taking import taken
 from tolcontact.archive.writer import opened_locked, replacing
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 
-CHECKED = {variable.name: variable for variable in words.ANALYZED}
+CHECKED = {variable.name: variable for variable in terms.ANALYZED}
 
 
 def check_room_for(path: str | Path, name: str, program: Program) -> None:
@@ -26,8 +26,8 @@ def check_room_for(path: str | Path, name: str, program: Program) -> None:
     inspect(real)
     with opened_locked(real, "r") as file:
         check_same_model(file, real, program)
-        if words.ANALYSES in file.groups and name in file[words.ANALYSES].groups:
-            raise ArchiveError(f'"{path}" has {words.ANALYSES}/{name} already, which is not replaced; choose another archive')
+        if terms.ANALYSES in file.groups and name in file[terms.ANALYSES].groups:
+            raise ArchiveError(f'"{path}" has {terms.ANALYSES}/{name} already, which is not replaced; choose another archive')
 
 
 def keep(path: str | Path, name: str, found: xr.Dataset, program: Program) -> None:
@@ -40,5 +40,5 @@ def keep(path: str | Path, name: str, found: xr.Dataset, program: Program) -> No
             for variable in stored.variables.values():
                 variable.encoding = {"dtype": "S1"} if variable.dtype.kind in "UO" else {}
             for each in stored.data_vars:
-                stored[each].attrs[words.CHECKSUM] = crc32(CHECKED[str(each)], stored[each].values)
-            stored.to_netcdf(part, mode="a", group=f"{words.ANALYSES}/{name}", engine="netcdf4")
+                stored[each].attrs[terms.CHECKSUM] = crc32(CHECKED[str(each)], stored[each].values)
+            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES}/{name}", engine="netcdf4")

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as words
-from tolcontact.archive.laid_out import LaidOut
+from tolcontact import vocabulary as terms
+from tolcontact.archive.raw_file import LaidOut
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 
@@ -27,13 +27,13 @@ class Checkpoint(NamedTuple):
 
 def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> Checkpoint:
     """The last checkpoint of an archive. Raises ArchiveError if it is not what was written."""
-    summed = np.ma.getdata(file[words.SUMMED_ROWS.name][:])
+    summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][:])
     place = int(summed.argmax())
     rows, found = max(0, int(summed[place])), []
     for part in parts if rows else ():
-        group = file[words.field_of(part)]
-        found.append(np.ma.getdata(group[words.FIELD_SUMS.name][place]))
-        if _checksum(rows, found[-1]) != int(group[words.SUMS_CHECKSUM.name][place]):
+        group = file[terms.field_of(part)]
+        found.append(np.ma.getdata(group[terms.FIELD_SUMS.name][place]))
+        if _checksum(rows, found[-1]) != int(group[terms.SUMS_CHECKSUM.name][place]):
             raise ArchiveError(
                 f'archive "{path}" is damaged: the sums of the field of part "{part}" are not what was written; write to '
                 "a new file"
@@ -43,14 +43,14 @@ def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> 
 
 def write_checkpoint(archive: LaidOut, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
     """Write a checkpoint to its place."""
-    archive.overwrite("", words.SUMMED_ROWS, [words.UNFINISHED], checkpoint.place)
+    archive.overwrite("", terms.SUMMED_ROWS, [terms.UNFINISHED], checkpoint.place)
     for part, of_part in zip(parts, checkpoint.sums, strict=True):
-        archive.overwrite(words.field_of(part), words.FIELD_SUMS, of_part[None], checkpoint.place)
+        archive.overwrite(terms.field_of(part), terms.FIELD_SUMS, of_part[None], checkpoint.place)
         checksum = _checksum(checkpoint.rows, of_part)
-        archive.overwrite(words.field_of(part), words.SUMS_CHECKSUM, [checksum], checkpoint.place)
-    archive.overwrite("", words.SUMMED_ROWS, [checkpoint.rows], checkpoint.place)
+        archive.overwrite(terms.field_of(part), terms.SUMS_CHECKSUM, [checksum], checkpoint.place)
+    archive.overwrite("", terms.SUMMED_ROWS, [checkpoint.rows], checkpoint.place)
 
 
 def _checksum(rows: int, sums: np.ndarray) -> int:
     """Of the sums and of how many realizations they are: one written without the other has another one."""
-    return crc32(words.FIELD_SUMS, sums, crc32(words.SUMMED_ROWS, rows))
+    return crc32(terms.FIELD_SUMS, sums, crc32(terms.SUMMED_ROWS, rows))

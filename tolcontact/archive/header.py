@@ -10,13 +10,14 @@ from typing import Any, NamedTuple
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as words
-from tolcontact.archive.checked import nothing_checked
+from tolcontact import vocabulary as terms
+from tolcontact.archive.surface_rows import nothing_checked
 from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import plain_faces, to_document
-from tolcontact.discretization import Nominal, NominalPart, form_arrays, known_surfaces
+from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.geometry import form_arrays, known_surfaces
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import Variable
@@ -38,7 +39,7 @@ class Run(NamedTuple):
     keep: str
     surfaces: int
     fields: str
-    plan: str = words.MONTE_CARLO
+    plan: str = terms.MONTE_CARLO
 
 
 def run_settings(program: Program, run: Run) -> dict[str, Any]:
@@ -85,8 +86,8 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     nominal = program.nominal
     file.setncatts(
         {
-            "Conventions": words.CONVENTIONS,
-            "format": np.int64(words.FORMAT),
+            "Conventions": terms.CONVENTIONS,
+            "format": np.int64(terms.FORMAT),
             "title": f"variation simulation of {nominal.assembly.name}",
             "source": "Monte-Carlo variation simulation of a rigid-body assembly with contact",
             "references": "Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg: "
@@ -101,23 +102,23 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_measures(file, program)
     _write_model(file.createGroup("model"), nominal, declaration(program))
     _write_contact(file.createGroup("contact"), nominal)
-    _write_sample(file.createGroup("sample"), program, deviations=words.DEVIATION in kept_rows(run.keep))
-    file["contact"].createDimension(words.BOUND, 2)
-    _lay_out_together(file["contact"], nothing_touching(file["contact"].dimensions[words.POINT].size))
+    _write_sample(file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
+    file["contact"].createDimension(terms.BOUND, 2)
+    _lay_out_together(file["contact"], nothing_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
-    checked.createDimension(words.CHECKED, run.surfaces)
+    checked.createDimension(terms.CHECKED, run.surfaces)
     _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.parts, sums, strict=True):
-        _write_field(file.createGroup(words.field_of(part.name)), part, numbers)
+        _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
 
 
 def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
     """Dimensions of the root, and what their places are called."""
     labels = labels_of_rows(nominal)
-    file.createDimension(words.REALIZATION, None)
+    file.createDimension(terms.REALIZATION, None)
     for name, values in labels.items():
         file.createDimension(name, len(values))
-    for coordinate in words.COORDINATES:
+    for coordinate in terms.COORDINATES:
         if coordinate.name in labels:
             write(file, coordinate, labels[coordinate.name])
         else:
@@ -127,19 +128,19 @@ def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
 def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
     """What the places along the dimensions of rows are called."""
     return {
-        words.STATE: words.STATES,
-        words.PART: [part.name for part in nominal.parts],
-        words.PAIR: [pair.name for pair in nominal.pairs],
-        words.MEASURE: [measure.name for measure in nominal.measures],
-        words.AXIS: words.AXES,
-        words.BODY_AXIS: words.AXES,
+        terms.STATE: terms.STATES,
+        terms.PART: [part.name for part in nominal.parts],
+        terms.PAIR: [pair.name for pair in nominal.pairs],
+        terms.MEASURE: [measure.name for measure in nominal.measures],
+        terms.AXIS: terms.AXES,
+        terms.BODY_AXIS: terms.AXES,
     }
 
 
 def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
     """How many places the dimensions of a row have."""
     return {name: len(labels) for name, labels in labels_of_rows(nominal).items()} | {
-        words.CONTRIBUTOR: len(nominal.contributors)
+        terms.CONTRIBUTOR: len(nominal.contributors)
     }
 
 
@@ -147,110 +148,110 @@ def units_of_rows(program: Program) -> dict[Variable, str]:
     """Units that depend on the model; those of measures are "1" if they differ."""
     units = {measure.units for measure in program.nominal.measures} or {"mm"}
     return {
-        words.REACTION: program.method.minimizes.reaction_units,
-        words.MEASURED: units.pop() if len(units) == 1 else "1",
+        terms.REACTION: program.method.minimizes.reaction_units,
+        terms.MEASURED: units.pop() if len(units) == 1 else "1",
     }
 
 
 def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Variable]) -> None:
     """The variables of realizations, their checksums, and the places of checkpoints; all without values yet."""
-    for variable in words.ROWS:
+    for variable in terms.ROWS:
         if variable in rows:
             define(file, variable)
     for variable, units in units_of_rows(program).items():
         file[variable.name].units = units
-    file.createDimension(words.BLOCK, None)
-    file.createDimension(words.ROW_VARIABLE, len(rows))
-    write(file, words.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
-    define(file, words.ROW_CHECKSUM)
-    file.createDimension(words.CHECKPOINT, 2)
-    lay_out(file, words.SUMMED_ROWS, [words.UNFINISHED] * 2)
+    file.createDimension(terms.BLOCK, None)
+    file.createDimension(terms.ROW_VARIABLE, len(rows))
+    write(file, terms.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
+    define(file, terms.ROW_CHECKSUM)
+    file.createDimension(terms.CHECKPOINT, 2)
+    lay_out(file, terms.SUMMED_ROWS, [terms.UNFINISHED] * 2)
 
 
 def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     measures = program.nominal.measures
-    write(file, words.MEASURE_NOMINAL, program.nominal_measures)
-    write(file, words.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
+    write(file, terms.MEASURE_NOMINAL, program.nominal_measures)
+    write(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
-    write(file, words.LOWER_LIMIT, bounds[:, 0])
-    write(file, words.UPPER_LIMIT, bounds[:, 1])
-    write(file, words.QUANTITY, [measure.quantity for measure in measures])
-    write(file, words.MEASURE_UNITS, [measure.units for measure in measures])
+    write(file, terms.LOWER_LIMIT, bounds[:, 0])
+    write(file, terms.UPPER_LIMIT, bounds[:, 1])
+    write(file, terms.QUANTITY, [measure.quantity for measure in measures])
+    write(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
 
 
 def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     """The surface of a part, and room for its displacement field and its sums."""
     group.setncattr("part", part.name)
     sizes = {
-        words.VERTEX: len(part.vertices),
-        words.FACE: len(part.faces),
-        words.CORNER: 3,
-        words.COMPONENT: len(words.COMPONENTS),
-        words.BOUND: len(words.BOUNDS),
-        words.NUMBER: numbers,
+        terms.VERTEX: len(part.vertices),
+        terms.FACE: len(part.faces),
+        terms.CORNER: 3,
+        terms.COMPONENT: len(terms.COMPONENTS),
+        terms.BOUND: len(terms.BOUNDS),
+        terms.NUMBER: numbers,
     }
     for name, size in sizes.items():
         group.createDimension(name, size)
-    write(group, words.COMPONENT_LABEL, words.COMPONENTS)
-    write(group, words.FIELD_VERTICES, part.vertices)
-    write(group, words.FIELD_FACES, part.faces)
-    write(group, words.BOUND_LABEL, words.BOUNDS)
+    write(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
+    write(group, terms.FIELD_VERTICES, part.vertices)
+    write(group, terms.FIELD_FACES, part.faces)
+    write(group, terms.BOUND_LABEL, terms.BOUNDS)
     _lay_out_together(group, no_field(len(part.vertices)))
-    lay_out(group, words.FIELD_SUMS, np.full([2, len(words.STATES), numbers], np.nan))
-    lay_out(group, words.SUMS_CHECKSUM, [words.UNFINISHED] * 2)
+    lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
+    lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
 
 
 def kept_rows(kept: str) -> tuple[Variable, ...]:
     """What is archived of each realization."""
-    left_out = {"measures": {*words.POSES, words.DEVIATION}, "poses": {words.DEVIATION}, "all": set[Variable]()}
-    return tuple(variable for variable in words.BY_REALIZATION if variable not in left_out[kept])
+    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[Variable]()}
+    return tuple(variable for variable in terms.BY_REALIZATION if variable not in left_out[kept])
 
 
 def no_field(vertices: int) -> dict[Variable, Any]:
     """What the group of a part holds before its field was written."""
-    states = len(words.STATES)
+    states = len(terms.STATES)
     return {
-        **{v: np.full([states, vertices, len(words.COMPONENTS)], np.nan) for v in (words.FIELD_MEAN, words.FIELD_SIX_SIGMA)},
-        words.FIELD_INTERVAL: np.full([states, vertices, len(words.BOUNDS)], np.nan),
-        words.FIELD_REALIZATIONS: 0,
-        words.MAGNITUDE_REALIZATIONS: 0,
+        **{v: np.full([states, vertices, len(terms.COMPONENTS)], np.nan) for v in (terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA)},
+        terms.FIELD_INTERVAL: np.full([states, vertices, len(terms.BOUNDS)], np.nan),
+        terms.FIELD_REALIZATIONS: 0,
+        terms.MAGNITUDE_REALIZATIONS: 0,
     }
 
 
 def nothing_touching(points: int) -> dict[Variable, Any]:
     """What the group of contact points holds of how often they touch, before that was looked at."""
     return {
-        words.TOUCHING_SHARE: np.full(points, np.nan),
-        words.TOUCHING_INTERVAL: np.full((points, 2), np.nan),
-        words.TOUCHING_REALIZATIONS: 0,
+        terms.TOUCHING_SHARE: np.full(points, np.nan),
+        terms.TOUCHING_INTERVAL: np.full((points, 2), np.nan),
+        terms.TOUCHING_REALIZATIONS: 0,
     }
 
 
 def _lay_out_together(group: netCDF4.Group, values: Mapping[Variable, Any]) -> None:
     for variable, nothing in values.items():
         lay_out(group, variable, nothing)
-    lay_out(group, words.GROUP_CHECKSUM, words.UNFINISHED)
+    lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
 
 
 def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
-    write(group, words.DECLARATION, document)
+    write(group, terms.DECLARATION, document)
     for part in nominal.parts:
         if isinstance(part.part.geometry, Mesh):
-            mesh = group.createGroup(f"mesh/{words.group_of(part.name)}")
+            mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
             mesh.setncattr("part", part.name)
-            mesh.createDimension(words.VERTEX, len(part.mesh.vertices))
-            mesh.createDimension(words.FACE, len(part.mesh.faces))
-            mesh.createDimension(words.CORNER, 3)
-            write(mesh, words.MESH_VERTICES, part.mesh.vertices)
-            write(mesh, words.MESH_FACES, part.mesh.faces)
+            mesh.createDimension(terms.VERTEX, len(part.mesh.vertices))
+            mesh.createDimension(terms.FACE, len(part.mesh.faces))
+            mesh.createDimension(terms.CORNER, 3)
+            write(mesh, terms.MESH_VERTICES, part.mesh.vertices)
+            write(mesh, terms.MESH_FACES, part.mesh.faces)
             known = known_surfaces(part.mesh)
             if known is not None:
-                mesh.createDimension(words.BREP_FACE, len(known[1]))
-                write(mesh, words.BREP_OF_FACE, known[0])
-                _write_forms(mesh, words.OF_BREP_FACE, form_arrays(known[1]))
+                mesh.createDimension(terms.BREP_FACE, len(known[1]))
+                write(mesh, terms.BREP_OF_FACE, known[0])
+                _write_forms(mesh, terms.OF_BREP_FACE, form_arrays(known[1]))
                 if known[2]:
-                    write(mesh, words.NAME_OF_BREP_FACE, known[2])
+                    write(mesh, terms.NAME_OF_BREP_FACE, known[2])
 
 
 def _write_forms(group: netCDF4.Group, variables: Mapping[str, Variable], arrays: Mapping[str, np.ndarray]) -> None:
@@ -259,14 +260,14 @@ def _write_forms(group: netCDF4.Group, variables: Mapping[str, Variable], arrays
 
 
 def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
-    group.createDimension(words.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
+    group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
-        group.createDimension(words.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
+        group.createDimension(terms.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
     if nominal.faces:
         sizes = {
-            words.FEATURE_FACE: len(nominal.faces),
-            words.FREEDOM: len(words.FREEDOMS),
-            words.CONTRIBUTOR: len(nominal.contributors),
+            terms.FEATURE_FACE: len(nominal.faces),
+            terms.FREEDOM: len(terms.FREEDOMS),
+            terms.CONTRIBUTOR: len(nominal.contributors),
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
@@ -278,18 +279,18 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
     """What the group `contact` holds: which parts touch, and where."""
     pairs = nominal.pairs
     parts = {
-        words.MOVING_PART: [pair.moving for pair in pairs],
-        words.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
+        terms.MOVING_PART: [pair.moving for pair in pairs],
+        terms.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
     }
     if not pairs:
         return parts
     locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
     values = parts | {
-        words.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
-        words.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
-        words.REFERENCE_POINT: np.vstack([pair.P_r for pair in pairs]),
-        words.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
-        words.LOCATOR_OF_POINT: np.concatenate(locators),
+        terms.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
+        terms.MOVING_POINT: np.vstack([pair.P_m for pair in pairs]),
+        terms.REFERENCE_POINT: np.vstack([pair.P_r for pair in pairs]),
+        terms.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
+        terms.LOCATOR_OF_POINT: np.concatenate(locators),
     }
     return values | _round_values(nominal) | _face_values(nominal)
 
@@ -307,14 +308,14 @@ def _face_values(nominal: Nominal) -> dict[Variable, Any]:
         for side in zip(*(pair.deviating for pair in nominal.pairs), strict=True)
     )
     return {
-        words.FEATURE_OF_FACE: [face.name for face in faces],
-        words.FACE_CENTRE: np.array([face.centre for face in faces]),
-        words.FREEDOM_LABEL: words.FREEDOMS,
-        words.FACE_TWIST: twists,
-        words.FACE_HEIGHT: heights,
-        words.FACE_OF_MOVING: moving,
-        words.FACE_OF_REFERENCE: reference,
-        words.FACING: np.concatenate([pair.facing for pair in nominal.pairs]),
+        terms.FEATURE_OF_FACE: [face.name for face in faces],
+        terms.FACE_CENTRE: np.array([face.centre for face in faces]),
+        terms.FREEDOM_LABEL: terms.FREEDOMS,
+        terms.FACE_TWIST: twists,
+        terms.FACE_HEIGHT: heights,
+        terms.FACE_OF_MOVING: moving,
+        terms.FACE_OF_REFERENCE: reference,
+        terms.FACING: np.concatenate([pair.facing for pair in nominal.pairs]),
     }
 
 
@@ -326,31 +327,31 @@ def _round_values(nominal: Nominal) -> dict[Variable, Any]:
         return {}
     numbers, points = zip(*known, strict=True)
     return {
-        words.POINT_OF_ROUND: np.concatenate(numbers),
-        **{v: np.concatenate([each.walls[name] for each in points]) for name, v in words.OF_WALL.items()},
-        **{v: np.concatenate([each.points[name] for each in points]) for name, v in words.OF_ROUND.items()},
+        terms.POINT_OF_ROUND: np.concatenate(numbers),
+        **{v: np.concatenate([each.walls[name] for each in points]) for name, v in terms.OF_WALL.items()},
+        **{v: np.concatenate([each.points[name] for each in points]) for name, v in terms.OF_ROUND.items()},
     }
 
 
 def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
     nominal, every = program.nominal, program.draws.contributors.every
-    group.createDimension(words.CONTRIBUTOR, len(every))
-    group.createDimension(words.LOCATOR, len(nominal.locators))
+    group.createDimension(terms.CONTRIBUTOR, len(every))
+    group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
-        define(group, words.DEVIATION)
-    write(group, words.CONTRIBUTOR_LABEL, [each.label for each in every])
-    write(group, words.CONTRIBUTOR_SOURCE, [each.source for each in every])
-    write(group, words.CONTRIBUTOR_UNITS, [each.units for each in every])
-    write(group, words.TOLERANCE_RANGE, [each.range for each in every])
-    write(group, words.DISTRIBUTION, [each.said for each in every])
-    write(group, words.MEAN_SHIFT, [each.mean_shift for each in every])
+        define(group, terms.DEVIATION)
+    write(group, terms.CONTRIBUTOR_LABEL, [each.label for each in every])
+    write(group, terms.CONTRIBUTOR_SOURCE, [each.source for each in every])
+    write(group, terms.CONTRIBUTOR_UNITS, [each.units for each in every])
+    write(group, terms.TOLERANCE_RANGE, [each.range for each in every])
+    write(group, terms.DISTRIBUTION, [each.said for each in every])
+    write(group, terms.MEAN_SHIFT, [each.mean_shift for each in every])
     locators = nominal.locators
-    write(group, words.LOCATOR_LABEL, locators.labels)
-    write(group, words.STIFFNESS, locators.stiffness)
-    write(group, words.ONE_SIDED, locators.one_sided)
-    write(group, words.LOCATOR_POINT, locators.points)
-    write(group, words.LOCATOR_DIRECTION, locators.directions)
-    write(group, words.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
+    write(group, terms.LOCATOR_LABEL, locators.labels)
+    write(group, terms.STIFFNESS, locators.stiffness)
+    write(group, terms.ONE_SIDED, locators.one_sided)
+    write(group, terms.LOCATOR_POINT, locators.points)
+    write(group, terms.LOCATOR_DIRECTION, locators.directions)
+    write(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
 
 
 def declaration(program: Program) -> str:

@@ -15,7 +15,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_memory, run_child
 from tolcontact.errors import ArchiveError, shown
@@ -26,31 +26,31 @@ MEMORY = 1 << 30  # beside four times the file's own size
 DEFLATED = 1032  # zlib makes data no smaller than that
 DECLARED = 1 << 26  # bytes of a declared model
 TEXT = 1 << 20  # letters of an attribute
-SIZES = {words.STATE: 2, words.AXIS: 3, words.BODY_AXIS: 3, words.CORNER: 3, words.COMPONENT: 4, words.BOUND: 2}
+SIZES = {terms.STATE: 2, terms.AXIS: 3, terms.BODY_AXIS: 3, terms.CORNER: 3, terms.COMPONENT: 4, terms.BOUND: 2}
 GROUPS = ("model", "contact", "sample", "field")
 ADDED = ("surface",)  # groups that archives of format 1 may not have
-LABELS = (words.PART, words.PAIR, words.MEASURE, words.ROW_VARIABLE)
+LABELS = (terms.PART, terms.PAIR, terms.MEASURE, terms.ROW_VARIABLE)
 CHANGES_VALUES = ("scale_factor", "add_offset", "missing_value", "_Unsigned", "calendar")  # when xarray reads them
 SAID = ("title", "history", "versions", "resolution", "objective", "active_set")  # texts that a summary repeats
-OF_FIELD = (words.FIELD_VERTICES, words.FIELD_FACES, words.FIELD_MEAN, words.FIELD_SIX_SIGMA, words.FIELD_INTERVAL)
-OF_CONTACT = (words.MOVING_PART, words.REFERENCE_PART)
-OF_SAMPLE = (words.LOCATOR_LABEL, words.TOLERANCE_RANGE)
+OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)
+OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
+OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
-OF_MESH = (words.MESH_VERTICES, words.MESH_FACES)
-IN_MESH = (*OF_MESH, *words.KNOWN_SURFACES, words.NAME_OF_BREP_FACE)
+OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
+IN_MESH = (*OF_MESH, *terms.KNOWN_SURFACES, terms.NAME_OF_BREP_FACE)
 ONCE = {  # by group
-    "": (*words.COORDINATES, *words.ROWS, words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS, *words.LIMITS,
-         words.ROW_VARIABLE_LABEL, words.ROW_CHECKSUM, words.SUMMED_ROWS),
-    "model": (words.DECLARATION,),
-    "contact": (*OF_CONTACT, words.PAIR_OF_POINT, words.MOVING_POINT, words.REFERENCE_POINT, words.REFERENCE_NORMAL,
-                words.LOCATOR_OF_POINT, *words.ROUND, *words.FEATURE_FACES, *words.TOUCHING, words.GROUP_CHECKSUM),
-    "sample": (*OF_SAMPLE, words.DEVIATION, words.DISTRIBUTION, words.STIFFNESS, words.ONE_SIDED, words.LOCATOR_POINT,
-               words.LOCATOR_DIRECTION, words.CONTRIBUTOR_LABEL, words.CONTRIBUTOR_SOURCE, words.CONTRIBUTOR_UNITS,
-               words.MEAN_SHIFT, words.FACE_OF_LOCATOR),
-    "surface": (*words.SURFACE, words.GROUP_CHECKSUM),
-    "field": (*OF_FIELD, words.COMPONENT_LABEL, words.BOUND_LABEL, words.FIELD_REALIZATIONS,
-              words.MAGNITUDE_REALIZATIONS, words.FIELD_SUMS,
-              words.SUMS_CHECKSUM, words.GROUP_CHECKSUM),
+    "": (*terms.COORDINATES, *terms.ROWS, terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS, *terms.LIMITS,
+         terms.ROW_VARIABLE_LABEL, terms.ROW_CHECKSUM, terms.SUMMED_ROWS),
+    "model": (terms.DECLARATION,),
+    "contact": (*OF_CONTACT, terms.PAIR_OF_POINT, terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL,
+                terms.LOCATOR_OF_POINT, *terms.ROUND, *terms.FEATURE_FACES, *terms.TOUCHING, terms.GROUP_CHECKSUM),
+    "sample": (*OF_SAMPLE, terms.DEVIATION, terms.DISTRIBUTION, terms.STIFFNESS, terms.ONE_SIDED, terms.LOCATOR_POINT,
+               terms.LOCATOR_DIRECTION, terms.CONTRIBUTOR_LABEL, terms.CONTRIBUTOR_SOURCE, terms.CONTRIBUTOR_UNITS,
+               terms.MEAN_SHIFT, terms.FACE_OF_LOCATOR),
+    "surface": (*terms.SURFACE, terms.GROUP_CHECKSUM),
+    "field": (*OF_FIELD, terms.COMPONENT_LABEL, terms.BOUND_LABEL, terms.FIELD_REALIZATIONS,
+              terms.MAGNITUDE_REALIZATIONS, terms.FIELD_SUMS,
+              terms.SUMS_CHECKSUM, terms.GROUP_CHECKSUM),
 }  # fmt: skip
 
 
@@ -104,14 +104,14 @@ def _check_format(file: netCDF4.Dataset) -> None:
     number = file.getncattr("format") if "format" in file.ncattrs() else 1
     if not isinstance(number, int | np.integer) or number < 1:
         raise DamagedError(f"is damaged: its format is {number!r}")
-    if number > words.FORMAT:
+    if number > terms.FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {words.FORMAT}; use a newer one"
+            f"has format {number}; this version of tolcontact reads formats up to {terms.FORMAT}; use a newer one"
         )
 
 
 def _groups(group: netCDF4.Dataset, depth: int = 0) -> Iterator[netCDF4.Dataset]:
-    if depth > 4 or len(group.groups) > 2 * len(_top(group).dimensions.get(words.PART, ())) + 64:
+    if depth > 4 or len(group.groups) > 2 * len(_top(group).dimensions.get(terms.PART, ())) + 64:
         raise DamagedError("is not an archive of tolcontact: its groups are nested too deeply, or too many")
     yield group
     for child in group.groups.values():
@@ -160,8 +160,8 @@ def _check_text(name: str, text: str) -> None:
 
 
 def _check_archive(file: netCDF4.Dataset) -> None:
-    optional = (*words.POSES, *words.ADDED)
-    missing = [v.name for v in words.ROWS if v not in optional and v.name not in file.variables]
+    optional = (*terms.POSES, *terms.ADDED)
+    missing = [v.name for v in terms.ROWS if v not in optional and v.name not in file.variables]
     first = getattr(file, "format", 1) == 1
     missing += [group for group in (GROUPS if first else (*GROUPS, *ADDED)) if group not in file.groups]
     missing += [word for word in SAID if not isinstance(getattr(file, word, None), str)]
@@ -177,7 +177,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
                 _check_variable(group, variable)
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
-        _need_together(group, words.KNOWN_SURFACES)
+        _need_together(group, terms.KNOWN_SURFACES)
         for variable in IN_MESH:
             _check_variable(group, variable)
     for name in LABELS:
@@ -185,8 +185,8 @@ def _check_archive(file: netCDF4.Dataset) -> None:
             labels = _texts(file[name])
             if len(set(labels)) < len(labels) or "" in labels:
                 raise DamagedError(f"is damaged: its {name} names are empty, or not unique")
-    rows = getattr(file, "block_rows", words.BLOCK_ROWS)
-    if not (isinstance(rows, int | np.integer) and 0 < rows <= words.BLOCK_ROWS):
+    rows = getattr(file, "block_rows", terms.BLOCK_ROWS)
+    if not (isinstance(rows, int | np.integer) and 0 < rows <= terms.BLOCK_ROWS):
         raise DamagedError(f"is damaged: its blocks have {rows!r} realizations")
     _check_needed(file)
 
@@ -199,10 +199,10 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
     dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
     expected = variable.dims
     if getattr(_top(group), "format", 1) <= BEFORE_CONTRIBUTORS:
-        expected = tuple(words.LOCATOR if d == words.CONTRIBUTOR else d for d in expected)
+        expected = tuple(terms.LOCATOR if d == terms.CONTRIBUTOR else d for d in expected)
     if dims != expected or text != (variable.kind is str):
         raise DamagedError(f"is damaged: {where} does not have the dimensions and the type that it has in an archive")
-    if text or variable is words.NUMBERS:
+    if text or variable is terms.NUMBERS:
         return
     wrong = [d for d, size in zip(dims, stored.shape, strict=True) if SIZES.get(d, size) != size]
     if wrong:
@@ -211,22 +211,22 @@ def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
 
 def _check_needed(file: netCDF4.Dataset) -> None:
     """What summaries and models are read from."""
-    _need_together(file["contact"], words.ROUND)
-    if any(variable.name in file["contact"].variables for variable in words.FEATURE_FACES):
-        _need(file["contact"], words.FEATURE_FACES)
-    for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (words.DECLARATION,))):
+    _need_together(file["contact"], terms.ROUND)
+    if any(variable.name in file["contact"].variables for variable in terms.FEATURE_FACES):
+        _need(file["contact"], terms.FEATURE_FACES)
+    for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (terms.DECLARATION,))):
         _need(file[group], needed)
-    _need(file, (words.MEASURE_NOMINAL, words.MEASURE_TOLERANCE, words.MEASURE_UNITS))
+    _need(file, (terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS))
     if getattr(file, "format", 1) > 1:
-        _need(file, (words.ROW_CHECKSUM, words.ROW_VARIABLE_LABEL, words.SUMMED_ROWS))
-        summed = np.ma.getdata(file[words.SUMMED_ROWS.name][...])
-        most = len(file.dimensions[words.BLOCK]) * int(file.block_rows)
-        if (summed < words.UNFINISHED).any() or (summed > most).any():
+        _need(file, (terms.ROW_CHECKSUM, terms.ROW_VARIABLE_LABEL, terms.SUMMED_ROWS))
+        summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][...])
+        most = len(file.dimensions[terms.BLOCK]) * int(file.block_rows)
+        if (summed < terms.UNFINISHED).any() or (summed > most).any():
             raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
-    if tuple(_texts(file[words.STATE])) != words.STATES:
+    if tuple(_texts(file[terms.STATE])) != terms.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
-    for part in _texts(file[words.PART]):
-        name = words.group_of(part)
+    for part in _texts(file[terms.PART]):
+        name = terms.group_of(part)
         if name not in file["field"].groups:
             raise DamagedError(f'is damaged: it has no field for part "{part}"')
         _need(file["field"][name], OF_FIELD)
@@ -243,7 +243,7 @@ def _need_together(group: netCDF4.Dataset, variables: tuple[Variable, ...]) -> N
     if any(variable.name in group.variables for variable in variables):
         _need(group, variables)
         kinds = np.ma.getdata(group[variables[1].name][...])
-        if ((kinds < -1) | (kinds >= len(words.SURFACE_KINDS))).any():
+        if ((kinds < -1) | (kinds >= len(terms.SURFACE_KINDS))).any():
             raise DamagedError(f"is damaged: group {group.path} has surfaces of unknown kinds")
 
 
@@ -266,16 +266,16 @@ def _check_sums(group: netCDF4.Dataset) -> None:
     kind = group.path.split("/")[1]
     known = {v.name: v for v in (IN_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
     for name, stored in group.variables.items():
-        if words.CHECKSUM in stored.ncattrs() and name in known:
-            values = _declaration(stored) if known[name] is words.DECLARATION else _values(stored, known[name])
-            if crc32(known[name], values) != int(stored.getncattr(words.CHECKSUM)):
+        if terms.CHECKSUM in stored.ncattrs() and name in known:
+            values = _declaration(stored) if known[name] is terms.DECLARATION else _values(stored, known[name])
+            if crc32(known[name], values) != int(stored.getncattr(terms.CHECKSUM)):
                 raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{name} is not what was written")
-    if words.GROUP_CHECKSUM.name in group.variables:
-        said, found = int(group[words.GROUP_CHECKSUM.name][...]), 0
-        for variable in {"surface": words.SURFACE, "contact": words.TOUCHING}.get(kind, words.FIELDS):
+    if terms.GROUP_CHECKSUM.name in group.variables:
+        said, found = int(group[terms.GROUP_CHECKSUM.name][...]), 0
+        for variable in {"surface": terms.SURFACE, "contact": terms.TOUCHING}.get(kind, terms.FIELDS):
             if variable.name in group.variables:  # magnitude_realizations is not in archives of format 2
                 found = crc32(variable, _values(group[variable.name], variable), found)
-        if said not in (words.UNFINISHED, found):
+        if said not in (terms.UNFINISHED, found):
             raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
 
 
@@ -294,7 +294,7 @@ def _declaration(stored: netCDF4.Variable) -> str:
 
 def _check_declaration(file: netCDF4.Dataset) -> None:
     try:
-        declared = json.loads(_declaration(file["model"][words.DECLARATION.name]))
+        declared = json.loads(_declaration(file["model"][terms.DECLARATION.name]))
     except (ValueError, RecursionError) as error:
         raise DamagedError(f"is damaged: its declared model is not JSON ({error})") from error
     if not isinstance(declared, dict):

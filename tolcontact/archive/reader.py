@@ -8,12 +8,12 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.rebuilding import from_document
-from tolcontact.discretization import forms_of, with_known_surfaces
 from tolcontact.errors import ArchiveError
+from tolcontact.geometry import forms_of, with_known_surfaces
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -33,18 +33,18 @@ def opened(path: Path) -> xr.DataTree:
     """An archive that is known to be whole."""
     try:
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
-        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=words.REALIZATION)
+        tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
     except Exception as error:  # whatever a library finds that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
-    numbers = pd.RangeIndex(tree.sizes[words.REALIZATION])
-    tree.coords[words.REALIZATION] = (words.REALIZATION, numbers, words.NUMBERS.all_attributes)
+    numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
+    tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree
 
 
 def model_of(results: xr.DataTree) -> Assembly:
     """The declared assembly, rebuilt from an archive."""
     try:
-        document = json.loads(str(results["model"][words.DECLARATION.name].values))
+        document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
     meshes = {}
@@ -63,16 +63,16 @@ class _Triangles:
 
 def _mesh(of: xr.Dataset) -> Any:
     """The mesh of a part, with the surfaces of its B-rep faces if it has any."""
-    vertices, faces = of[words.MESH_VERTICES.name].values, of[words.MESH_FACES.name].values
-    if any(variable.name not in of for variable in words.KNOWN_SURFACES):
+    vertices, faces = of[terms.MESH_VERTICES.name].values, of[terms.MESH_FACES.name].values
+    if any(variable.name not in of for variable in terms.KNOWN_SURFACES):
         return _Triangles(vertices, faces)
-    brep = of[words.BREP_OF_FACE.name].values
-    arrays = {name: of[variable.name].values for name, variable in words.OF_BREP_FACE.items()}
+    brep = of[terms.BREP_OF_FACE.name].values
+    arrays = {name: of[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds = arrays["kind"]
     sound = all(np.isfinite(values).all() for values in arrays.values())
-    sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(words.SURFACE_KINDS)).all())
+    sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(terms.SURFACE_KINDS)).all())
     if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
-    named = words.NAME_OF_BREP_FACE.name
+    named = terms.NAME_OF_BREP_FACE.name
     names = tuple(map(str, of[named].values)) if named in of else ()
     return with_known_surfaces(vertices, faces, brep, forms_of(arrays), names)

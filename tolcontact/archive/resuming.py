@@ -8,7 +8,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.archive.header import contact_values, declaration
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
@@ -18,9 +18,9 @@ SAME = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
     """Raise ArchiveError if the archive `there`, in the file `path`, is of another model or another run."""
-    if getattr(there, "format", 1) != words.FORMAT:
+    if getattr(there, "format", 1) != terms.FORMAT:
         raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
-    if not there.dimensions[words.REALIZATION].isunlimited():
+    if not there.dimensions[terms.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
     check_same_model(there, path, program)
     for word, value in settings.items():
@@ -29,17 +29,17 @@ def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, setting
             raise ArchiveError(
                 f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
             )
-    room = len(there["surface"].dimensions[words.CHECKED])
+    room = len(there["surface"].dimensions[terms.CHECKED])
     if room != surfaces:
         raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
 
 
 def check_same_model(there: netCDF4.Dataset, path: Path, program: Program) -> None:
     """Raise ArchiveError if the archive `there`, in the file `path`, is of another model."""
-    if _comparable(str(there["model"][words.DECLARATION.name][...])) != _comparable(declaration(program)):
+    if _comparable(str(there["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
         raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
     for part in program.nominal.parts:
-        if not _same(there[f"field/{words.group_of(part.name)}"][words.FIELD_VERTICES.name], part.vertices):
+        if not _same(there[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program.nominal).items():
         stored = there["contact"].variables.get(variable.name)

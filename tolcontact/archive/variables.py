@@ -6,7 +6,7 @@ from typing import Any
 import netCDF4
 import numpy as np
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.vocabulary import Variable
 
@@ -18,11 +18,11 @@ BLOCK_CHUNK = 256
 def define(group: netCDF4.Dataset, variable: Variable) -> None:
     """A variable of numbers, without values yet."""
     options: dict[str, Any] = {}
-    if {words.REALIZATION, words.BLOCK} & set(variable.dims):
+    if {terms.REALIZATION, terms.BLOCK} & set(variable.dims):
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
-        fixed = [1 if d in (words.REALIZATION, words.BLOCK) else max(len(_dimension(group, d)), 1) for d in variable.dims]
+        fixed = [1 if d in (terms.REALIZATION, terms.BLOCK) else max(len(_dimension(group, d)), 1) for d in variable.dims]
         rows = rows_together(np.dtype(variable.kind).itemsize * math.prod(fixed))
-        grows = {words.REALIZATION: rows, words.BLOCK: BLOCK_CHUNK}
+        grows = {terms.REALIZATION: rows, terms.BLOCK: BLOCK_CHUNK}
         options["chunksizes"] = [grows.get(d, size) for d, size in zip(variable.dims, fixed, strict=True)]
     created = group.createVariable(variable.name, variable.kind, variable.dims, **options)
     attributes = variable.all_attributes
@@ -33,7 +33,7 @@ def define(group: netCDF4.Dataset, variable: Variable) -> None:
 
 def rows_together(width: int) -> int:
     """How many rows of so many bytes lie together in the file: those of a block, unless they are too many bytes."""
-    rows = words.BLOCK_ROWS
+    rows = terms.BLOCK_ROWS
     while rows > LEAST_ROWS and rows * width > CHUNK:
         rows //= 2
     return rows
@@ -52,7 +52,7 @@ def write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
         _write_text(group, variable, values)
     else:
         lay_out(group, variable, values)
-    group[variable.name].setncattr(words.CHECKSUM, np.int64(crc32(variable, values)))
+    group[variable.name].setncattr(terms.CHECKSUM, np.int64(crc32(variable, values)))
 
 
 def lay_out(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:

@@ -18,17 +18,17 @@ import netCDF4
 import numpy as np
 from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
-from tolcontact import vocabulary as words
-from tolcontact.archive.checked import archived_poses, choose, nothing_checked
+from tolcontact import vocabulary as terms
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
+from tolcontact.archive.disk_space import check_room, lay_out_rows
 from tolcontact.archive.header import Run, kept_rows, no_field, nothing_touching, now, run_settings, versions, write_header
 from tolcontact.archive.inspection import inspect
-from tolcontact.archive.laid_out import LaidOut
+from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
-from tolcontact.archive.room import check_room, lay_out_rows
-from tolcontact.archive.rows import check_rows
-from tolcontact.archive.stored import StoredBlock
+from tolcontact.archive.row_checksums import check_rows
+from tolcontact.archive.stored_block import StoredBlock
+from tolcontact.archive.surface_rows import archived_poses, choose, nothing_checked
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
@@ -53,7 +53,7 @@ class ArchiveWriter:
         check_room(path, program.nominal, kept_rows(run.keep), run.samples)
         with replacing(path) as part, opened_locked(part, "w") as file:
             write_header(file, program, run, sums)
-            lay_out_rows(file, 0, min(run.samples, words.FIRST_ROWS))
+            lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
         self._go_on(path, program.nominal)
 
     @classmethod
@@ -72,17 +72,17 @@ class ArchiveWriter:
             with opened_locked(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
                 rows = last_checkpoint(file, path, [own.name for own in program.nominal.parts]).rows
-                samples, length = max(run.samples, int(file.samples)), len(file.dimensions[words.REALIZATION])
+                samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
                 check_room(path, program.nominal, kept_rows(run.keep), samples - length)
                 lay_out_rows(file, length, samples)
                 file.setncattr("samples", np.int64(samples))
                 others = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
             # What follows stands for the rows of before.
-            nothing = {words.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
+            nothing = {terms.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
             nothing["surface"] = nothing_checked(run.surfaces, len(program.nominal.pairs))
             with contextlib.closing(LaidOut(part)) as values:
-                if values.has("contact", words.TOUCHING_SHARE):  # not in archives that were begun before
+                if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
                     nothing["contact"] = nothing_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(nothing)
         writer._go_on(path, program.nominal)
@@ -93,9 +93,9 @@ class ArchiveWriter:
         with _refusals_told(path):
             self._values = LaidOut(path)
             with opened_locked(path, "r") as file:
-                self._length, self._block_rows = len(file.dimensions[words.REALIZATION]), int(file.block_rows)
-                self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[words.CHECKED])
-        self.kept = [variable for variable in words.BY_REALIZATION if self._values.has(_group_of(variable), variable)]
+                self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
+                self.samples, self._checked = int(file.samples), len(file["surface"].dimensions[terms.CHECKED])
+        self.kept = [variable for variable in terms.BY_REALIZATION if self._values.has(_group_of(variable), variable)]
         self.rows = self._place = 0
         self.take_up()
 
@@ -119,10 +119,10 @@ class ArchiveWriter:
             if block.stop > self._length:
                 self._make_room_for_all()
             for variable in self.kept:
-                if variable is not words.STATUS:
+                if variable is not terms.STATUS:
                     self._values.overwrite(_group_of(variable), variable, block.values[variable.name], block.start)
-            self._values.overwrite("", words.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
-            self._values.overwrite("", words.STATUS, block.values[words.STATUS.name], block.start)
+            self._values.overwrite("", terms.ROW_CHECKSUM, [block.checksums], block.start // self._block_rows)
+            self._values.overwrite("", terms.STATUS, block.values[terms.STATUS.name], block.start)
         self.rows = block.stop
 
     def _make_room_for_all(self) -> None:
@@ -155,11 +155,11 @@ class ArchiveWriter:
             self._place = place  # not before: one that is interrupted is written again, the other one stays
         self._since = time.monotonic()
 
-    def write_fields(self, fields: Sequence[dict[words.Variable, Any]]) -> None:
+    def write_fields(self, fields: Sequence[dict[terms.Variable, Any]]) -> None:
         """Displacement fields: for each part the values of `FIELDS`."""
         with _refusals_told(self._path):
             self._values.overwrite_together(
-                {words.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)}
+                {terms.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)}
             )
 
     def chosen(self, seed: int) -> np.ndarray:
@@ -175,7 +175,7 @@ class ArchiveWriter:
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
         """What the check of some rows found, (row, pair) [mm]."""
         values = nothing_checked(self._checked, self._pairs)
-        found = {words.CHECKED_REALIZATION: rows, words.SURFACE_PENETRATION: penetration, words.BESIDE: beside}
+        found = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: beside}
         for variable, of_rows in found.items():
             values[variable][: len(rows)] = of_rows
         with _refusals_told(self._path):
@@ -183,9 +183,9 @@ class ArchiveWriter:
 
     def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
         """How often each contact point touches, (point,), with its interval, (point, bound)."""
-        if self._values.has("contact", words.TOUCHING_SHARE):
+        if self._values.has("contact", terms.TOUCHING_SHARE):
             with _refusals_told(self._path):
-                values = dict(zip(words.TOUCHING, (share, interval, realizations), strict=True))
+                values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
                 self._values.overwrite_together({"contact": values})
 
 
@@ -211,9 +211,9 @@ def _refusals_told(path: Path) -> Iterator[None]:
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
-def _group_of(variable: words.Variable) -> str:
+def _group_of(variable: terms.Variable) -> str:
     """The path of the group that holds a variable of realizations."""
-    return "sample" if variable is words.DEVIATION else ""
+    return "sample" if variable is terms.DEVIATION else ""
 
 
 @contextlib.contextmanager

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from tolcontact.analyses.allocate import VERIFICATIONS
+from tolcontact.analyses.allocate import allocate as allocate_model
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -30,8 +32,6 @@ from tolcontact.errors import OptionError
 from tolcontact.report import allocation_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.allocate import VERIFICATIONS
-from tolcontact.workflow.allocate import allocate as allocate_model
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
 

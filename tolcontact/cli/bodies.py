@@ -6,8 +6,8 @@ from dataclasses import asdict
 import typer
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples
-from tolcontact.discretization import bodies_in
 from tolcontact.errors import shown
+from tolcontact.geometry import bodies_in
 
 
 @app.command(epilog=examples("bodies parts.stp"))

@@ -14,7 +14,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, shown
 from tolcontact.report import population_text, write_view
-from tolcontact.workflow.population import check_population
+from tolcontact.workflow.population_check import check_population
 from tolcontact.workflow.run import DEFAULT_SOLVER, build
 
 

@@ -16,9 +16,9 @@ from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text, runs_text, write_comparison
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.compare import compare as compare_solvers
-from tolcontact.workflow.compare_runs import compare_runs, named
 from tolcontact.workflow.run import DEFAULT_SOLVER
+from tolcontact.workflow.run_comparison import compare_runs, named
+from tolcontact.workflow.solver_comparison import compare as compare_solvers
 
 _ONE_OR_MORE = "One or more of {}. Default: the model's."
 _OF_MODELS = ("solvers", "samples", "seed", "resolution", "objective", "workers", "scheduler")

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tolcontact.analyses.contributions import contributions as contributions_of
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -29,7 +30,6 @@ from tolcontact.declaration.script import load_model
 from tolcontact.report import contributions_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.contributions import contributions as contributions_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
 

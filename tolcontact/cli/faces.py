@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples
-from tolcontact.discretization import faces_in
+from tolcontact.geometry import faces_in
 
 Body = Annotated[str | None, typer.Option(help="Name or number of the body; a file with a single one needs none.")]
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tolcontact.analyses.relocate import relocate as relocate_locator
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -28,7 +29,6 @@ from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.report import relocation_text
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.relocate import relocate as relocate_locator
 from tolcontact.workflow.run import DEFAULT_SOLVER
 
 CORNER = "X,Y,Z"

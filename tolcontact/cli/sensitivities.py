@@ -4,6 +4,7 @@ import functools
 
 import typer
 
+from tolcontact.analyses.sensitivities import sensitivities as sensitivities_of
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -28,7 +29,6 @@ from tolcontact.declaration.script import load_model
 from tolcontact.report import sensitivities_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
-from tolcontact.workflow.sensitivities import sensitivities as sensitivities_of
 
 
 @app.command(epilog=examples("sensitivities model.py", "sensitivities model.py --samples 200 --csv > slopes.csv"))

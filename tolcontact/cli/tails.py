@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tolcontact.analyses.tails import tails as tails_of
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -28,7 +29,6 @@ from tolcontact.declaration.script import load_model
 from tolcontact.report import tails_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
-from tolcontact.workflow.tails import tails as tails_of
 
 
 @app.command(epilog=examples("tails model.py", "tails model.py --samples 400000 --json > rare.json"))

@@ -12,8 +12,9 @@ from tolcontact.cli.output import check_page
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
-from tolcontact.discretization import discretize, parts_from
+from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, shown
+from tolcontact.geometry import parts_from
 from tolcontact.report import write_page, write_view
 from tolcontact.workflow.run import summarize
 

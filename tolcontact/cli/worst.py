@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tolcontact.analyses.worst_case import worst_case
 from tolcontact.cli.app import (
     AsCsv,
     AsJson,
@@ -28,7 +29,6 @@ from tolcontact.declaration.script import load_model
 from tolcontact.report import worst_case_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.run import DEFAULT_SOLVER
-from tolcontact.workflow.worst_case import worst_case
 
 
 @app.command(epilog=examples("worst model.py", "worst model.py --samples 20000 --json > worst.json"))

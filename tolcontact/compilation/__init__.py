@@ -51,9 +51,9 @@ the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so tha
 has it from the beginning: with thirty coupled bodies that saves some twenty seconds.
 """
 
+from tolcontact.compilation.contact_rows import SLOTS
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import ACCURACY, usable_plugins
 from tolcontact.compilation.program import ContactGroup, Program, compile_program
-from tolcontact.compilation.rows import SLOTS
 
 __all__ = ["ACCURACY", "SLOTS", "ContactGroup", "NamedFunction", "Program", "compile_program", "usable_plugins"]

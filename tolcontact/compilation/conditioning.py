@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.rows import Rows
+from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.setting import Setting
 

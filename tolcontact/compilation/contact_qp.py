@@ -18,10 +18,10 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.curvature import with_curvature
+from tolcontact.compilation.contact_rows import SLOTS, contact_rows, standing_points
+from tolcontact.compilation.newton import with_curvature
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.plugins import Plugin, solver
-from tolcontact.compilation.rows import SLOTS, contact_rows, standing_points
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, Motion, increments, linear, published, quadratic, rigid
 from tolcontact.mechanics.displacement import MOMENTS

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import casadi as ca
 
 from tolcontact.compilation.conditioning import SLACK, whitening
-from tolcontact.compilation.rows import Rows
+from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.objective import Energy
 from tolcontact.mechanics.pose import Pose

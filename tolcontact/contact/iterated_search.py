@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from tolcontact.contact.acceptance import Doubt
 from tolcontact.contact.candidates import Candidates
-from tolcontact.contact.doubt import Doubt
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import least_gaps, undone
 from tolcontact.contact.slots import Slots

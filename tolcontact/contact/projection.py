@@ -8,7 +8,7 @@ from scipy.spatial import KDTree
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.scan import PairScan
-from tolcontact.discretization.surface import Surface
+from tolcontact.geometry.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)

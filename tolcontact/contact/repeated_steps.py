@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.contact.doubt import Doubt
+from tolcontact.contact.acceptance import Doubt
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.scan import least_gaps
 from tolcontact.contact.state import State, Task, Unsettled

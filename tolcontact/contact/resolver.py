@@ -14,8 +14,8 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.compilation import ACCURACY, ContactGroup, Program
+from tolcontact.contact.acceptance import Doubt
 from tolcontact.contact.candidates import Candidates
-from tolcontact.contact.doubt import Doubt
 from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.repeated_steps import repeat

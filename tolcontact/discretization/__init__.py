@@ -115,40 +115,10 @@ Shape files are read by a separate process with a limit on time (30 s, and 20 s 
 file therefore ends as one message that names the file and what to do.
 """
 
-from tolcontact.discretization.analytic import form_arrays, forms_of
-from tolcontact.discretization.brep_face import FaceInFile
-from tolcontact.discretization.cad import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.discretization.discretizing import discretize
-from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.features import Layer, NominalFeature
-from tolcontact.discretization.known_forms import known_surfaces, with_known_surfaces
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
-from tolcontact.discretization.seen import SeenPart, seen
 
-__all__ = [
-    "BodyInFile",
-    "ContactPoints",
-    "FaceDeviation",
-    "FaceInFile",
-    "Layer",
-    "Locators",
-    "Nominal",
-    "NominalFeature",
-    "NominalPart",
-    "Offsets",
-    "RoundPoint",
-    "RoundPoints",
-    "SeenPart",
-    "bodies_in",
-    "discretize",
-    "faces_in",
-    "form_arrays",
-    "forms_of",
-    "known_surfaces",
-    "parts_from",
-    "seen",
-    "with_known_surfaces",
-]
+__all__ = ["ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "discretize"]

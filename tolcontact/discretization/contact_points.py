@@ -10,19 +10,19 @@ from dataclasses import replace
 import numpy as np
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
-from tolcontact.discretization.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
-from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.faces import Meshes, patch
-from tolcontact.discretization.fault import GeometryFault, where
-from tolcontact.discretization.features import Features
 from tolcontact.discretization.nominal import ContactPoints, NominalPart
 from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.overlap import overlap_corners, rim_points
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.discretization.spreading import own_vertices, spread
-from tolcontact.discretization.surface import Surface
 from tolcontact.errors import ContactWarning, shown
+from tolcontact.features.face_deviation import FaceDeviation
+from tolcontact.features.nominal_features import Features
+from tolcontact.geometry.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
+from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.fault import GeometryFault, where
+from tolcontact.geometry.overlap import overlap_corners, rim_points
+from tolcontact.geometry.spreading import own_vertices, spread
+from tolcontact.geometry.surface import Surface
 
 DEFAULT_REACH = 0.1
 DEFAULT_POINTS = 200

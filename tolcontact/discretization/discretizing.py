@@ -11,17 +11,17 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
-from tolcontact.discretization.doubtful_sizes import warn_of_units
-from tolcontact.discretization.faces import Meshes
-from tolcontact.discretization.fault import GeometryFault, where
-from tolcontact.discretization.features import Features, in_order
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
 from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.shape_files.reading import read_files
-from tolcontact.discretization.shapes import field_surface, shape
 from tolcontact.discretization.three_two_one import lay_out
+from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import ModelError
+from tolcontact.features.nominal_features import Features, in_order
+from tolcontact.geometry.faces import Meshes
+from tolcontact.geometry.fault import GeometryFault, where
+from tolcontact.geometry.files.reading import read_files
+from tolcontact.geometry.shapes import field_surface, shape
 
 log = logging.getLogger(__name__)
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import Tolerance
-from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.fault import GeometryFault
+from tolcontact.features.face_deviation import FaceDeviation
+from tolcontact.geometry.fault import GeometryFault
 
 CONDITION_LIMIT = 1e8
 

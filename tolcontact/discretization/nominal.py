@@ -7,15 +7,15 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
-from tolcontact.discretization.curvature import chord_height
-from tolcontact.discretization.face_deviation import FaceDeviation
-from tolcontact.discretization.face_pair import FacePair, side
-from tolcontact.discretization.faces import triangles
-from tolcontact.discretization.features import Features, NominalFeature
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.discretization.surface import Surface
+from tolcontact.features.face_deviation import FaceDeviation
+from tolcontact.features.nominal_features import Features, NominalFeature
+from tolcontact.geometry.curvature import chord_height
+from tolcontact.geometry.face_pair import FacePair, side
+from tolcontact.geometry.faces import triangles
+from tolcontact.geometry.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)

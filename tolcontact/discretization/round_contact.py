@@ -6,12 +6,12 @@ import math
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.analytic import Form
-from tolcontact.discretization.curvature import chord_height
-from tolcontact.discretization.edges import CREASE, rim
 from tolcontact.discretization.round_points import RoundPoint
 from tolcontact.discretization.round_walls import NotRoundError, arc, directions, tangent, touched
-from tolcontact.discretization.surface import Piece, Surface
+from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.curvature import chord_height
+from tolcontact.geometry.edges import CREASE, rim
+from tolcontact.geometry.surface import Piece, Surface
 
 MOST = 40  # points of a pair
 PARALLEL = 1e-3  # rad: how far the axis of a shaft may stand off its wall's

@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tolcontact.discretization.analytic import Form, form_arrays, forms_of
-from tolcontact.discretization.surface import Piece
+from tolcontact.geometry.analytic_surfaces import Form, form_arrays, forms_of
+from tolcontact.geometry.surface import Piece
 
 NONE = np.zeros(3)
 

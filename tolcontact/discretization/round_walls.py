@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tolcontact.discretization.analytic import Form
-from tolcontact.discretization.surface import Piece
+from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.surface import Piece
 
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
 FACET = math.radians(31.0)  # no facet of a round face turns by more: a wider gap is one

@@ -5,7 +5,8 @@ A small rigid deviation enters as the pose of the face. So it costs no rows: con
 
 import casadi as ca
 
-from tolcontact.discretization import ContactPoints, FaceDeviation
+from tolcontact.discretization import ContactPoints
+from tolcontact.features import FaceDeviation
 from tolcontact.mechanics.pose import Pose, relative, rotation
 
 

@@ -6,18 +6,18 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.report.marks import Mark, Marks, marks_of, marks_of_nominal
+from tolcontact.report.annotations import Mark, Marks, marks_of, marks_of_nominal
 
 try:
     import pyvista as pv
 except ModuleNotFoundError as error:
     raise OptionError("bodies need pyvista, which is not installed; install it: pip install '.[plot]'") from error
 
-STATISTICS = {"mean": words.FIELD_MEAN, "6 sigma": words.FIELD_SIX_SIGMA}
+STATISTICS = {"mean": terms.FIELD_MEAN, "6 sigma": terms.FIELD_SIX_SIGMA}
 GREYS = ("#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0")
 INK, LOCATOR, FORCE, CONTACT, MEASURE = "#30363d", "#1f5fa8", "#7a3fb0", "#0a7d4f", "#d01c1c"
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
@@ -76,9 +76,9 @@ def field(
     of both can be compared. Raises OptionError for a word that is not known, or an archive without fields.
     """
     _expect("statistic", statistic, tuple(STATISTICS))
-    _expect("component", component, words.COMPONENTS)
-    _expect("state", state, words.STATES)
-    of = {words.COMPONENT: component}
+    _expect("component", component, terms.COMPONENTS)
+    _expect("state", state, terms.STATES)
+    of = {terms.COMPONENT: component}
     values = [group[STATISTICS[statistic].name].sel(of) for group in _groups(results)]
     every = np.concatenate([each.values.ravel() for each in values])
     if not np.isfinite(every).any():
@@ -91,7 +91,7 @@ def field(
     title = f"{statistic} of displacement, {component} [mm]\n"
     for body, value in zip(_bodies(results), values, strict=True):
         mesh = _mesh(body)
-        mesh["field"] = value.sel({words.STATE: state}).values
+        mesh["field"] = value.sel({terms.STATE: state}).values
         plotter.add_mesh(
             mesh, scalars="field", clim=(float(low), float(high)), cmap=DIVERGING if is_signed else SEQUENTIAL, lighting=False,
             scalar_bar_args={"title": title, "color": "black", "n_labels": 5, "fmt": "%.3g"},
@@ -119,13 +119,13 @@ def _expect(word: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _groups(results: xr.DataTree) -> list[xr.Dataset]:
-    names = results.to_dataset()[words.PART].values
-    return [results["field"].children[words.group_of(str(name))].to_dataset() for name in names]
+    names = results.to_dataset()[terms.PART].values
+    return [results["field"].children[terms.group_of(str(name))].to_dataset() for name in names]
 
 
 def _bodies(results: xr.DataTree) -> Iterator[_Body]:
-    for name, group in zip(results.to_dataset()[words.PART].values, _groups(results), strict=True):
-        yield _Body(str(name), group[words.FIELD_VERTICES.name].values, group[words.FIELD_FACES.name].values)
+    for name, group in zip(results.to_dataset()[terms.PART].values, _groups(results), strict=True):
+        yield _Body(str(name), group[terms.FIELD_VERTICES.name].values, group[terms.FIELD_FACES.name].values)
 
 
 def _declared(model: Assembly) -> tuple[list[_Body], Marks]:
@@ -138,16 +138,16 @@ def _mesh(body: _Body) -> Any:
 
 
 def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: str, vertices: np.ndarray) -> np.ndarray:
-    _expect("state", state, words.STATES)
+    _expect("state", state, terms.STATES)
     if isinstance(results, Assembly):
         raise OptionError("realizations are those of results; a declared model has none")
     rows = results.to_dataset()
-    if not 0 <= realization < rows.sizes[words.REALIZATION]:
-        raise OptionError(f"realization is {realization}; expected 0 to {rows.sizes[words.REALIZATION] - 1}")
-    if words.ROTATION.name not in rows:
+    if not 0 <= realization < rows.sizes[terms.REALIZATION]:
+        raise OptionError(f"realization is {realization}; expected 0 to {rows.sizes[terms.REALIZATION] - 1}")
+    if terms.ROTATION.name not in rows:
         raise OptionError("the archive has no poses; run again with --keep poses")
-    at = {words.REALIZATION: realization, words.STATE: words.STATES.index(state), words.PART: part}
-    R, t = (rows[of.name].isel(at).values for of in (words.ROTATION, words.TRANSLATION))
+    at = {terms.REALIZATION: realization, terms.STATE: terms.STATES.index(state), terms.PART: part}
+    R, t = (rows[of.name].isel(at).values for of in (terms.ROTATION, terms.TRANSLATION))
     return np.asarray(vertices @ R.T + t)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.statistics import limits
@@ -27,7 +27,7 @@ def histogram(
     results: xr.DataTree,
     measure: str | None = None,
     *,
-    states: Sequence[str] = words.STATES,
+    states: Sequence[str] = terms.STATES,
     bins: int = BINS,
     axes: Axes | None = None,
 ) -> Axes:
@@ -36,14 +36,14 @@ def histogram(
     Heights are shares of all realizations in a bin, in %; both states have the same bins. Raises OptionError for a measure or a
     state that is not there, or a measure without numbers.
     """
-    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     place = _place(rows, measure)
-    of = rows.isel({words.MEASURE: place})
-    if not states or not set(states) <= set(words.STATES):
-        raise OptionError(f"states are {list(states)}; expected some of: {', '.join(words.STATES)}")
-    values = {state: of[words.MEASURED.name].sel({words.STATE: state}).values for state in states}
+    of = rows.isel({terms.MEASURE: place})
+    if not states or not set(states) <= set(terms.STATES):
+        raise OptionError(f"states are {list(states)}; expected some of: {', '.join(terms.STATES)}")
+    values = {state: of[terms.MEASURED.name].sel({terms.STATE: state}).values for state in states}
     every = np.concatenate(list(values.values()))
-    name, units = str(of[words.MEASURE].values), str(of[words.MEASURE_UNITS.name].values)
+    name, units = str(of[terms.MEASURE].values), str(of[terms.MEASURE_UNITS.name].values)
     if not np.isfinite(every).all():
         raise OptionError(f'measure "{name}" has values that are no numbers; nothing can be drawn of it')
     if axes is None:
@@ -67,7 +67,7 @@ def histogram(
 
 def _place(rows: xr.Dataset, name: str | None) -> int:
     """Which of the measures is meant."""
-    names = [str(each) for each in rows[words.MEASURE].values]
+    names = [str(each) for each in rows[terms.MEASURE].values]
     if name is None and len(names) == 1:
         return 0
     if name not in names:

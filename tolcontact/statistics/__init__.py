@@ -74,10 +74,10 @@ each point.
 ('vertex',)
 """
 
-from tolcontact.statistics.comparison import compare_runs
-from tolcontact.statistics.contacts import touching
+from tolcontact.statistics.archived_analysis import kept_analysis
+from tolcontact.statistics.contact import touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
-from tolcontact.statistics.kept import kept_analysis
+from tolcontact.statistics.run_comparison import compare_runs
 from tolcontact.statistics.summary import Summary, estimate_of, limits, summarize
 
 __all__ = [

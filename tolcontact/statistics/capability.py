@@ -17,8 +17,8 @@ from scipy import special
 from scipy.stats import qmc
 
 from tolcontact.statistics.intervals import CONFIDENCE, NOTHING, Estimate, is_constant, percentiles, share
+from tolcontact.statistics.moments import by_influence, standardized
 from tolcontact.statistics.sample import Sample
-from tolcontact.statistics.shape import by_influence, standardized
 
 TAIL, MEDIAN, HEAD = 0.135, 50.0, 99.865  # %
 TRIALS = 1 << 11  # places of the three percentiles that an interval covers 95 % of

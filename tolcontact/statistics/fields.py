@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.statistics import intervals, kernel
@@ -166,11 +166,11 @@ class _Surface:
     def field(self, states: Sequence[FieldSums]) -> dict[Variable, Any]:
         """The field, from the sums of each state."""
         found = [self._of_state(sums) for sums in states]
-        kinds = (words.FIELD_MEAN, words.FIELD_SIX_SIGMA, words.FIELD_INTERVAL)
+        kinds = (terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)
         return {
             **{variable: np.array([each[k] for each in found]) for k, variable in enumerate(kinds)},
-            words.FIELD_REALIZATIONS: int(states[0].count[0]),
-            words.MAGNITUDE_REALIZATIONS: int(states[0].of_magnitude[0]),
+            terms.FIELD_REALIZATIONS: int(states[0].count[0]),
+            terms.MAGNITUDE_REALIZATIONS: int(states[0].of_magnitude[0]),
         }
 
     def _of_state(self, sums: FieldSums) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

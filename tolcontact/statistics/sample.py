@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
 
 AT_ONCE = 1 << 18  # values that are sorted in memory
@@ -105,10 +105,10 @@ class Sample:
 
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
     """The values of a measure, by number, in a state; read from the rows of an archive as often as needed."""
-    of = rows[[words.MEASURED.name]].sel({words.STATE: state}).isel({words.MEASURE: measure})
-    is_planned = rows.attrs.get("sampler", words.MONTE_CARLO) != words.MONTE_CARLO
+    of = rows[[terms.MEASURED.name]].sel({terms.STATE: state}).isel({terms.MEASURE: measure})
+    is_planned = rows.attrs.get("sampler", terms.MONTE_CARLO) != terms.MONTE_CARLO
     return Sample(
-        lambda: (np.asarray(piece[words.MEASURED.name].values) for piece in pieces(of)), words.REPLICATE if is_planned else 1
+        lambda: (np.asarray(piece[terms.MEASURED.name].values) for piece in pieces(of)), terms.REPLICATE if is_planned else 1
     )
 
 

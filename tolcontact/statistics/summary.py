@@ -5,14 +5,14 @@ from collections import Counter
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
 from tolcontact.readable import picture_of
 from tolcontact.realizations import finished, pieces, statuses
-from tolcontact.statistics import capability, contacts, intervals
+from tolcontact.statistics import capability, contact, intervals
 from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.moments import kurtosis, skewness
 from tolcontact.statistics.sample import Sample, measured_sample
-from tolcontact.statistics.shape import kurtosis, skewness
 
 LEAST = 2
 
@@ -53,40 +53,40 @@ def summarize(results: xr.DataTree) -> Summary:
     done = finished(results)
     if done < LEAST:
         raise ArchiveError(f"{done} realizations are finished, too few for statistics; continue with --resume")
-    rows = results.to_dataset().isel({words.REALIZATION: slice(done)})
-    measures = range(rows.sizes[words.MEASURE])
-    samples = [[measured_sample(rows, measure, state) for state in words.STATES] for measure in measures]
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(done)})
+    measures = range(rows.sizes[terms.MEASURE])
+    samples = [[measured_sample(rows, measure, state) for state in terms.STATES] for measure in measures]
     values = np.array([[_of_sample(sample, rows, k) for sample in both] for k, both in enumerate(samples)])
     changes = np.array([_change(raw, corrected) for raw, corrected in samples])
-    by_status = np.sum([np.bincount(piece, minlength=len(words.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
+    by_status = np.sum([np.bincount(piece, minlength=len(terms.STATUS_MEANINGS)) for piece in statuses(rows)], axis=0)
     total = int(by_status.sum())
-    parts, together = rows[words.PART].values, contacts.combinations(rows)
+    parts, together = rows[terms.PART].values, contact.combinations(rows)
     return Summary(
         {
-            "statistic_value": ((words.MEASURE, words.STATE, words.STATISTIC, words.INTERVAL), values),
-            "change": ((words.MEASURE, words.CHANGE_OF, words.INTERVAL), changes),
-            "touched": ((words.INTERVAL,), np.array(intervals.share_of(total - by_status[words.Status.UNTOUCHED], total))),
-            "by_status": ((words.STATUS_MEANING,), by_status),
+            "statistic_value": ((terms.MEASURE, terms.STATE, terms.STATISTIC, terms.INTERVAL), values),
+            "change": ((terms.MEASURE, terms.CHANGE_OF, terms.INTERVAL), changes),
+            "touched": ((terms.INTERVAL,), np.array(intervals.share_of(total - by_status[terms.Status.UNTOUCHED], total))),
+            "by_status": ((terms.STATUS_MEANING,), by_status),
             "not_assemblable": (
-                (words.INTERVAL,),
-                np.array(intervals.share_of(by_status[words.Status.NOT_ASSEMBLABLE], total)),
+                (terms.INTERVAL,),
+                np.array(intervals.share_of(by_status[terms.Status.NOT_ASSEMBLABLE], total)),
             ),
-            "conflicts": ((words.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0)),
-            "carried": ((words.PAIR, words.INTERVAL), contacts.carried(rows)),
+            "conflicts": ((terms.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0)),
+            "carried": ((terms.PAIR, terms.INTERVAL), contact.carried(rows)),
             "reaction": (
-                (words.PAIR, words.OF_REACTION, words.INTERVAL),
-                contacts.reactions(rows),
-                {"units": rows[words.REACTION.name].attrs.get("units", "1")},
+                (terms.PAIR, terms.OF_REACTION, terms.INTERVAL),
+                contact.reactions(rows),
+                {"units": rows[terms.REACTION.name].attrs.get("units", "1")},
             ),
             "together": (
-                (words.COMBINATION, words.INTERVAL),
-                np.array([intervals.share_of(n, total) for _, n in together]).reshape(-1, len(words.ESTIMATE)),
+                (terms.COMBINATION, terms.INTERVAL),
+                np.array([intervals.share_of(n, total) for _, n in together]).reshape(-1, len(terms.ESTIMATE)),
             ),
-            "iterations": ((words.OF_ITERATIONS,), _iterations(rows)),
-            "penetration": ((words.STATE,), _penetration(rows), {"units": "mm"}),
+            "iterations": ((terms.OF_ITERATIONS,), _iterations(rows)),
+            "penetration": ((terms.STATE,), _penetration(rows), {"units": "mm"}),
             **_checked(results),
             "field_extreme": (
-                (words.PART, words.STATE, words.EXTREME, words.INTERVAL),
+                (terms.PART, terms.STATE, terms.EXTREME, terms.INTERVAL),
                 np.array([_field_extremes(results, str(part)) for part in parts]),
                 {"units": "mm"},
             ),
@@ -94,24 +94,24 @@ def summarize(results: xr.DataTree) -> Summary:
             "magnitude_realizations": ((), min(_magnitudes(results, str(part)) for part in parts), {"units": "1"}),
         },
         coords={
-            words.MEASURE: rows[words.MEASURE].values,
-            words.STATE: list(words.STATES),
-            words.STATISTIC: list(words.EVERY_STATISTIC),
-            words.INTERVAL: list(words.ESTIMATE),
-            words.CHANGE_OF: list(words.CHANGES),
-            words.STATUS_MEANING: list(words.STATUS_MEANINGS),
-            words.PART: parts,
-            words.PAIR: rows[words.PAIR].values,
-            words.OF_REACTION: list(words.REACTION_STATISTICS),
-            words.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in together],
-            words.OF_ITERATIONS: list(words.MIDDLES),
-            words.EXTREME: list(words.EXTREMES),
-            "measure_units": (words.MEASURE, rows[words.MEASURE_UNITS.name].values),
+            terms.MEASURE: rows[terms.MEASURE].values,
+            terms.STATE: list(terms.STATES),
+            terms.STATISTIC: list(terms.EVERY_STATISTIC),
+            terms.INTERVAL: list(terms.ESTIMATE),
+            terms.CHANGE_OF: list(terms.CHANGES),
+            terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
+            terms.PART: parts,
+            terms.PAIR: rows[terms.PAIR].values,
+            terms.OF_REACTION: list(terms.REACTION_STATISTICS),
+            terms.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in together],
+            terms.OF_ITERATIONS: list(terms.MIDDLES),
+            terms.EXTREME: list(terms.EXTREMES),
+            "measure_units": (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),
             **{
-                f"measure_{side}": (words.MEASURE, of_side)
+                f"measure_{side}": (terms.MEASURE, of_side)
                 for side, of_side in zip(("lower", "upper"), limits(rows).T, strict=True)
             },
-            "measure_quantity": (words.MEASURE, _quantities(rows)),
+            "measure_quantity": (terms.MEASURE, _quantities(rows)),
         },
         attrs={
             "title": results.attrs.get("title", ""),
@@ -126,10 +126,10 @@ def summarize(results: xr.DataTree) -> Summary:
 
 def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
     """One of the statistics of `summarize`, of a corrected measure."""
-    rows = results.to_dataset().isel({words.REALIZATION: slice(finished(results))})
-    number = rows[words.MEASURE].values.tolist().index(measure)
-    x = measured_sample(rows, number, words.STATES[words.CORRECTED])
-    return _of_sample(x, rows, number)[words.EVERY_STATISTIC.index(statistic)]
+    rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
+    number = rows[terms.MEASURE].values.tolist().index(measure)
+    x = measured_sample(rows, number, terms.STATES[terms.CORRECTED])
+    return _of_sample(x, rows, number)[terms.EVERY_STATISTIC.index(statistic)]
 
 
 def in_conflict(rows: xr.Dataset) -> np.ndarray:
@@ -137,15 +137,15 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
 
     These are the pairs that the pose of least penetration leaves inside each other.
     """
-    gap = rows[words.GAP_MIN.name].sel({words.STATE: "corrected"}).transpose(words.REALIZATION, words.PAIR).values
-    stuck = rows[words.STATUS.name].values == words.Status.NOT_ASSEMBLABLE
+    gap = rows[terms.GAP_MIN.name].sel({terms.STATE: "corrected"}).transpose(terms.REALIZATION, terms.PAIR).values
+    stuck = rows[terms.STATUS.name].values == terms.Status.NOT_ASSEMBLABLE
     return np.asarray(stuck[:, None] & (gap < -rows.attrs["solver_accuracy"]))
 
 
 def _penetration(rows: xr.Dataset) -> np.ndarray:
-    if not rows[words.GAP_MIN.name].size:
-        return np.zeros(len(words.STATES))
-    least = [piece[words.GAP_MIN.name].min([words.REALIZATION, words.PAIR]).values for piece in pieces(rows)]
+    if not rows[terms.GAP_MIN.name].size:
+        return np.zeros(len(terms.STATES))
+    least = [piece[terms.GAP_MIN.name].min([terms.REALIZATION, terms.PAIR]).values for piece in pieces(rows)]
     return np.asarray(np.maximum(-np.min(least, axis=0), 0))
 
 
@@ -153,9 +153,9 @@ def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str
     largest, count = [np.nan, np.nan], 0
     if "surface" in results.children:  # archives of before have none
         of = results["surface"].to_dataset()
-        known = [of[v.name].values[~np.isnan(of[v.name].values)] for v in (words.SURFACE_PENETRATION, words.BESIDE)]
+        known = [of[v.name].values[~np.isnan(of[v.name].values)] for v in (terms.SURFACE_PENETRATION, terms.BESIDE)]
         largest = [float(values.max()) if values.size else np.nan for values in known]
-        count = int((of[words.CHECKED_REALIZATION.name] != words.UNFINISHED).sum())
+        count = int((of[terms.CHECKED_REALIZATION.name] != terms.UNFINISHED).sum())
     return {
         "surface_penetration": ((), largest[0], {"units": "mm"}),
         "beside": ((), largest[1], {"units": "mm"}),
@@ -166,8 +166,8 @@ def _checked(results: xr.DataTree) -> dict[str, tuple[tuple[()], float, dict[str
 def _iterations(rows: xr.Dataset) -> list[float]:
     """Median and largest number of linear steps of the realizations that contact touched: those that took any."""
     counts: Counter[int] = Counter()
-    for piece in pieces(rows[[words.ITERATIONS.name]]):
-        steps, times = np.unique(piece[words.ITERATIONS.name].values, return_counts=True)
+    for piece in pieces(rows[[terms.ITERATIONS.name]]):
+        steps, times = np.unique(piece[terms.ITERATIONS.name].values, return_counts=True)
         counts.update(dict(zip(steps.tolist(), times.tolist(), strict=True)))
     taken = sorted(steps for steps in counts if steps > 0)
     if not taken:
@@ -180,11 +180,11 @@ def _iterations(rows: xr.Dataset) -> list[float]:
 def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
     """The smallest tolerance range above 0 of any contributor or measure [mm]; infinite if there is none."""
     sample = results["sample"].to_dataset()
-    contributors = sample[words.TOLERANCE_RANGE.name].values
-    if words.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have locators alone
-        contributors = contributors[sample[words.CONTRIBUTOR_UNITS.name].values == "mm"]
+    contributors = sample[terms.TOLERANCE_RANGE.name].values
+    if terms.CONTRIBUTOR_UNITS.name in sample:  # archives up to format 3 have locators alone
+        contributors = contributors[sample[terms.CONTRIBUTOR_UNITS.name].values == "mm"]
     ranges = np.concatenate(
-        [contributors, rows[words.MEASURE_TOLERANCE.name].values[rows[words.MEASURE_UNITS.name].values == "mm"]]
+        [contributors, rows[terms.MEASURE_TOLERANCE.name].values[rows[terms.MEASURE_UNITS.name].values == "mm"]]
     )
     return float(np.min(ranges, where=ranges > 0, initial=np.inf))
 
@@ -192,17 +192,17 @@ def _smallest_range(results: xr.DataTree, rows: xr.Dataset) -> float:
 def _datum_shifts(results: xr.DataTree) -> list[str]:
     """Features with a datum at maximum or least material, as part.feature."""
     sample = results["sample"].to_dataset()
-    if words.DISTRIBUTION.name not in sample or words.CONTRIBUTOR not in sample[words.DISTRIBUTION.name].dims:
+    if terms.DISTRIBUTION.name not in sample or terms.CONTRIBUTOR not in sample[terms.DISTRIBUTION.name].dims:
         return []
-    labels = zip(sample[words.CONTRIBUTOR].values, sample[words.DISTRIBUTION.name].values, strict=True)
+    labels = zip(sample[terms.CONTRIBUTOR].values, sample[terms.DISTRIBUTION.name].values, strict=True)
     shifted = [str(label).rpartition(".")[0] for label, said in labels if "(M)" in str(said) or "(L)" in str(said)]
     return list(dict.fromkeys(shifted))
 
 
 def _begun_for(results: xr.DataTree, done: int) -> int:
     """How many realizations the run was begun for; those that are there, if they were taken from an archive."""
-    samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[words.REALIZATION]
-    unfinished = size > done or size == words.FIRST_ROWS
+    samples, size = int(results.attrs["samples"]), results.to_dataset().sizes[terms.REALIZATION]
+    unfinished = size > done or size == terms.FIRST_ROWS
     return max(samples, done) if unfinished else done
 
 
@@ -213,7 +213,7 @@ def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
     return [
         intervals.mean(x),
         *spreads,
-        *intervals.percentiles(x, words.PERCENTILES),
+        *intervals.percentiles(x, terms.PERCENTILES),
         *shape,
         *_within(x, *limits(rows)[measure]),
     ]
@@ -222,23 +222,23 @@ def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
 def _within(x: Sample, lower: float, upper: float) -> list[Estimate]:
     """How a sample stays within limits; nothing if it is not of numbers."""
     if not np.isfinite(x.mean):
-        return [intervals.NOTHING] * len((*words.SHARES, *words.CAPABILITY))
+        return [intervals.NOTHING] * len((*terms.SHARES, *terms.CAPABILITY))
     shares = [capability.below(x, lower), capability.above(x, upper), capability.outside(x, lower, upper)]
     return [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
 
 
 def limits(rows: xr.Dataset) -> np.ndarray:
     """Lower and upper limit of each measure (measure, 2); NaN where a side is open."""
-    if words.LOWER_LIMIT.name in rows:
-        return np.column_stack([rows[words.LOWER_LIMIT.name].values, rows[words.UPPER_LIMIT.name].values])
-    nominal, half = rows[words.MEASURE_NOMINAL.name].values, rows[words.MEASURE_TOLERANCE.name].values / 2
+    if terms.LOWER_LIMIT.name in rows:
+        return np.column_stack([rows[terms.LOWER_LIMIT.name].values, rows[terms.UPPER_LIMIT.name].values])
+    nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
     return np.column_stack([nominal - half, nominal + half])
 
 
 def _quantities(rows: xr.Dataset) -> np.ndarray:
     """What each measure is a value of; archives before format 4 do not say it."""
-    known = words.QUANTITY.name in rows
-    return np.asarray(rows[words.QUANTITY.name].values if known else [""] * rows.sizes[words.MEASURE], dtype=object)
+    known = terms.QUANTITY.name in rows
+    return np.asarray(rows[terms.QUANTITY.name].values if known else [""] * rows.sizes[terms.MEASURE], dtype=object)
 
 
 def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
@@ -248,34 +248,34 @@ def _change(raw: Sample, corrected: Sample) -> list[Estimate]:
 
 def _field_extremes(results: xr.DataTree, part: str) -> np.ndarray:
     """6 sigma of |u|, and its interval, where the archived field is least and largest; (state, extreme, bound)."""
-    found = np.full((len(words.STATES), 2, len(words.ESTIMATE)), np.nan)
+    found = np.full((len(terms.STATES), 2, len(terms.ESTIMATE)), np.nan)
     if not _summed(results, part):
         return found
     field = _field(results, part)
-    six_sigma = field[words.FIELD_SIX_SIGMA.name].sel({words.COMPONENT: "magnitude"}).values
+    six_sigma = field[terms.FIELD_SIX_SIGMA.name].sel({terms.COMPONENT: "magnitude"}).values
     for state, values in enumerate(six_sigma):
         if np.isfinite(values).all():
             where = [values.argmin(), values.argmax()]
             found[state, :, 0] = values[where]
-            found[state, :, 1:] = field[words.FIELD_INTERVAL.name].values[state, where]
+            found[state, :, 1:] = field[terms.FIELD_INTERVAL.name].values[state, where]
     return found
 
 
 def _summed(results: xr.DataTree, part: str) -> int:
     """How many realizations are in the field of a part; 0 if it is being written."""
     field = _field(results, part)
-    if words.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
-        return results.to_dataset().sizes[words.REALIZATION]
-    whole = int(field[words.GROUP_CHECKSUM.name]) != words.UNFINISHED
-    return int(field[words.FIELD_REALIZATIONS.name]) if whole else 0
+    if terms.FIELD_REALIZATIONS.name not in field:  # archives of format 1 have fields of all their rows, or none
+        return results.to_dataset().sizes[terms.REALIZATION]
+    whole = int(field[terms.GROUP_CHECKSUM.name]) != terms.UNFINISHED
+    return int(field[terms.FIELD_REALIZATIONS.name]) if whole else 0
 
 
 def _magnitudes(results: xr.DataTree, part: str) -> int:
     """How many realizations are in the magnitude of a part's field: before format 3 all of the field's."""
     field, summed = _field(results, part), _summed(results, part)
-    known = words.MAGNITUDE_REALIZATIONS.name in field
-    return min(int(field[words.MAGNITUDE_REALIZATIONS.name]), summed) if known else summed
+    known = terms.MAGNITUDE_REALIZATIONS.name in field
+    return min(int(field[terms.MAGNITUDE_REALIZATIONS.name]), summed) if known else summed
 
 
 def _field(results: xr.DataTree, part: str) -> xr.Dataset:
-    return results["field"].children[words.group_of(part)].to_dataset()
+    return results["field"].children[terms.group_of(part)].to_dataset()

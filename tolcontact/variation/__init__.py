@@ -108,21 +108,6 @@ realizations). Deviations are its quantiles: the same share u gives the same ran
 yields non-finite deviations is rejected."""
 
 from tolcontact.variation.contributors import Contributor
-from tolcontact.variation.draws import Draws, draw
-from tolcontact.variation.given import GivenDraws
-from tolcontact.variation.mixed import MixedDraws, independent_groups
-from tolcontact.variation.region import Region
-from tolcontact.variation.released import ReleasedDraws
-from tolcontact.variation.stepped import SteppedDraws
+from tolcontact.variation.draws import Draws, GivenDraws, draw
 
-__all__ = [
-    "Contributor",
-    "Draws",
-    "GivenDraws",
-    "MixedDraws",
-    "Region",
-    "ReleasedDraws",
-    "SteppedDraws",
-    "draw",
-    "independent_groups",
-]
+__all__ = ["Contributor", "Draws", "GivenDraws", "draw"]

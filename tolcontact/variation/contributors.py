@@ -9,8 +9,9 @@ from scipy.special import ndtri
 
 from tolcontact.declaration import GeometricTolerance, Tolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
-from tolcontact.discretization import Layer, Nominal, NominalFeature
+from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
+from tolcontact.features import Layer, NominalFeature
 from tolcontact.variation import zones
 from tolcontact.variation.quantiles import quantile
 

@@ -189,3 +189,14 @@ class Draws:
 def draw(nominal: Nominal, *, seed: int, start: int, stop: int) -> np.ndarray:
     """Deviations (realization, contributor) of realizations `start` to `stop`; see Draws."""
     return Draws(nominal)(seed=seed, start=start, stop=stop)
+
+
+class GivenDraws:
+    """Deviations as Draws give them: the rows of an array (realization, contributor), whatever the seed."""
+
+    def __init__(self, deviations: np.ndarray) -> None:
+        self._deviations = deviations
+
+    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
+        """Deviations (realization, contributor); see Draws."""
+        return self._deviations[start:stop]

@@ -11,7 +11,8 @@ import numpy as np
 
 from tolcontact.declaration import GeometricTolerance
 from tolcontact.declaration.feature_tolerance import INSIDE, ORIENTATIONS
-from tolcontact.discretization import Nominal, NominalFeature
+from tolcontact.discretization import Nominal
+from tolcontact.features import NominalFeature
 from tolcontact.variation.contributors import bonus
 from tolcontact.variation.draws import Draws
 

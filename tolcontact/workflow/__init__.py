@@ -149,21 +149,15 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 
 from tolcontact.archive import open_archive
 from tolcontact.workflow import accessor
-from tolcontact.workflow.allocate import allocate
-from tolcontact.workflow.compare import compare
-from tolcontact.workflow.compare_runs import compare_runs
-from tolcontact.workflow.contributions import contributions
-from tolcontact.workflow.population import check_population
-from tolcontact.workflow.relocate import relocate
+from tolcontact.workflow.population_check import check_population
 from tolcontact.workflow.run import build, check, run, summarize
-from tolcontact.workflow.sensitivities import sensitivities
+from tolcontact.workflow.run_comparison import compare_runs
 from tolcontact.workflow.simulate import simulate
+from tolcontact.workflow.solver_comparison import compare
 from tolcontact.workflow.study import study
-from tolcontact.workflow.tails import tails
-from tolcontact.workflow.worst_case import worst_case
 from tolcontact.workflow.written import write_model
 
 __all__ = [
-    "accessor", "allocate", "build", "check", "check_population", "compare", "compare_runs", "contributions",
-    "open_archive", "relocate", "run", "sensitivities", "simulate", "study", "summarize", "tails", "worst_case", "write_model",
+    "accessor", "build", "check", "check_population", "compare", "compare_runs", "open_archive", "run", "simulate", "study",
+    "summarize", "write_model",
 ]  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import plot
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.report.notebook import results_html
@@ -52,11 +52,11 @@ class Results:
 
     def field(self, part: str) -> xr.Dataset:
         """The displacement field of a part by its name, whatever its group is called (see tolcontact.statistics)."""
-        names = [str(name) for name in self._results.to_dataset()[words.PART].values]
+        names = [str(name) for name in self._results.to_dataset()[terms.PART].values]
         if part not in names:
             raise OptionError(f'part is "{part}"; expected one of: {", ".join(names)}')
-        whole = self._results["field"].children[words.group_of(part)].to_dataset(inherit=True)
-        kept = [name for name, of in whole.data_vars.items() if words.CHECKPOINT not in of.dims and name != words.CHECKSUM]
+        whole = self._results["field"].children[terms.group_of(part)].to_dataset(inherit=True)
+        kept = [name for name, of in whole.data_vars.items() if terms.CHECKPOINT not in of.dims and name != terms.CHECKSUM]
         used = {dim for name in kept for dim in whole[name].dims}
         found = whole[kept]
         return found.drop_vars([name for name in found.coords if name not in used])
@@ -67,21 +67,21 @@ class Results:
         if not 0 <= number < done:
             raise OptionError(f"realization is {number}; expected 0 to {done - 1}")
         rows = self._results.to_dataset()
-        row = rows[[name for name, of in rows.data_vars.items() if words.REALIZATION in of.dims]].isel(
-            {words.REALIZATION: number}
+        row = rows[[name for name, of in rows.data_vars.items() if terms.REALIZATION in of.dims]].isel(
+            {terms.REALIZATION: number}
         )
         sample = self._results["sample"].to_dataset()
-        if words.DEVIATION.name in sample:
-            row[words.DEVIATION.name] = sample[words.DEVIATION.name].isel({words.REALIZATION: number})
-        return row.assign_coords({words.STATUS_MEANING: words.STATUS_MEANINGS[int(row[words.STATUS.name])]})
+        if terms.DEVIATION.name in sample:
+            row[terms.DEVIATION.name] = sample[terms.DEVIATION.name].isel({terms.REALIZATION: number})
+        return row.assign_coords({terms.STATUS_MEANING: terms.STATUS_MEANINGS[int(row[terms.STATUS.name])]})
 
-    def where_status(self, status: str | words.Status) -> xr.DataTree:
+    def where_status(self, status: str | terms.Status) -> xr.DataTree:
         """The results of the realizations with a status, such as "not_assemblable", with their numbers."""
-        names = {each.name.lower(): each for each in words.Status}
-        if str(status) not in names and status not in list(words.Status):
+        names = {each.name.lower(): each for each in terms.Status}
+        if str(status) not in names and status not in list(terms.Status):
             raise OptionError(f"status is {status!r}; expected one of: {', '.join(names)}")
-        rows = np.flatnonzero(self._results[words.STATUS.name].values == int(names.get(str(status), status)))
-        return self._results.isel({words.REALIZATION: rows})
+        rows = np.flatnonzero(self._results[terms.STATUS.name].values == int(names.get(str(status), status)))
+        return self._results.isel({terms.REALIZATION: rows})
 
     def touching(self) -> xr.Dataset:
         """Where contact points touch, and how often (see tolcontact.statistics.touching)."""

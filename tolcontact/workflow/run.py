@@ -9,7 +9,7 @@ from typing import Any
 import xarray as xr
 
 from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, opened, stored, taken
-from tolcontact.archive.stored import StoredBlock
+from tolcontact.archive.stored_block import StoredBlock
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model

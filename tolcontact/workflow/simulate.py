@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.archive import Run, labelled, row_values, run_settings, sizes_of_rows
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
@@ -43,12 +43,12 @@ def simulate(
     elif not isinstance(samples, int):
         raise OptionError(
             f"samples is a {type(samples).__name__}; expected a number of realizations, or their deviations as an "
-            f"xarray.DataArray ({words.REALIZATION}, {words.CONTRIBUTOR})"
+            f"xarray.DataArray ({terms.REALIZATION}, {terms.CONTRIBUTOR})"
         )
     else:
         check_counts(samples=samples)
         deviations = lazy_draws(program, samples, seed)
-    variables = [of for of in words.BY_REALIZATION if of is not words.DEVIATION]
+    variables = [of for of in terms.BY_REALIZATION if of is not terms.DEVIATION]
     sizes = sizes_of_rows(program.nominal)
     records = _Records(tuple((of.name, of.kind, tuple(sizes[dim] for dim in of.dims[1:])) for of in variables))
     found = lazy_realizations(program, deviations, records, records.kind)
@@ -58,15 +58,15 @@ def simulate(
         del settings["seed"]
     rows = labelled(
         program,
-        {of: found[of.name] for of in variables} | {words.DEVIATION: deviations},
+        {of: found[of.name] for of in variables} | {terms.DEVIATION: deviations},
         {
-            "Conventions": words.CONVENTIONS,
+            "Conventions": terms.CONVENTIONS,
             "title": f"realizations of {program.nominal.assembly.name}",
             **{name: value for name, value in settings.items() if name not in OF_ARCHIVES},
         },
     )
-    if isinstance(samples, xr.DataArray) and words.REALIZATION in samples.coords:
-        return rows.assign_coords({words.REALIZATION: samples[words.REALIZATION]})
+    if isinstance(samples, xr.DataArray) and terms.REALIZATION in samples.coords:
+        return rows.assign_coords({terms.REALIZATION: samples[terms.REALIZATION]})
     return rows
 
 
@@ -90,27 +90,27 @@ class _Records:
 def _given(deviations: xr.DataArray, program: Program) -> Any:
     """Deviations of the user's own as an array (realization, contributor) in chunks."""
     known = list(program.nominal.contributors)
-    if set(deviations.dims) != {words.REALIZATION, words.CONTRIBUTOR}:
+    if set(deviations.dims) != {terms.REALIZATION, terms.CONTRIBUTOR}:
         raise OptionError(
             f"deviations have the dimensions {', '.join(map(str, deviations.dims)) or 'none'}; "
-            f"expected {words.REALIZATION} and {words.CONTRIBUTOR}"
+            f"expected {terms.REALIZATION} and {terms.CONTRIBUTOR}"
         )
-    if words.CONTRIBUTOR in deviations.coords:
-        labels = deviations[words.CONTRIBUTOR].values.tolist()
+    if terms.CONTRIBUTOR in deviations.coords:
+        labels = deviations[terms.CONTRIBUTOR].values.tolist()
         wrong = sorted(set(map(str, labels)) ^ set(known)) or sorted({label for label in labels if labels.count(label) > 1})
         if wrong:
             raise OptionError(
                 f'deviations of "{wrong[0]}" are missing, unknown, or given twice; expected one of each: {", ".join(known)}'
             )
-        deviations = deviations.sel({words.CONTRIBUTOR: known})
-    elif deviations.sizes[words.CONTRIBUTOR] != len(known):
+        deviations = deviations.sel({terms.CONTRIBUTOR: known})
+    elif deviations.sizes[terms.CONTRIBUTOR] != len(known):
         raise OptionError(
-            f"deviations are of {deviations.sizes[words.CONTRIBUTOR]} contributors; expected {len(known)}: {', '.join(known)}"
+            f"deviations are of {deviations.sizes[terms.CONTRIBUTOR]} contributors; expected {len(known)}: {', '.join(known)}"
         )
-    if not deviations.sizes[words.REALIZATION]:
+    if not deviations.sizes[terms.REALIZATION]:
         raise OptionError("deviations are of no realization; expected one or more")
     if deviations.dtype.kind not in "fiu":
         raise OptionError(f"deviations are {deviations.dtype}; expected numbers")
-    found, array = deviations.transpose(words.REALIZATION, words.CONTRIBUTOR).astype(float).data, dask_arrays()
+    found, array = deviations.transpose(terms.REALIZATION, terms.CONTRIBUTOR).astype(float).data, dask_arrays()
     chunked = found if isinstance(found, array.Array) else array.from_array(found, chunks=(chunk_rows(program), -1))
     return chunked.rechunk({1: -1})

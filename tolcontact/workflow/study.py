@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.workflow.compare import told_apart
 from tolcontact.workflow.run import Choice, Model, declared, program_of
 from tolcontact.workflow.simulate import simulate
+from tolcontact.workflow.solver_comparison import told_apart
 
 
 def study(
@@ -52,9 +52,9 @@ def study(
         **{word: [each.attrs[word] for each in designs] for word in ("resolution", "objective", "solver")},
     }
     found = xr.concat(
-        every, xr.Variable(words.DESIGN, np.array(labels, dtype=object)), join="exact", combine_attrs="drop_conflicts"
+        every, xr.Variable(terms.DESIGN, np.array(labels, dtype=object)), join="exact", combine_attrs="drop_conflicts"
     )
-    return found.assign_coords({word: (words.DESIGN, values) for word, values in own.items()})
+    return found.assign_coords({word: (terms.DESIGN, values) for word, values in own.items()})
 
 
 def _named(models: Mapping[str, Model | Program] | Sequence[Model | Program]) -> dict[str, Model | Program]:
@@ -72,7 +72,7 @@ def _with_all_labels(design: xr.Dataset, designs: Sequence[xr.Dataset]) -> xr.Da
     """A design with the parts, pairs, measures and contributors of all."""
     labels = {
         dim: list(dict.fromkeys(label for each in designs for label in each[dim].values.tolist()))
-        for dim in (words.PART, words.PAIR, words.MEASURE, words.CONTRIBUTOR)
+        for dim in (terms.PART, terms.PAIR, terms.MEASURE, terms.CONTRIBUTOR)
     }
     nothing = {name: np.nan if of.dtype.kind == "f" else 0 for name, of in design.data_vars.items()}
     return design.reindex(labels, fill_value=nothing)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
-from tolcontact.report.html.packed import packed
+from tolcontact.report.html.packed_array import packed
 from tolcontact.statistics import intervals
 
 BINS = 60
@@ -19,11 +19,11 @@ FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
 
 def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]:
     """For each measure its name, units, limits, figures and distributions."""
-    rows = results.to_dataset()[[words.MEASURED.name]].isel({words.REALIZATION: slice(summary.attrs["realizations"])})
+    rows = results.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(summary.attrs["realizations"])})
     found = []
     for number, name in enumerate(summary["measure"].values):
         of = summary.sel(measure=name)
-        states = [_of_state(rows, number, state) for state in range(len(words.STATES))]
+        states = [_of_state(rows, number, state) for state in range(len(terms.STATES))]
         edges = _edges(states)
         for state, own in enumerate(states):
             own["counts"] = _counts(rows, number, state, edges)
@@ -45,17 +45,17 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
     """For each measure of a comparison the share [%] of realizations in the same bins, by run and state."""
     found = []
     rows = {
-        name: run.to_dataset()[[words.MEASURED.name]].isel({words.REALIZATION: slice(int(count))})
+        name: run.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(int(count))})
         for (name, run), count in zip(runs.items(), comparison["realizations"].values, strict=True)
     }
     for name in comparison["measure"].values:
-        places = {run: own[words.MEASURE].values.tolist().index(name) for run, own in rows.items()}
-        both = range(len(words.STATES))
+        places = {run: own[terms.MEASURE].values.tolist().index(name) for run, own in rows.items()}
+        both = range(len(terms.STATES))
         edges = _edges([{"range": _range(own, places[run], state)} for run, own in rows.items() for state in both])
         shares = [
             {
                 "name": run,
-                "shares": [[100 * k / own.sizes[words.REALIZATION] for k in _counts(own, places[run], s, edges)] for s in both],
+                "shares": [[100 * k / own.sizes[terms.REALIZATION] for k in _counts(own, places[run], s, edges)] for s in both],
             }
             for run, own in rows.items()
         ]
@@ -63,7 +63,7 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
             {
                 "name": str(name),
                 "units": str(comparison["measure_units"].sel(measure=name).values),
-                "limits": [_finite(comparison[f"measure_{side}"].sel(measure=name)[0]) for side in words.BOUNDS],
+                "limits": [_finite(comparison[f"measure_{side}"].sel(measure=name)[0]) for side in terms.BOUNDS],
                 "edges": edges.tolist(),
                 "runs": shares,
             }
@@ -73,18 +73,18 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
 
 def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
     """The first realizations one by one: measures (realization, state, measure), and deviations (realization, contributor)."""
-    some = {words.REALIZATION: slice(min(summary.attrs["realizations"], POINTS))}
+    some = {terms.REALIZATION: slice(min(summary.attrs["realizations"], POINTS))}
     sample = results["sample"].to_dataset()
     found: dict[str, Any] = {
-        "measured": packed(results.to_dataset()[words.MEASURED.name].isel(some).values),
+        "measured": packed(results.to_dataset()[terms.MEASURED.name].isel(some).values),
         "contributors": [],
     }
-    if words.DEVIATION.name in sample:
-        varying = sample[words.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
-        deviations = sample[words.DEVIATION.name].isel(some).values
+    if terms.DEVIATION.name in sample:
+        varying = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
+        deviations = sample[terms.DEVIATION.name].isel(some).values
         moves = np.ptp(deviations, axis=0) > 0
         units = (
-            sample[words.CONTRIBUTOR_UNITS.name].values if words.CONTRIBUTOR_UNITS.name in sample else np.full(len(moves), "mm")
+            sample[terms.CONTRIBUTOR_UNITS.name].values if terms.CONTRIBUTOR_UNITS.name in sample else np.full(len(moves), "mm")
         )
         labels = zip(sample[varying].values[moves], units[moves], strict=True)
         found["contributors"] = [{"name": str(name), "units": str(unit)} for name, unit in labels]
@@ -98,12 +98,12 @@ def _estimates(of: xr.Dataset, statistic: str) -> xr.DataArray:
 
 def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
     """The range of a measure, and its mean after more and more realizations, with half of its 95 % interval (Student's t)."""
-    total = rows.sizes[words.REALIZATION]
+    total = rows.sizes[terms.REALIZATION]
     steps = np.unique(np.geomspace(2, total, STEPS).round().astype(int))
     low, high, count, middle = np.inf, -np.inf, 0, None
     sums, found = np.zeros(2), []
     for piece in pieces(rows):
-        x = piece[words.MEASURED.name].values[:, state, measure]
+        x = piece[terms.MEASURED.name].values[:, state, measure]
         low, high = min(low, float(x.min())), max(high, float(x.max()))
         middle = float(x[0]) if middle is None else middle
         cumulated = np.cumsum([x - middle, (x - middle) ** 2], axis=1)
@@ -117,7 +117,7 @@ def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
 
 def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
     """The least and the largest value of a measure."""
-    values = [piece[words.MEASURED.name].values[:, state, measure] for piece in pieces(rows)]
+    values = [piece[terms.MEASURED.name].values[:, state, measure] for piece in pieces(rows)]
     return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
@@ -133,7 +133,7 @@ def _counts(rows: xr.Dataset, measure: int, state: int, edges: np.ndarray) -> li
         return []
     counts = np.zeros(len(edges) - 1, dtype=int)
     for piece in pieces(rows):
-        counts += np.histogram(piece[words.MEASURED.name].values[:, state, measure], edges)[0]
+        counts += np.histogram(piece[terms.MEASURED.name].values[:, state, measure], edges)[0]
     return counts.tolist()
 
 

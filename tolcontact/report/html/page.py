@@ -16,7 +16,7 @@ from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import scene_of
-from tolcontact.report.html.shown import shown_of
+from tolcontact.report.html.shown_realizations import shown_of
 from tolcontact.report.html.view import gaps_in_words, view_of
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells, pair_columns, pair_rows

@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import vocabulary as words
-from tolcontact.report.html.coarse import allowed, coarser
-from tolcontact.report.html.packed import Packed, packed
-from tolcontact.report.html.shown import Shown
-from tolcontact.report.marks import Marks, marks_of
+from tolcontact import vocabulary as terms
+from tolcontact.report.annotations import Marks, marks_of
+from tolcontact.report.html.decimation import allowed, coarser
+from tolcontact.report.html.packed_array import Packed, packed
+from tolcontact.report.html.shown_realizations import Shown
 from tolcontact.statistics import kept_analysis, touching
 
 Drawn = dict[str, Any]
@@ -48,17 +48,17 @@ def drawn_marks(marks: Marks) -> Drawn:
 
 
 def _parts(results: xr.DataTree) -> list[Drawn]:
-    names = [str(name) for name in results.to_dataset()[words.PART].values]
-    fields = [results["field"].children[words.group_of(name)].to_dataset() for name in names]
-    counts = allowed([field.sizes[words.FACE] for field in fields])
+    names = [str(name) for name in results.to_dataset()[terms.PART].values]
+    fields = [results["field"].children[terms.group_of(name)].to_dataset() for name in names]
+    counts = allowed([field.sizes[terms.FACE] for field in fields])
     return [_part(name, field, count) for name, field, count in zip(names, fields, counts, strict=True)]
 
 
 def _part(name: str, field: xr.Dataset, count: int) -> Drawn:
-    before = field[words.FIELD_FACES.name].values
-    vertices, faces, nearest = coarser(field[words.FIELD_VERTICES.name].values, before, count)
+    before = field[terms.FIELD_FACES.name].values
+    vertices, faces, nearest = coarser(field[terms.FIELD_VERTICES.name].values, before, count)
     drawn: Drawn = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(before)}
-    for word, variable in (("mean", words.FIELD_MEAN), ("sixSigma", words.FIELD_SIX_SIGMA)):
+    for word, variable in (("mean", terms.FIELD_MEAN), ("sixSigma", terms.FIELD_SIX_SIGMA)):
         values = field[variable.name].values[:, nearest]
         if np.isfinite(values[..., :3]).all():
             drawn[word] = packed(values)
@@ -70,23 +70,23 @@ def _realizations(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     order = np.argsort([each.row for each in shown], kind="stable")
     back = np.empty(len(order), dtype=int)
     back[order] = np.arange(len(order))
-    rows = results.to_dataset().isel({words.REALIZATION: np.array([each.row for each in shown], dtype=int)[order]})
-    worst = kept_analysis(results, words.OF_WORST_CASE)
-    names = [] if worst is None else [f"worst case: {case}" for case in worst[words.CASE].values]
+    rows = results.to_dataset().isel({terms.REALIZATION: np.array([each.row for each in shown], dtype=int)[order]})
+    worst = kept_analysis(results, terms.OF_WORST_CASE)
+    names = [] if worst is None else [f"worst case: {case}" for case in worst[terms.CASE].values]
 
-    def of(variable: words.Variable) -> np.ndarray:
+    def of(variable: terms.Variable) -> np.ndarray:
         own = rows[variable.name].values[back]
         return own if worst is None else np.concatenate([worst[variable.name].values, own])
 
     drawn: Drawn = {
         "names": names + [f"realization {each.row} ({each.why})" for each in shown],
-        "status": [words.STATUS_MEANINGS[status] for status in of(words.STATUS)],
-        "residual": packed(of(words.KKT_RESIDUAL)),
-        "gaps": packed(of(words.GAP_MIN)),
-        "measured": packed(of(words.MEASURED)),
+        "status": [terms.STATUS_MEANINGS[status] for status in of(terms.STATUS)],
+        "residual": packed(of(terms.KKT_RESIDUAL)),
+        "gaps": packed(of(terms.GAP_MIN)),
+        "measured": packed(of(terms.MEASURED)),
     }
-    if words.ROTATION.name in rows:
-        drawn["motions"] = _motions(of(words.ROTATION) - np.eye(3), of(words.TRANSLATION))
+    if terms.ROTATION.name in rows:
+        drawn["motions"] = _motions(of(terms.ROTATION) - np.eye(3), of(terms.TRANSLATION))
     return drawn
 
 

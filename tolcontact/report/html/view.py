@@ -4,10 +4,11 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from tolcontact.declaration import Assembly
-from tolcontact.discretization import Nominal, seen
-from tolcontact.report.html.packed import packed
+from tolcontact.discretization import Nominal
+from tolcontact.geometry import seen
+from tolcontact.report.annotations import Marks, fixed_points, marks_of_nominal
+from tolcontact.report.html.packed_array import packed
 from tolcontact.report.html.scene import Drawn, drawn_marks
-from tolcontact.report.marks import Marks, fixed_points, marks_of_nominal
 
 
 def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Drawn:

@@ -14,7 +14,7 @@ from tolcontact.vocabulary import EFFECTS, PPM, STAGES
 
 
 def allocation_text(found: xr.Dataset) -> Group:
-    """An allocation (see tolcontact.workflow.allocate) as something that rich prints."""
+    """An allocation (see tolcontact.analyses.allocate) as something that rich prints."""
     return Group(*_sections(found))
 
 

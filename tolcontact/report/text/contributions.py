@@ -17,7 +17,7 @@ SMALL = 0.005  # total shares below that, in both states, are counted only
 
 
 def contributions_text(found: xr.Dataset) -> Group:
-    """Contributions (see tolcontact.workflow.contributions) as something that rich prints."""
+    """Contributions (see tolcontact.analyses.contributions) as something that rich prints."""
     return Group(*_sections(found))
 
 

@@ -7,7 +7,7 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from tolcontact import vocabulary as words
+from tolcontact import vocabulary as terms
 
 
 def population_text(population: xr.Dataset) -> Group:
@@ -17,16 +17,16 @@ def population_text(population: xr.Dataset) -> Group:
     table.add_column("tolerance", vertical="bottom")
     for column in ("stated", "inside, %", "zone of\n99.73 %"):
         table.add_column(column, justify="right", vertical="bottom", no_wrap=True)
-    for zone in range(population.sizes[words.ZONE]):
-        of = population.isel({words.ZONE: zone})
-        estimate, lower, upper = 100 * of[words.SHARE_INSIDE.name].values
-        stated = float(of[words.STATED_SHARE.name])
+    for zone in range(population.sizes[terms.ZONE]):
+        of = population.isel({terms.ZONE: zone})
+        estimate, lower, upper = 100 * of[terms.SHARE_INSIDE.name].values
+        stated = float(of[terms.STATED_SHARE.name])
         table.add_row(
-            str(of[words.ZONE_FEATURE.name].values),
-            str(of[words.ZONE_TOLERANCE.name].values),
+            str(of[terms.ZONE_FEATURE.name].values),
+            str(of[terms.ZONE_TOLERANCE.name].values),
             "" if np.isnan(stated) else f"{100 * stated:.5g}",
             f"{estimate:.2f} [{lower:.2f}, {upper:.2f}]",
-            f"{float(of[words.NEEDED_WIDTH.name]):.3g} mm",
+            f"{float(of[terms.NEEDED_WIDTH.name]):.3g} mm",
         )
     heading = f"{population.attrs['title']}: {population.attrs['realizations']} of each feature, measured"
     return Group(Text(heading, style="bold"), Text(), table)

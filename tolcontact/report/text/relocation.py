@@ -13,7 +13,7 @@ from tolcontact.vocabulary import PPM, STAGES
 
 
 def relocation_text(found: xr.Dataset) -> Group:
-    """A relocation (see tolcontact.workflow.relocate) as something that rich prints."""
+    """A relocation (see tolcontact.analyses.relocate) as something that rich prints."""
     return Group(*_sections(found))
 
 

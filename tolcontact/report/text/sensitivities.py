@@ -17,7 +17,7 @@ SMALL = 1e-3  # of the largest derivative of a measure: smaller ones are counted
 
 
 def sensitivities_text(found: xr.Dataset) -> Group:
-    """Sensitivities (see tolcontact.workflow.sensitivities) as something that rich prints."""
+    """Sensitivities (see tolcontact.analyses.sensitivities) as something that rich prints."""
     return Group(*_sections(found))
 
 

@@ -13,7 +13,7 @@ TAIL_COLUMNS = ("", "ppm")
 
 
 def tails_text(found: xr.Dataset) -> Group:
-    """Rare events (see tolcontact.workflow.tails) as something that rich prints."""
+    """Rare events (see tolcontact.analyses.tails) as something that rich prints."""
     return Group(*_sections(found))
 
 

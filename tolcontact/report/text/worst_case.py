@@ -17,7 +17,7 @@ UNSURE = 0.1  # from this share of unseen starts on, it is said that there may b
 
 
 def worst_case_text(found: xr.Dataset) -> Group:
-    """Worst cases (see tolcontact.workflow.worst_case) as something that rich prints."""
+    """Worst cases (see tolcontact.analyses.worst_case) as something that rich prints."""
     return Group(*_sections(found))
 
 

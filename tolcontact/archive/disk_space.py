@@ -1,0 +1,68 @@
+"""Room for the rows of an archive: on the disk, and in the file."""
+
+import shutil
+from collections.abc import Sequence
+from math import prod
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+
+from tolcontact import vocabulary as terms
+from tolcontact.archive.header import kept_rows, sizes_of_rows
+from tolcontact.archive.variables import rows_together
+from tolcontact.discretization import Nominal
+from tolcontact.errors import ArchiveError
+from tolcontact.vocabulary import Variable
+
+AT_ONCE = 8  # chunks that are laid out at once
+
+
+def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: int) -> None:
+    """Raise ArchiveError if the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
+    needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
+    if needed > free:
+        less = ", or keep less of each realization (measures)" if terms.ROTATION in rows else ""
+        raise ArchiveError(
+            f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
+            f"{size_in_words(free)} free; ask for fewer, write to another disk{less}"
+        )
+
+
+def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
+    """How many bytes `samples` realizations take in an archive that keeps what `keep` names."""
+    return samples * bytes_of_row(nominal, kept_rows(keep))
+
+
+def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
+    """How many bytes a realization takes."""
+    sizes = {terms.REALIZATION: 1, **sizes_of_rows(nominal)}
+    return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (terms.NUMBERS, *rows))
+
+
+def size_in_words(count: float) -> str:
+    """A number of bytes for people: 1.5 GB."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if count < 1000:
+            return f"{count:.3g} {unit}"
+        count /= 1000
+    return f"{count:.3g} TB"
+
+
+def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
+    """Lay out rows `start` to `stop`: numbered, unfinished, and with their place in the file."""
+    for variable in terms.BY_REALIZATION:
+        stored = (file["sample"] if variable is terms.DEVIATION else file).variables.get(variable.name)
+        if stored is not None and 0 not in stored.shape[1:]:
+            nothing = np.nan if np.dtype(variable.kind).kind == "f" else terms.UNFINISHED
+            stored.set_var_chunk_cache(0)  # whole chunks go straight to the file
+            together = AT_ONCE * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
+            piece = np.full((together, *stored.shape[1:]), nothing, dtype=variable.kind)
+            for first in range(start, stop, together):
+                last = min(first + together, stop)
+                stored[first:last] = piece[: last - first]
+    file[terms.REALIZATION][start:stop] = np.arange(start, stop)
+    sums = file[terms.ROW_CHECKSUM.name]
+    blocks = slice(len(sums), -(-stop // int(file.block_rows)))
+    if blocks.stop > blocks.start:
+        sums[blocks] = np.full((blocks.stop - blocks.start, sums.shape[1]), terms.UNFINISHED)

@@ -1,0 +1,82 @@
+"""An archive that has room for all its values: they are overwritten in place, past the netCDF library.
+
+The library takes as long to write a block as contact takes to resolve it, must not be called by two threads at once, and
+locks the file against readers. All that it knows and a writer needs is where the bytes of a variable lie.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from tolcontact import vocabulary as terms
+from tolcontact.checksums import crc32
+from tolcontact.vocabulary import Variable
+
+
+class Place(NamedTuple):
+    """Where the values of a variable lie: chunks of `rows` rows (along the first dimension), each at its offset."""
+
+    kind: np.dtype
+    rows: int
+    offsets: list[int]
+
+
+class LaidOut:
+    """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
+
+    def __init__(self, path: Path) -> None:
+        """Raises OSError if the file cannot be read and written."""
+        self._places: dict[str, Place] = {}
+        with h5py.File(path, "r", locking=False) as file:
+            file.visititems(self._find)
+        self._file = path.open("r+b", buffering=0)
+
+    def _find(self, name: str, found: h5py.Group | h5py.Dataset) -> None:
+        if not isinstance(found, h5py.Dataset):
+            return
+        if found.chunks is None:
+            offset = found.id.get_offset()
+            self._places[name] = Place(found.dtype, max((1, *found.shape[:1])), [] if offset is None else [offset])
+            return
+        chunks: list[tuple[int, int]] = []
+        found.id.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
+        self._places[name] = Place(found.dtype, found.chunks[0], [offset for _, offset in sorted(chunks)])
+
+    def close(self) -> None:
+        self._file.close()
+
+    def has(self, group: str, variable: Variable) -> bool:
+        return f"{group}/{variable.name}".lstrip("/") in self._places
+
+    def overwrite(self, group: str, variable: Variable, rows: Any, first: int = 0) -> None:
+        """Overwrite some rows, from `first` on, of a variable in the group of that path."""
+        kind, together, offsets = self._places[f"{group}/{variable.name}".lstrip("/")]
+        values = np.atleast_1d(np.ascontiguousarray(rows, dtype=kind))
+        width, done = values.nbytes // max(len(values), 1), 0
+        data = values.reshape(-1).view(np.uint8).data
+        while width and done < len(values):
+            chunk, inside = divmod(first + done, together)
+            count = min(together - inside, len(values) - done)
+            self._write(offsets[chunk] + inside * width, data[done * width : (done + count) * width])
+            done += count
+
+    def _write(self, offset: int, data: memoryview) -> None:
+        self._file.seek(offset)
+        while data:  # the system may take less than all, and then says why
+            data = data[self._file.write(data) :]
+
+    def overwrite_together(self, values: Mapping[str, Mapping[Variable, Any]]) -> None:
+        """Overwrite what the checksums of some groups are of; `values` by their paths. A run killed meanwhile leaves -1."""
+        for group in values:
+            self.overwrite(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
+        for group, of_group in values.items():
+            for variable, of_all in of_group.items():
+                self.overwrite(group, variable, of_all)
+        for group, of_group in values.items():
+            found = 0
+            for variable, of_all in of_group.items():
+                found = crc32(variable, of_all, found)
+            self.overwrite(group, terms.GROUP_CHECKSUM, found)

@@ -1,0 +1,52 @@
+"""A block of realizations as it will be stored: by whoever simulated it, so that the writer only writes."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact import vocabulary as terms
+from tolcontact.checksums import crc32
+from tolcontact.simulation import Block
+
+
+class StoredBlock(NamedTuple):
+    """Realizations `start` to `stop`: the values of each variable that is kept, by name, and their checksums."""
+
+    start: int
+    stop: int
+    values: dict[str, np.ndarray]
+    checksums: list[int]
+
+
+def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
+    """A block, converted once for the file and for its checksums; `kept` are names of variables."""
+    values = row_values(block, kept)
+    checksums = [crc32(variable, values[variable.name]) for variable in terms.BY_REALIZATION if variable.name in values]
+    return StoredBlock(block.start, block.start + len(block), values, checksums)
+
+
+def row_values(block: Block, kept: Sequence[str]) -> dict[str, np.ndarray]:
+    """The values of variables, by their names, as they are stored."""
+    found = {
+        terms.MEASURED: block.measured,
+        terms.GAP_MIN: block.gap_min,
+        terms.ACTIVE: block.active,
+        terms.CARRYING: block.carrying,
+        terms.REACTION: block.reaction,
+        terms.KKT_RESIDUAL: block.kkt_residual,
+        terms.ITERATIONS: block.iterations,
+        terms.STARTS: block.starts,
+        terms.SECOND_ANSWERS: block.second_answers,
+        terms.SEARCHED: block.searched,
+        terms.DEVIATION: block.deviations,
+        terms.STATUS: block.status,
+    }
+    if terms.ROTATION.name in kept:
+        found |= {terms.ROTATION: pose.rotation(block.poses), terms.TRANSLATION: pose.translation(block.poses)}
+    return {
+        variable.name: np.ascontiguousarray(found[variable], dtype=variable.kind)
+        for variable in terms.BY_REALIZATION
+        if variable.name in kept
+    }

@@ -1,0 +1,21 @@
+"""Geometry: shapes, their surfaces and faces, and the files they come from. Part's own frame, mm."""
+
+from tolcontact.geometry.analytic_surfaces import form_arrays, forms_of
+from tolcontact.geometry.brep_face import FaceInFile
+from tolcontact.geometry.part_preview import SeenPart, seen
+from tolcontact.geometry.step_listing import BodyInFile, bodies_in, faces_in, parts_from
+from tolcontact.geometry.surface_recognition import known_surfaces, with_known_surfaces
+
+__all__ = [
+    "BodyInFile",
+    "FaceInFile",
+    "SeenPart",
+    "bodies_in",
+    "faces_in",
+    "form_arrays",
+    "forms_of",
+    "known_surfaces",
+    "parts_from",
+    "seen",
+    "with_known_surfaces",
+]

@@ -1,0 +1,120 @@
+"""What is drawn besides the bodies, in the nominal assembly frame [mm]: locators, contact points, measures, forces."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from tolcontact import vocabulary as terms
+from tolcontact.declaration import Point
+from tolcontact.discretization import ContactPoints, Nominal
+
+Mark = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Marks:
+    """Each by its name.
+
+    locators   at (3,), along (3,)
+    contacts   part (its number), points (point, 3), gaps (point,), None where only an archive is known
+    measures   points (point, 3), along (3,), or None
+    features   at (3,), where the face of a feature that contact or a locator is on turns about
+    forces     at (3,), or None where only the geometry knows it, along (3,)
+    """
+
+    locators: list[Mark]
+    contacts: list[Mark]
+    measures: list[Mark]
+    features: list[Mark]
+    forces: list[Mark]
+
+
+def marks_of(results: xr.DataTree) -> Marks:
+    """Those of an archive; what it does not have is left out."""
+    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+    forces = [{"name": each["name"], "at": _at(document, each["at"]), "along": each["vector"]} for each in document["forces"]]
+    return Marks(_locators(results), list(_contacts(results)), list(_measures(document)), _features(results), forces)
+
+
+def marks_of_nominal(nominal: Nominal) -> Marks:
+    """Those of a model before any run."""
+    locators = zip(nominal.locators.labels, nominal.locators.points, nominal.locators.directions, strict=True)
+    contacts = []
+    for pair in nominal.pairs:
+        points, gaps = fixed_points(pair)
+        contacts.append({"name": pair.name, "part": pair.moving, "points": points, "gaps": gaps})
+    return Marks(
+        [{"name": name, "at": at.tolist(), "along": along.tolist()} for name, at, along in locators],
+        contacts,
+        [
+            {"name": measure.name, "points": [_position(nominal, point) for point in measure.points], "along": measure.along}
+            for measure in nominal.measures
+            if measure.points
+        ],
+        [{"name": face.name, "at": face.centre.tolist()} for face in nominal.faces],
+        [
+            {"name": force.name, "at": _position(nominal, force.at), "along": list(force.vector)}
+            for force in nominal.assembly.forces
+        ],
+    )
+
+
+def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
+    """Contact points (point, 3) and gaps (point,) [mm]; the nearest tangent of a hollow wall, which moves, is left out."""
+    stays = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
+    return pair.P_m[stays], ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1)[stays]
+
+
+def _locators(results: xr.DataTree) -> list[Mark]:
+    sample = results["sample"].to_dataset()
+    if terms.LOCATOR_POINT.name not in sample:
+        return []
+    points, directions = sample[terms.LOCATOR_POINT.name].values, sample[terms.LOCATOR_DIRECTION.name].values
+    return [
+        {"name": str(name), "at": at.tolist(), "along": along.tolist()}
+        for name, at, along in zip(sample[terms.LOCATOR].values, points, directions, strict=True)
+    ]
+
+
+def _contacts(results: xr.DataTree) -> Iterator[Mark]:
+    contact = results["contact"].to_dataset()
+    if terms.MOVING_POINT.name not in contact:
+        return
+    points, pair_of_point = contact[terms.MOVING_POINT.name].values, contact[terms.PAIR_OF_POINT.name].values
+    for number, name in enumerate(results.to_dataset()[terms.PAIR].values):
+        moving = int(contact[terms.MOVING_PART.name].values[number])
+        yield {"name": str(name), "part": moving, "points": points[pair_of_point == number], "gaps": None}
+
+
+def _features(results: xr.DataTree) -> list[Mark]:
+    contact = results["contact"].to_dataset()
+    if terms.FACE_CENTRE.name not in contact:
+        return []
+    named = zip(contact[terms.FEATURE_OF_FACE.name].values, contact[terms.FACE_CENTRE.name].values, strict=True)
+    return [{"name": str(name), "at": at.tolist()} for name, at in named]
+
+
+def _measures(document: Mark) -> Iterator[Mark]:
+    for measure in document["measures"]:
+        ends = [_at(document, measure[word]) for word in ("of", "to") if word in measure]
+        known = [end for end in ends if end is not None]
+        if known:
+            yield {"name": measure["name"], "points": known, "along": measure["along"]}
+
+
+def _at(document: Mark, point: Mark) -> list[float] | None:
+    """Where a declared point is in the nominal assembly; None of an axis's end, which is the geometry's."""
+    if "position" not in point:
+        return None
+    part = next(each for each in document["parts"] if each["name"] == point["part"])
+    R = Rotation.from_rotvec(part["rotation"]).as_matrix()
+    return [float(x) for x in R @ point["position"] + part["at"]]
+
+
+def _position(nominal: Nominal, point: Point) -> list[float]:
+    return [float(x) for x in nominal.position(point)]
