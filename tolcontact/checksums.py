@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 from isal import isal_zlib
 
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 
-def crc32(variable: Variable, values: Any, after: int = 0) -> int:
+def crc32(variable: ArchiveVariable, values: Any, after: int = 0) -> int:
     """CRC-32 of the values of a variable, `after` that of others before them.
 
     Numbers are taken as little-endian bytes of the variable's kind, texts as UTF-8 with a zero byte behind each.

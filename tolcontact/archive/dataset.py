@@ -10,10 +10,10 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.archive.header import labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 
-def labelled(program: Program, values: Mapping[Variable, Any], attributes: Mapping[str, Any]) -> xr.Dataset:
+def labelled(program: Program, values: Mapping[ArchiveVariable, Any], attributes: Mapping[str, Any]) -> xr.Dataset:
     """Variables of realizations from arrays of any kind, with the labels and attributes that an archive gives them."""
     texts = {**labels_of_rows(program.nominal), terms.CONTRIBUTOR: program.nominal.contributors}
     labels: dict[str, Any] = {name: np.array(list(own), dtype=object) for name, own in texts.items()}  # text of any length
@@ -25,7 +25,7 @@ def labelled(program: Program, values: Mapping[Variable, Any], attributes: Mappi
     )
 
 
-def _attributes(variable: Variable, program: Program) -> dict[str, Any]:
+def _attributes(variable: ArchiveVariable, program: Program) -> dict[str, Any]:
     attributes = variable.all_attributes
     if "flag_values" in attributes:
         attributes["flag_values"] = np.array(attributes["flag_values"], dtype=variable.kind)

@@ -13,12 +13,12 @@ from tolcontact.archive.header import kept_rows, sizes_of_rows
 from tolcontact.archive.variables import rows_together
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 AT_ONCE = 8  # chunks that are laid out at once
 
 
-def check_room(path: Path, nominal: Nominal, rows: Sequence[Variable], samples: int) -> None:
+def check_room(path: Path, nominal: Nominal, rows: Sequence[ArchiveVariable], samples: int) -> None:
     """Raise ArchiveError if the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
     needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
     if needed > free:
@@ -34,7 +34,7 @@ def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
     return samples * bytes_of_row(nominal, kept_rows(keep))
 
 
-def bytes_of_row(nominal: Nominal, rows: Sequence[Variable]) -> int:
+def bytes_of_row(nominal: Nominal, rows: Sequence[ArchiveVariable]) -> int:
     """How many bytes a realization takes."""
     sizes = {terms.REALIZATION: 1, **sizes_of_rows(nominal)}
     return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (terms.NUMBERS, *rows))

@@ -20,7 +20,7 @@ from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry import form_arrays, known_surfaces
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 _LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
 
@@ -144,7 +144,7 @@ def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
     }
 
 
-def units_of_rows(program: Program) -> dict[Variable, str]:
+def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
     """Units that depend on the model; those of measures are "1" if they differ."""
     units = {measure.units for measure in program.nominal.measures} or {"mm"}
     return {
@@ -153,7 +153,7 @@ def units_of_rows(program: Program) -> dict[Variable, str]:
     }
 
 
-def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[Variable]) -> None:
+def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveVariable]) -> None:
     """The variables of realizations, their checksums, and the places of checkpoints; all without values yet."""
     for variable in terms.ROWS:
         if variable in rows:
@@ -202,13 +202,13 @@ def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
 
 
-def kept_rows(kept: str) -> tuple[Variable, ...]:
+def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
     """What is archived of each realization."""
-    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[Variable]()}
+    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
     return tuple(variable for variable in terms.BY_REALIZATION if variable not in left_out[kept])
 
 
-def no_field(vertices: int) -> dict[Variable, Any]:
+def no_field(vertices: int) -> dict[ArchiveVariable, Any]:
     """What the group of a part holds before its field was written."""
     states = len(terms.STATES)
     return {
@@ -219,7 +219,7 @@ def no_field(vertices: int) -> dict[Variable, Any]:
     }
 
 
-def nothing_touching(points: int) -> dict[Variable, Any]:
+def nothing_touching(points: int) -> dict[ArchiveVariable, Any]:
     """What the group of contact points holds of how often they touch, before that was looked at."""
     return {
         terms.TOUCHING_SHARE: np.full(points, np.nan),
@@ -228,7 +228,7 @@ def nothing_touching(points: int) -> dict[Variable, Any]:
     }
 
 
-def _lay_out_together(group: netCDF4.Group, values: Mapping[Variable, Any]) -> None:
+def _lay_out_together(group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
     for variable, nothing in values.items():
         lay_out(group, variable, nothing)
     lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
@@ -254,7 +254,7 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
                     write(mesh, terms.NAME_OF_BREP_FACE, known[2])
 
 
-def _write_forms(group: netCDF4.Group, variables: Mapping[str, Variable], arrays: Mapping[str, np.ndarray]) -> None:
+def _write_forms(group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]) -> None:
     for name, variable in variables.items():
         write(group, variable, arrays[name])
 
@@ -275,7 +275,7 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
         write(group, variable, values)
 
 
-def contact_values(nominal: Nominal) -> dict[Variable, Any]:
+def contact_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     """What the group `contact` holds: which parts touch, and where."""
     pairs = nominal.pairs
     parts = {
@@ -295,7 +295,7 @@ def contact_values(nominal: Nominal) -> dict[Variable, Any]:
     return values | _round_values(nominal) | _face_values(nominal)
 
 
-def _face_values(nominal: Nominal) -> dict[Variable, Any]:
+def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     """How the faces of features deviate, and which sides of pairs they are."""
     faces, count = nominal.faces, len(nominal.contributors)
     if not faces:
@@ -319,7 +319,7 @@ def _face_values(nominal: Nominal) -> dict[Variable, Any]:
     }
 
 
-def _round_values(nominal: Nominal) -> dict[Variable, Any]:
+def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     """What says where round faces touch, at any pose."""
     first = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
     known = [(first[k] + np.arange(len(pair.round)), pair.round) for k, pair in enumerate(nominal.pairs) if pair.round]

@@ -19,7 +19,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_memory, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 SECONDS, SECONDS_PER_GB = 20.0, 20.0
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -191,7 +191,7 @@ def _check_archive(file: netCDF4.Dataset) -> None:
     _check_needed(file)
 
 
-def _check_variable(group: netCDF4.Dataset, variable: Variable) -> None:
+def _check_variable(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
     if variable.name not in group.variables:
         return
     stored, where = group[variable.name], f"{group.path.rstrip('/')}/{variable.name}"
@@ -232,13 +232,13 @@ def _check_needed(file: netCDF4.Dataset) -> None:
         _need(file["field"][name], OF_FIELD)
 
 
-def _need(group: netCDF4.Dataset, needed: tuple[Variable, ...]) -> None:
+def _need(group: netCDF4.Dataset, needed: tuple[ArchiveVariable, ...]) -> None:
     missing = [variable.name for variable in needed if variable.name not in group.variables]
     if missing:
         raise DamagedError(f"is damaged: group {group.path} has no {', '.join(missing)}")
 
 
-def _need_together(group: netCDF4.Dataset, variables: tuple[Variable, ...]) -> None:
+def _need_together(group: netCDF4.Dataset, variables: tuple[ArchiveVariable, ...]) -> None:
     """Variables that a group has all of, or none; the second of them are kinds of surfaces."""
     if any(variable.name in group.variables for variable in variables):
         _need(group, variables)
@@ -279,7 +279,7 @@ def _check_sums(group: netCDF4.Dataset) -> None:
             raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
 
 
-def _values(stored: netCDF4.Variable, variable: Variable) -> Any:
+def _values(stored: netCDF4.Variable, variable: ArchiveVariable) -> Any:
     return _texts(stored) if variable.kind is str else np.ma.getdata(stored[...])
 
 

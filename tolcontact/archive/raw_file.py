@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 
 class Place(NamedTuple):
@@ -48,10 +48,10 @@ class LaidOut:
     def close(self) -> None:
         self._file.close()
 
-    def has(self, group: str, variable: Variable) -> bool:
+    def has(self, group: str, variable: ArchiveVariable) -> bool:
         return f"{group}/{variable.name}".lstrip("/") in self._places
 
-    def overwrite(self, group: str, variable: Variable, rows: Any, first: int = 0) -> None:
+    def overwrite(self, group: str, variable: ArchiveVariable, rows: Any, first: int = 0) -> None:
         """Overwrite some rows, from `first` on, of a variable in the group of that path."""
         kind, together, offsets = self._places[f"{group}/{variable.name}".lstrip("/")]
         values = np.atleast_1d(np.ascontiguousarray(rows, dtype=kind))
@@ -68,7 +68,7 @@ class LaidOut:
         while data:  # the system may take less than all, and then says why
             data = data[self._file.write(data) :]
 
-    def overwrite_together(self, values: Mapping[str, Mapping[Variable, Any]]) -> None:
+    def overwrite_together(self, values: Mapping[str, Mapping[ArchiveVariable, Any]]) -> None:
         """Overwrite what the checksums of some groups are of; `values` by their paths. A run killed meanwhile leaves -1."""
         for group in values:
             self.overwrite(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)

@@ -9,7 +9,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import finished
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 
 def check_rows(results: xr.DataTree) -> None:
@@ -50,7 +50,7 @@ def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tu
             yield from ((variable.name, int(block)) for block in wrong[:1])
 
 
-def _checksums(variable: Variable, values: xr.DataArray, rows: int) -> np.ndarray:
+def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
     """Checksums (block,) of the values of a variable in blocks of so many `rows`."""
     found, at_once = [], -(-terms.PIECE_ROWS // rows) * rows
     for first in range(0, len(values), at_once):

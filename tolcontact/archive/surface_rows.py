@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact import vocabulary as terms
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
@@ -65,7 +65,7 @@ def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None
     return pose.pose(R, t)
 
 
-def nothing_checked(count: int, pairs: int) -> dict[Variable, np.ndarray]:
+def nothing_checked(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
     """What the group holds before anything was checked."""
     return {
         terms.CHECKED_REALIZATION: np.full(count, terms.UNFINISHED),

@@ -8,14 +8,14 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
-from tolcontact.vocabulary import Variable
+from tolcontact.vocabulary import ArchiveVariable
 
 CHUNK = 1 << 22  # bytes: more would not stay in the library's cache
 LEAST_ROWS = 16
 BLOCK_CHUNK = 256
 
 
-def define(group: netCDF4.Dataset, variable: Variable) -> None:
+def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
     """A variable of numbers, without values yet."""
     options: dict[str, Any] = {}
     if {terms.REALIZATION, terms.BLOCK} & set(variable.dims):
@@ -46,7 +46,7 @@ def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
     return _dimension(group.parent, name)
 
 
-def write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+def write(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
     """A variable with its values, which stay as they are, and their checksum; in a group that has the dimensions."""
     if variable.kind is str:
         _write_text(group, variable, values)
@@ -55,14 +55,14 @@ def write(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
     group[variable.name].setncattr(terms.CHECKSUM, np.int64(crc32(variable, values)))
 
 
-def lay_out(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+def lay_out(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
     """A variable of numbers whose values will be overwritten."""
     define(group, variable)
     if np.size(values):
         group[variable.name][...] = values
 
 
-def _write_text(group: netCDF4.Dataset, variable: Variable, values: Any) -> None:
+def _write_text(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
     """Text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
     text = np.char.encode(np.array(values, dtype=str), "utf-8")
     length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))

@@ -155,7 +155,7 @@ class ArchiveWriter:
             self._place = place  # not before: one that is interrupted is written again, the other one stays
         self._since = time.monotonic()
 
-    def write_fields(self, fields: Sequence[dict[terms.Variable, Any]]) -> None:
+    def write_fields(self, fields: Sequence[dict[terms.ArchiveVariable, Any]]) -> None:
         """Displacement fields: for each part the values of `FIELDS`."""
         with _refusals_told(self._path):
             self._values.overwrite_together(
@@ -211,7 +211,7 @@ def _refusals_told(path: Path) -> Iterator[None]:
         raise ArchiveError(f'archive "{path}" cannot be written: {reason}') from error
 
 
-def _group_of(variable: terms.Variable) -> str:
+def _group_of(variable: terms.ArchiveVariable) -> str:
     """The path of the group that holds a variable of realizations."""
     return "sample" if variable is terms.DEVIATION else ""
 

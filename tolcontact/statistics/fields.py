@@ -15,7 +15,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.statistics import intervals, kernel
-from tolcontact.vocabulary import CORRECTED, RAW, Variable
+from tolcontact.vocabulary import CORRECTED, RAW, ArchiveVariable
 
 NEAR = 64  # realizations whose mean magnitude is near enough to that of all
 # "Some" realizations for magnitudes: more for parts with few points, and as many points in all as take a tenth of a second.
@@ -117,7 +117,7 @@ class DisplacementFields:
             for one, other in zip(own, others, strict=True):
                 one.merge(other)
 
-    def fields(self) -> list[dict[Variable, Any]]:
+    def fields(self) -> list[dict[ArchiveVariable, Any]]:
         """The field of each part, of what was merged: the values of `FIELDS`."""
         return [part.field([sums[0], sums[-1]]) for part, sums in zip(self._parts, self._sums, strict=True)]
 
@@ -163,7 +163,7 @@ class _Surface:
         ):
             moment[:] = value
 
-    def field(self, states: Sequence[FieldSums]) -> dict[Variable, Any]:
+    def field(self, states: Sequence[FieldSums]) -> dict[ArchiveVariable, Any]:
         """The field, from the sums of each state."""
         found = [self._of_state(sums) for sums in states]
         kinds = (terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)

@@ -12,6 +12,6 @@ from tolcontact.vocabulary.sensitivities import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surfaces import *  # noqa: F403
 from tolcontact.vocabulary.tails import *  # noqa: F403
-from tolcontact.vocabulary.variable import Variable as Variable
+from tolcontact.vocabulary.variable import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.variation import *  # noqa: F403
 from tolcontact.vocabulary.worst_case import *  # noqa: F403

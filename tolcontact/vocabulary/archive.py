@@ -24,10 +24,10 @@ from tolcontact.vocabulary.labels import (
     UNFINISHED,
     VERTEX,
 )
-from tolcontact.vocabulary.variable import Variable, label
+from tolcontact.vocabulary.variable import ArchiveVariable, label
 from tolcontact.vocabulary.variation import DEVIATION
 
-NUMBERS = Variable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
+NUMBERS = ArchiveVariable(REALIZATION, (REALIZATION,), "i8", "number of the realization", "1", {"standard_name": "realization"})
 COORDINATES = (
     NUMBERS,
     label(STATE, "state: raw as located, corrected after contact"),
@@ -38,48 +38,50 @@ COORDINATES = (
     label(BODY_AXIS, "axis of the part's nominal orientation"),
 )
 
-MEASURED = Variable(
+MEASURED = ArchiveVariable(
     "measured",
     (REALIZATION, STATE, MEASURE),
     "f8",
     "value of a measure: displacement of a point, distance of two points, or the user's expression",
     "mm",
 )
-TRANSLATION = Variable(
+TRANSLATION = ArchiveVariable(
     "translation",
     (REALIZATION, STATE, PART, AXIS),
     "f8",
     "t of the pose x = R x0 + t, x0 in the nominal assembly frame",
     "mm",
 )
-ROTATION = Variable(
+ROTATION = ArchiveVariable(
     "rotation",
     (REALIZATION, STATE, PART, AXIS, BODY_AXIS),
     "f8",
     "R of the pose x = R x0 + t; rows are assembly axes",
     "1",
 )
-GAP_MIN = Variable(
+GAP_MIN = ArchiveVariable(
     "gap_min",
     (REALIZATION, STATE, PAIR),
     "f8",
     "smallest gap of all contact points of a pair; negative: penetration",
     "mm",
 )
-ACTIVE = Variable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
-CARRYING = Variable("carrying", (REALIZATION, PAIR), "i4", "number of contact points under load in the corrected state", "1")
-REACTION = Variable("reaction", (REALIZATION, PAIR), "f8", "sum of the reactions of the contact points of a pair")
-KKT_RESIDUAL = Variable(
+ACTIVE = ArchiveVariable("active", (REALIZATION, PAIR), "i4", "number of active contact points in the raw state", "1")
+CARRYING = ArchiveVariable(
+    "carrying", (REALIZATION, PAIR), "i4", "number of contact points under load in the corrected state", "1"
+)
+REACTION = ArchiveVariable("reaction", (REALIZATION, PAIR), "f8", "sum of the reactions of the contact points of a pair")
+KKT_RESIDUAL = ArchiveVariable(
     "kkt_residual",
     (REALIZATION,),
     "f8",
     "largest residual of the optimality conditions of the contact problem; in an exact resolution also its last step",
     "mm",
 )
-ITERATIONS = Variable("iterations", (REALIZATION,), "i4", "number of linear steps that the contact problem took", "1")
-STARTS = Variable("starts", (REALIZATION,), "i1", "number of places that the steps were started from", "1")
-SECOND_ANSWERS = Variable("second_answers", (REALIZATION,), "i4", "number of QPs that another solver had to answer", "1")
-SEARCHED = Variable(
+ITERATIONS = ArchiveVariable("iterations", (REALIZATION,), "i4", "number of linear steps that the contact problem took", "1")
+STARTS = ArchiveVariable("starts", (REALIZATION,), "i1", "number of places that the steps were started from", "1")
+SECOND_ANSWERS = ArchiveVariable("second_answers", (REALIZATION,), "i4", "number of QPs that another solver had to answer", "1")
+SEARCHED = ArchiveVariable(
     "searched",
     (REALIZATION,),
     "i1",
@@ -87,7 +89,7 @@ SEARCHED = Variable(
     "0: it refers to the archived ones",
     "1",
 )
-STATUS = Variable(
+STATUS = ArchiveVariable(
     "status",
     (REALIZATION,),
     "i1",
@@ -118,7 +120,7 @@ ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not hav
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
-ROW_CHECKSUM = Variable(
+ROW_CHECKSUM = ArchiveVariable(
     "row_checksum",
     (BLOCK, ROW_VARIABLE),
     "i8",
@@ -127,40 +129,44 @@ ROW_CHECKSUM = Variable(
     "1",
 )
 
-MEASURE_NOMINAL = Variable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
-MEASURE_TOLERANCE = Variable(
+MEASURE_NOMINAL = ArchiveVariable("measure_nominal", (MEASURE,), "f8", "value of the measure in the nominal assembly")
+MEASURE_TOLERANCE = ArchiveVariable(
     "measure_tolerance",
     (MEASURE,),
     "f8",
     "full width of the allowed zone; NaN if it is open",
 )
-LOWER_LIMIT = Variable("measure_lower_limit", (MEASURE,), "f8", "least allowed value of the measure; NaN if that side is open")
-UPPER_LIMIT = Variable(
+LOWER_LIMIT = ArchiveVariable(
+    "measure_lower_limit", (MEASURE,), "f8", "least allowed value of the measure; NaN if that side is open"
+)
+UPPER_LIMIT = ArchiveVariable(
     "measure_upper_limit", (MEASURE,), "f8", "largest allowed value of the measure; NaN if that side is open"
 )
-QUANTITY = Variable(
+QUANTITY = ArchiveVariable(
     "measure_quantity",
     (MEASURE,),
     str,
     "what a measure is the value of: displacement, coordinate, distance, deviation of distance, or expression of the poses",
 )
 LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # that archives before format 4 do not have
-MEASURE_UNITS = Variable("measure_units", (MEASURE,), str, "units of the measure")
+MEASURE_UNITS = ArchiveVariable("measure_units", (MEASURE,), str, "units of the measure")
 
-DECLARATION = Variable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
-MESH_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "vertices of a mesh in its part's own frame", "mm")
-MESH_FACES = Variable("faces", (FACE, CORNER), "i4", "vertex numbers of each triangle, counted from 0")
+DECLARATION = ArchiveVariable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
+MESH_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "vertices of a mesh in its part's own frame", "mm")
+MESH_FACES = ArchiveVariable("faces", (FACE, CORNER), "i4", "vertex numbers of each triangle, counted from 0")
 
-PAIR_OF_POINT = Variable("pair_of_point", (POINT,), "i4", "number of the pair of each contact point, counted from 0")
-MOVING_PART = Variable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
-REFERENCE_PART = Variable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, -1: the ground")
-MOVING_POINT = Variable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
-REFERENCE_POINT = Variable("reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm")
-REFERENCE_NORMAL = Variable(
+PAIR_OF_POINT = ArchiveVariable("pair_of_point", (POINT,), "i4", "number of the pair of each contact point, counted from 0")
+MOVING_PART = ArchiveVariable("moving_part", (PAIR,), "i4", "number of the moving part of each pair, counted from 0")
+REFERENCE_PART = ArchiveVariable("reference_part", (PAIR,), "i4", "number of the reference part of each pair, -1: the ground")
+MOVING_POINT = ArchiveVariable("moving_point", (POINT, AXIS), "f8", "P^m: contact point of the moving part, nominal", "mm")
+REFERENCE_POINT = ArchiveVariable(
+    "reference_point", (POINT, AXIS), "f8", "P^r: its projection on the reference part, nominal", "mm"
+)
+REFERENCE_NORMAL = ArchiveVariable(
     "reference_normal", (POINT, AXIS), "f8", "n^r: outward unit normal of the reference part there, nominal", "1"
 )
 
-LOCATOR_OF_POINT = Variable(
+LOCATOR_OF_POINT = ArchiveVariable(
     "locator_of_point",
     (POINT,),
     "i4",
@@ -168,10 +174,10 @@ LOCATOR_OF_POINT = Variable(
 )
 
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
-FIELD_VERTICES = Variable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
+FIELD_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
 FIELD_FACES = MESH_FACES
-FIELD_MEAN = Variable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
-FIELD_SIX_SIGMA = Variable(
+FIELD_MEAN = ArchiveVariable("mean", (STATE, VERTEX, COMPONENT), "f8", "mean displacement of a surface point", "mm")
+FIELD_SIX_SIGMA = ArchiveVariable(
     "six_sigma",
     (STATE, VERTEX, COMPONENT),
     "f8",
@@ -179,15 +185,15 @@ FIELD_SIX_SIGMA = Variable(
     "mm",
 )
 BOUND_LABEL = label(BOUND, "bound of a 95 % confidence interval")
-FIELD_INTERVAL = Variable(
+FIELD_INTERVAL = ArchiveVariable(
     "magnitude_six_sigma_interval",
     (STATE, VERTEX, BOUND),
     "f8",
     "95 % confidence interval of six standard deviations of the displacement magnitude",
     "mm",
 )
-FIELD_REALIZATIONS = Variable("realizations", (), "i8", "number of realizations that the displacement field covers", "1")
-MAGNITUDE_REALIZATIONS = Variable(
+FIELD_REALIZATIONS = ArchiveVariable("realizations", (), "i8", "number of realizations that the displacement field covers", "1")
+MAGNITUDE_REALIZATIONS = ArchiveVariable(
     "magnitude_realizations",
     (),
     "i8",
@@ -195,10 +201,10 @@ MAGNITUDE_REALIZATIONS = Variable(
     "1",
 )
 FIELDS = (FIELD_MEAN, FIELD_SIX_SIGMA, FIELD_INTERVAL, FIELD_REALIZATIONS, MAGNITUDE_REALIZATIONS)
-CHECKED_REALIZATION = Variable(
+CHECKED_REALIZATION = ArchiveVariable(
     "realization_checked", (CHECKED,), "i8", "number of a realization that was checked; -1: none", "1"
 )
-SURFACE_PENETRATION = Variable(
+SURFACE_PENETRATION = ArchiveVariable(
     "surface_penetration",
     (CHECKED, PAIR),
     "f8",
@@ -206,7 +212,7 @@ SURFACE_PENETRATION = Variable(
     "NaN: one-sided locators, which have no faces",
     "mm",
 )
-BESIDE = Variable(
+BESIDE = ArchiveVariable(
     "beside",
     (CHECKED, PAIR),
     "f8",
@@ -214,34 +220,36 @@ BESIDE = Variable(
     "mm",
 )
 SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE)
-TOUCHING_SHARE = Variable(
+TOUCHING_SHARE = ArchiveVariable(
     "touching",
     (POINT,),
     "f8",
     "share of realizations in which a contact point touches in the corrected state, gap below 1e-4 mm; NaN: not known",
     "1",
 )
-TOUCHING_INTERVAL = Variable("touching_interval", (POINT, BOUND), "f8", "its 95 % confidence interval", "1")
-TOUCHING_REALIZATIONS = Variable(
+TOUCHING_INTERVAL = ArchiveVariable("touching_interval", (POINT, BOUND), "f8", "its 95 % confidence interval", "1")
+TOUCHING_REALIZATIONS = ArchiveVariable(
     "touching_realizations", (), "i8", "number of realizations, of the first ones, that this share is of", "1"
 )
 TOUCHING = (TOUCHING_SHARE, TOUCHING_INTERVAL, TOUCHING_REALIZATIONS)
-GROUP_CHECKSUM = Variable(
+GROUP_CHECKSUM = ArchiveVariable(
     "checksum",
     (),
     "i8",
     "CRC-32 of the variables of this group that may be overwritten, in their order; -1: being written",
     "1",
 )
-SUMMED_ROWS = Variable("summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1")
-FIELD_SUMS = Variable(
+SUMMED_ROWS = ArchiveVariable(
+    "summed_rows", (CHECKPOINT,), "i8", "number of realizations in the sums of a checkpoint; -1: none", "1"
+)
+FIELD_SUMS = ArchiveVariable(
     "sums",
     (CHECKPOINT, STATE, NUMBER),
     "f8",
     "running sums of the displacement field, from which an unfinished run continues",
     "1",
 )
-SUMS_CHECKSUM = Variable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of the sums of a checkpoint", "1")
+SUMS_CHECKSUM = ArchiveVariable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of the sums of a checkpoint", "1")
 
 
 def group_of(part: str) -> str:

@@ -5,7 +5,7 @@ from typing import Any
 
 
 @dataclass(frozen=True, eq=False)
-class Variable:
+class ArchiveVariable:
     """A variable of an archive: `kind` is a NumPy type, or str; `units=None` marks labels and texts."""
 
     name: str
@@ -21,6 +21,6 @@ class Variable:
         return {"long_name": self.long_name, **units, **self.attributes}
 
 
-def label(name: str, long_name: str) -> Variable:
+def label(name: str, long_name: str) -> ArchiveVariable:
     """The variable of texts that labels a dimension, and is called like it."""
-    return Variable(name, (name,), str, long_name)
+    return ArchiveVariable(name, (name,), str, long_name)

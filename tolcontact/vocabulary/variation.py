@@ -1,11 +1,11 @@
 """Variables of an archive that describe what varies: contributors, locators, and the faces of features."""
 
 from tolcontact.vocabulary.labels import AXIS, CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, PAIR, POINT, REALIZATION
-from tolcontact.vocabulary.variable import Variable, label
+from tolcontact.vocabulary.variable import ArchiveVariable, label
 
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 
-DEVIATION = Variable(
+DEVIATION = ArchiveVariable(
     "deviation",
     (REALIZATION, CONTRIBUTOR),
     "f8",
@@ -14,22 +14,22 @@ DEVIATION = Variable(
     "mm",
 )
 CONTRIBUTOR_LABEL = label(CONTRIBUTOR, "contributor, as part.locator, part.feature.freedom, or a variable's name")
-CONTRIBUTOR_SOURCE = Variable("source", (CONTRIBUTOR,), str, "what a contributor is of: locator, feature or variable")
-CONTRIBUTOR_UNITS = Variable("contributor_units", (CONTRIBUTOR,), str, "units of the deviation of a contributor")
-TOLERANCE_RANGE = Variable(
+CONTRIBUTOR_SOURCE = ArchiveVariable("source", (CONTRIBUTOR,), str, "what a contributor is of: locator, feature or variable")
+CONTRIBUTOR_UNITS = ArchiveVariable("contributor_units", (CONTRIBUTOR,), str, "units of the deviation of a contributor")
+TOLERANCE_RANGE = ArchiveVariable(
     "tolerance_range",
     (CONTRIBUTOR,),
     "f8",
     "full width of the tolerance zone; NaN if the distribution alone defines the spread",
     "mm",
 )
-DISTRIBUTION = Variable(
+DISTRIBUTION = ArchiveVariable(
     "distribution",
     (CONTRIBUTOR,),
     str,
     "distribution of the deviation; of a feature its tolerance, and the rule from zone to spread",
 )
-MEAN_SHIFT = Variable(
+MEAN_SHIFT = ArchiveVariable(
     "mean_shift",
     (CONTRIBUTOR,),
     "f8",
@@ -38,38 +38,42 @@ MEAN_SHIFT = Variable(
 )
 
 LOCATOR_LABEL = label(LOCATOR, "locator, as part.locator: contributors of the same number")
-STIFFNESS = Variable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")
-ONE_SIDED = Variable("one_sided", (LOCATOR,), "i1", "1: a support that the part may lift off, 0: held both ways")
-LOCATOR_POINT = Variable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
-LOCATOR_DIRECTION = Variable("locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1")
-FACE_OF_LOCATOR = Variable(
+STIFFNESS = ArchiveVariable("stiffness", (LOCATOR,), "f8", "stiffness of the locator", "N mm-1")
+ONE_SIDED = ArchiveVariable("one_sided", (LOCATOR,), "i1", "1: a support that the part may lift off, 0: held both ways")
+LOCATOR_POINT = ArchiveVariable("locator_point", (LOCATOR, AXIS), "f8", "where the locator holds its part, nominal", "mm")
+LOCATOR_DIRECTION = ArchiveVariable(
+    "locator_direction", (LOCATOR, AXIS), "f8", "direction of the deviation, into the part", "1"
+)
+FACE_OF_LOCATOR = ArchiveVariable(
     "face_of_locator", (LOCATOR,), "i4", "number of the feature's face that a locator stands against, counted from 0; -1: none"
 )
 
 FREEDOM_LABEL = label(FREEDOM, "component of a small displacement p -> p + tau + rho x (p - centre)")
-FEATURE_OF_FACE = Variable("feature_of_face", (FEATURE_FACE,), str, "feature that a face belongs to, as part.feature")
-FACE_CENTRE = Variable("face_centre", (FEATURE_FACE, AXIS), "f8", "centre about which a feature's face turns, nominal", "mm")
-FACE_TWIST = Variable(
+FEATURE_OF_FACE = ArchiveVariable("feature_of_face", (FEATURE_FACE,), str, "feature that a face belongs to, as part.feature")
+FACE_CENTRE = ArchiveVariable(
+    "face_centre", (FEATURE_FACE, AXIS), "f8", "centre about which a feature's face turns, nominal", "mm"
+)
+FACE_TWIST = ArchiveVariable(
     "face_twist",
     (FEATURE_FACE, FREEDOM, CONTRIBUTOR),
     "f8",
     "displacement tau [mm], rho [rad] of a feature's face, nominal frame, for deviations of 1",
     "1",
 )
-FACE_HEIGHT = Variable(
+FACE_HEIGHT = ArchiveVariable(
     "face_height",
     (FEATURE_FACE, CONTRIBUTOR),
     "f8",
     "how much farther out of the material a feature's face lies everywhere, for deviations of 1",
     "1",
 )
-FACE_OF_MOVING = Variable(
+FACE_OF_MOVING = ArchiveVariable(
     "face_of_moving", (PAIR,), "i4", "number of the feature's face that the moving side of a pair is, counted from 0; -1: none"
 )
-FACE_OF_REFERENCE = Variable(
+FACE_OF_REFERENCE = ArchiveVariable(
     "face_of_reference", (PAIR,), "i4", "number of the feature's face that the reference side is, counted from 0; -1: none"
 )
-FACING = Variable(
+FACING = ArchiveVariable(
     "facing", (POINT,), "f8", "-n^m . n^r: share of the moving face's height by which it comes nearer at a contact point", "1"
 )
 FEATURE_FACES = (

@@ -74,7 +74,7 @@ def _realizations(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     worst = kept_analysis(results, terms.OF_WORST_CASE)
     names = [] if worst is None else [f"worst case: {case}" for case in worst[terms.CASE].values]
 
-    def of(variable: terms.Variable) -> np.ndarray:
+    def of(variable: terms.ArchiveVariable) -> np.ndarray:
         own = rows[variable.name].values[back]
         return own if worst is None else np.concatenate([worst[variable.name].values, own])
 
