@@ -209,7 +209,6 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
-from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import (
     Angularity,
     CircularRunout,
@@ -229,8 +228,7 @@ from tolcontact.declaration.freedom import has_supports, is_free, movers
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.point import Point
+from tolcontact.declaration.part import Face, Feature, Part, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 

@@ -5,13 +5,11 @@ from dataclasses import asdict, fields
 from typing import Any, TypeVar
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box
 from tolcontact.declaration.locator import ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.point import Point
+from tolcontact.declaration.part import Face, Feature, Part, Point
 from tolcontact.declaration.selection import Facing, Inside
 from tolcontact.declaration.tape import Tape
 from tolcontact.declaration.tolerance import Tolerance

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tolcontact.declaration.point import Point
+from tolcontact.declaration.part import Point
 from tolcontact.declaration.vectors import Vector, is_finite
 from tolcontact.readable import Readable
 

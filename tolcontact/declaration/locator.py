@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.names import repetitions, text_faults
-from tolcontact.declaration.part import Face, Part, face_of
+from tolcontact.declaration.part import Face, Feature, Part, face_of
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.vectors import Vector, is_finite, is_length

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tolcontact.declaration.names import is_line
-from tolcontact.declaration.point import Point
+from tolcontact.declaration.part import Point
 from tolcontact.declaration.vectors import Vector, is_finite, is_length
 from tolcontact.readable import Readable
 

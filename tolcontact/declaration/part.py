@@ -1,19 +1,16 @@
-"""Parts, and the faces that other declarations pick from them."""
+"""Parts, and what other declarations pick from them: faces, named features, points."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
-from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
-from tolcontact.declaration.point import Point
-from tolcontact.declaration.selection import Near, Selection, criterion
-from tolcontact.declaration.vectors import Vector, is_finite, script_line, vector
+from tolcontact.declaration.selection import Near, Picker, Selection, criterion
+from tolcontact.declaration.vectors import Vector, is_finite, is_length, script_line, vector
 from tolcontact.readable import Readable
 
-if TYPE_CHECKING:
-    from tolcontact.declaration.selection import Picker
+LETTER = re.compile(r"[A-Z]{1,2}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -31,35 +28,35 @@ class Part(Readable):
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
     declared_at: str = field(default_factory=script_line)
-    _features: list[Feature] = field(default_factory=list, init=False)
+    _features: "list[Feature]" = field(default_factory=list, init=False)
 
     @property
-    def features(self) -> tuple[Feature, ...]:
+    def features(self) -> "tuple[Feature, ...]":
         return tuple(self._features)
 
-    def feature(self, name: str, *said: "Face | Size | GeometricTolerance", datum: str | None = None) -> Feature:
+    def feature(self, name: str, *constituents: "Face | Size | GeometricTolerance", datum: str | None = None) -> "Feature":
         """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`."""
-        for each in said:
-            if not isinstance(each, Face | Size | GeometricTolerance):
+        for constituent in constituents:
+            if not isinstance(constituent, Face | Size | GeometricTolerance):
                 raise TypeError(
-                    f'feature "{name}": {type(each).__name__} is neither a face nor a tolerance; expected part.face(...), '
-                    "tc.Size(...), tc.Position(...) or another tolerance of a feature"
+                    f'feature "{name}": {type(constituent).__name__} is neither a face nor a tolerance; expected '
+                    "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
                 )
-        faces = tuple(each for each in said if isinstance(each, Face))
-        tolerances = tuple(each for each in said if not isinstance(each, Face))
+        faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
+        tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
         self.add(Feature(name, self, faces, tolerances, datum, script_line()))
         return self._features[-1]
 
-    def add(self, *features: Feature) -> None:
-        """Features of this part that have been declared already."""
+    def add(self, *features: "Feature") -> None:
+        """Add features of this part that have been declared already."""
         self._features.extend(features)
 
-    def point(self, x: float, y: float, z: float) -> Point:
-        """The point (x, y, z) [mm] of this part, in its own frame."""
+    def point(self, x: float, y: float, z: float) -> "Point":
+        """Return the point (x, y, z) [mm] of this part, in its own frame."""
         return Point(self, vector((x, y, z)))
 
-    def face(self, *selections: "str | Sequence[int] | Picker | Selection") -> "Face":
-        """The triangles of this part that meet every criterion; without any, the whole surface.
+    def face(self, *selections: str | Sequence[int] | Picker | Selection) -> "Face":
+        """Return the triangles of this part that meet every criterion; without any, the whole surface.
 
         A criterion is a direction ("+x" to "-z": all triangles whose outward normal points there in the part's own
         frame), `tc.Facing`, `tc.Inside` a box, `tc.Near` another part, `tc.Cylinder`, `tc.Largest`, `tc.Brep` (a face of a
@@ -69,9 +66,9 @@ class Part(Readable):
 
     def faults(self) -> Iterator[str]:
         yield from self.geometry.faults()
-        for word, value in (("at", self.at), ("rotation", self.rotation)):
+        for label, value in (("at", self.at), ("rotation", self.rotation)):
             if not is_finite(value):
-                yield f"{word} is not a vector of three finite numbers"
+                yield f"{label} is not a vector of three finite numbers"
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -88,7 +85,7 @@ class Face(Readable):
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        """The part itself, and those that its criteria refer to."""
+        """The part itself, and the parts that its criteria refer to."""
         return (self.part, *(selection.part for selection in self.selections if isinstance(selection, Near)))
 
     def faults(self) -> Iterator[str]:
@@ -99,10 +96,120 @@ class Face(Readable):
         return " ".join([self.part.name, *map(str, self.selections)])
 
 
-def face_of(said: Face | Feature) -> Face:
-    """The face that is meant by itself, or by a feature. Raises TypeError for a feature that has two of them."""
-    if isinstance(said, Feature):
-        if len(said.faces) != 1:
-            raise TypeError(f'feature "{said.name}" has {len(said.faces)} faces; choose one of them: .faces[0]')
-        return said.faces[0]
-    return said
+@dataclass(frozen=True, eq=False, repr=False)
+class Point(Readable):
+    """A point of a part, in the part's own frame [mm]; one `on` a feature moves with it when it deviates.
+
+    An `end` (0 or 1) of the feature's axis takes the place of a position.
+    """
+
+    part: Part
+    position: Vector | None = None
+    on: "Feature | None" = None
+    end: int | None = None
+
+    def faults(self) -> Iterator[str]:
+        if self.position is not None and not is_finite(self.position):
+            yield f'point of part "{self.part.name}" is not three finite numbers'
+        if self.position is None and self.on is None:
+            yield f'point of part "{self.part.name}" has no position; an end of an axis needs the feature that it is on'
+        elif self.position is None and self.end not in (0, 1):
+            yield f"end of the axis is {self.end!r}; expected 0 or 1"
+
+    def __str__(self) -> str:
+        owner = f"{self.part.name}.{self.on.name}" if self.on else self.part.name
+        if self.position is None:
+            return f"{owner} axis end {self.end}"
+        return "{} ({:g}, {:g}, {:g})".format(owner, *self.position)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Feature(Readable):
+    """A face of a part, or two that are opposed (a slot, a tab, a thickness), with a name and its tolerances.
+
+    It serves wherever a face or a point does. Whatever touches, holds or measures it goes with its one deviation, which is
+    outward from the material. `datum` is the letter by which tolerances refer to it.
+    """
+
+    name: str
+    part: Part
+    faces: tuple[Face, ...]
+    tolerances: tuple[Size | GeometricTolerance, ...] = ()
+    datum: str | None = None
+    declared_at: str = ""
+
+    @property
+    def size(self) -> Size | None:
+        """The tolerance of its size, if it has one."""
+        return next((tolerance for tolerance in self.tolerances if isinstance(tolerance, Size)), None)
+
+    @property
+    def geometric(self) -> tuple[GeometricTolerance, ...]:
+        """Its other tolerances."""
+        return tuple(tolerance for tolerance in self.tolerances if isinstance(tolerance, GeometricTolerance))
+
+    def point(self, x: float, y: float, z: float) -> Point:
+        """Return the point (x, y, z) [mm] of its part, which moves with the feature when it deviates."""
+        return Point(self.part, vector((x, y, z)), self)
+
+    def axis(self, end: int) -> Point:
+        """Return an end of the axis of a cylinder or cone; of a sphere the centre.
+
+        The ends 0 and 1 are in the sense of the axis' largest component.
+        """
+        return Point(self.part, None, self, end)
+
+    def faults(self) -> Iterator[str]:
+        for face in self.faces:
+            yield from face.faults()
+            if face.part is not self.part:
+                yield f'its face {face} belongs to part "{face.part.name}"'
+        if not 1 <= len(self.faces) <= 2:
+            yield f"it has {len(self.faces)} faces; expected one, or two that are opposed"
+        if self.datum is not None and not (isinstance(self.datum, str) and LETTER.fullmatch(self.datum)):
+            yield f"its datum letter is {self.datum!r}; expected one or two capital letters"
+        for tolerance in self.tolerances:
+            yield from (f"{tolerance.word}: {fault}" for fault in tolerance.faults())
+        yield from self._size_faults()
+        yield from self._form_faults()
+
+    def _size_faults(self) -> Iterator[str]:
+        if sum(isinstance(tolerance, Size) for tolerance in self.tolerances) > 1:
+            yield "its size is toleranced twice; leave one out"
+        for tolerance in self.geometric:
+            if tolerance.material and self.size is None:
+                yield (
+                    f"{tolerance.word}: a bonus (material {tolerance.material!r}) needs the tolerance of a size; "
+                    "add tc.Size(...)"
+                )
+        if self.size and self.size.moves != "both" and len(self.faces) == 1:
+            yield f"size: moves is {self.size.moves!r}, but the feature has one face; leave it out"
+        elif self.size and self.size.moves != "both" and any(tolerance.kind != "flatness" for tolerance in self.geometric):
+            yield (
+                f"size: moves is {self.size.moves!r}, so the feature has no middle that could have a place; give its other "
+                'tolerances to a feature of the face alone, in place of the size, or let "both" move'
+            )
+
+    def _form_faults(self) -> Iterator[str]:
+        tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
+        for form in (tolerance for tolerance in tolerances if tolerance.kind == "flatness"):
+            for tolerance in tolerances:
+                if tolerance.kind != "flatness" and tolerance.width < form.width:
+                    yield (
+                        f"{form.word} {form.width:g} is wider than {tolerance.word} {tolerance.width:g}, which contains it; "
+                        "expected form within orientation within location"
+                    )
+
+    def __str__(self) -> str:
+        letter = f" (datum {self.datum})" if self.datum else ""
+        constituents = "; ".join([", ".join(str(face) for face in self.faces), *map(str, self.tolerances)])
+        return f"feature {self.name} of {self.part.name}{letter}: {constituents}"
+
+
+def face_of(face: Face | Feature) -> Face:
+    """Return the face itself, or the one face of a feature. Raises TypeError for a feature that has two of them."""
+    if isinstance(face, Feature):
+        if len(face.faces) != 1:
+            raise TypeError(f'feature "{face.name}" has {len(face.faces)} faces; choose one of them: .faces[0]')
+        return face.faces[0]
+    return face

@@ -9,14 +9,12 @@ from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.criteria import criterion_of
-from tolcontact.declaration.feature import Feature
 from tolcontact.declaration.feature_tolerance import KINDS, GeometricTolerance, Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Part
-from tolcontact.declaration.point import Point
+from tolcontact.declaration.part import Face, Feature, Part, Point
 from tolcontact.declaration.said import Said
 from tolcontact.declaration.selection import Facing, Inside, Triangles
 from tolcontact.declaration.tape import tape_of

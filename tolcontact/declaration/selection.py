@@ -3,7 +3,9 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
+
+import numpy as np
 
 from tolcontact.declaration.vectors import DIRECTIONS, Vector, is_finite, is_length, vector
 from tolcontact.declaration.vectors import direction as _direction
@@ -11,11 +13,7 @@ from tolcontact.errors import shown
 from tolcontact.readable import Readable
 from tolcontact.vocabulary import SURFACE_KINDS
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
+Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 FACE_ANGLE = math.radians(1.0)
 KINDS = (*SURFACE_KINDS, "general")  # of surfaces
 
@@ -74,7 +72,7 @@ class Triangles(Readable):
 class Picked(Readable):
     """Triangles that a function `(centres, normals) -> mask` of arrays (triangle, 3) [mm, -] picks."""
 
-    function: "Picker"
+    function: Picker
 
     def faults(self) -> Iterator[str]:
         yield from ()
