@@ -16,52 +16,53 @@ from tests import cases
 from tests.step_files import assembly, step_block
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
-from tolcontact.geometry.analytic_surfaces import Form, believed, onto
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
 from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import BREP, SURFACES, product, reading
 from tolcontact.geometry.files.reading import usual_chord
+from tolcontact.geometry.files.step_surfaces import credible, onto
 from tolcontact.geometry.files.step_text import step_text
-from tolcontact.geometry.fitting import fitted
+from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.shapes import shape
 
 COVER = cases.MODELS / "cover.step"
 TILTED = np.array([1.0, 2.0, 2.0]) / 3
-FORMS = [
-    Form("plane", np.array([1.0, 2, 3]), TILTED),
-    Form("cylinder", np.array([1.0, 2, 3]), TILTED, radius=5),
-    Form("cone", np.array([1.0, 2, 3]), TILTED, angle=0.4),
-    Form("sphere", np.array([1.0, 2, 3]), TILTED, radius=5),
-    Form("torus", np.array([1.0, 2, 3]), TILTED, radius=5, minor=2),
+ANALYTIC = [
+    Plane(np.array([1.0, 2, 3]), TILTED),
+    Cylinder(np.array([1.0, 2, 3]), TILTED, radius=5),
+    Cone(np.array([1.0, 2, 3]), TILTED, angle=0.4),
+    Sphere(np.array([1.0, 2, 3]), TILTED, radius=5),
+    Torus(np.array([1.0, 2, 3]), TILTED, radius=5, minor=2),
 ]
 POINTS = np.random.default_rng(1).normal(scale=10, size=(50, 3))
 
 
-@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.kind)
-def test_distances_have_unit_gradients_and_end_on_the_surface(form):
-    value, slope = form.distance(POINTS)
-    numeric = [approx_fprime(p, lambda q: form.distance(q[None])[0][0], 1e-6) for p in POINTS]
+@pytest.mark.parametrize("surface", ANALYTIC, ids=lambda surface: surface.kind)
+def test_distances_have_unit_gradients_and_end_on_the_surface(surface):
+    value, slope = surface.distance(POINTS)
+    numeric = [approx_fprime(p, lambda q: surface.distance(q[None])[0][0], 1e-6) for p in POINTS]
     assert np.abs(slope - numeric).max() < 1e-4
     assert np.linalg.norm(slope, axis=1) == pytest.approx(1)
-    foot = form.project(POINTS)
-    assert np.abs(form.distance(foot)[0]).max() < 1e-12
+    foot = surface.project(POINTS)
+    assert np.abs(surface.distance(foot)[0]).max() < 1e-12
     assert np.linalg.norm(foot - POINTS, axis=1) == pytest.approx(np.abs(value), abs=1e-9)
 
 
-@pytest.mark.parametrize("form", FORMS, ids=lambda form: form.kind)
-def test_a_form_moves_with_its_part(form):
+@pytest.mark.parametrize("surface", ANALYTIC, ids=lambda surface: surface.kind)
+def test_a_surface_moves_with_its_part(surface):
     R, t = trimesh.transformations.random_rotation_matrix(np.array([0.1, 0.5, 0.9]))[:3, :3], np.array([3.0, -1, 2])
-    assert form.placed(R, t).distance(POINTS @ R.T + t)[0] == pytest.approx(form.distance(POINTS)[0], abs=1e-12)
+    assert surface.placed(R, t).distance(POINTS @ R.T + t)[0] == pytest.approx(surface.distance(POINTS)[0], abs=1e-12)
 
 
 def test_vertices_are_put_back_where_surfaces_meet():
     """The corner of three planes, an edge of a plane and a cylinder; what is too far off stays."""
-    x, y, z = (Form("plane", np.zeros(3), axis) for axis in np.eye(3))
-    round_ = Form("cylinder", np.zeros(3), np.array([0.0, 0, 1]), radius=2.0)
+    x, y, z = (Plane(np.zeros(3), axis) for axis in np.eye(3))
+    round_ = Cylinder(np.zeros(3), np.array([0.0, 0, 1]), radius=2.0)
     vertices = np.array([[1e-6, -2e-6, 3e-6], [2 + 1e-6, 0.0, 2e-6], [5.0, 5.0, 1e-6], [9.0, 9.0, 0.5]])
     faces, brep = np.array([[0, 0, 0], [0, 0, 0], [0, 1, 2], [1, 1, 1], [3, 3, 3]]), np.array([0, 1, 2, 3, 2])
     found = onto(vertices, faces, brep, [x, y, z, round_], 1e-3)
     assert found == pytest.approx(np.array([[0, 0, 0], [2, 0, 0], [5, 5, 0], [9, 9, 0.5]]), abs=1e-12)
-    assert believed(found, faces, brep, [x, y, z, round_], 1e-3) == [x, y, None, round_]
+    assert credible(found, faces, brep, [x, y, z, round_], 1e-3) == [x, y, None, round_]
 
 
 def test_surfaces_are_fitted_where_a_file_states_none():
@@ -76,28 +77,28 @@ def test_surfaces_are_fitted_where_a_file_states_none():
         vertices = mesh.vertices[used] @ R.T + [10.0, 20.0, -5.0] + rng.normal(scale=1e-6, size=(len(used), 3))
         moved = np.zeros((len(mesh.vertices), 3))
         moved[used] = vertices
-        form = fitted(moved[mesh.faces[side]], 1e-4)
-        assert form.kind == ("cylinder" if radius == 7.5 else "sphere")
-        assert form.radius == pytest.approx(radius, abs=2e-6) and 0 < form.residual < 1e-5
+        surface = fit_surface(moved[mesh.faces[side]], 1e-4)
+        assert surface.kind == ("cylinder" if radius == 7.5 else "sphere")
+        assert surface.radius == pytest.approx(radius, abs=2e-6) and 0 < surface.residual < 1e-5
     box = trimesh.creation.box()
-    assert fitted(box.triangles, 1e-4) is not None  # eight corners lie on a sphere: that they turn sharply is not looked at
-    assert fitted(rng.normal(size=(30, 3, 3)), 1e-4) is None
+    assert fit_surface(box.triangles, 1e-4) is not None  # eight corners lie on a sphere; sharp turns do not matter
+    assert fit_surface(rng.normal(size=(30, 3, 3)), 1e-4) is None
     # Two rings of vertices lie on a sphere, too; and a large face that is none of these is told from few of its triangles.
     profile = np.array([[4, 0], [9, 3], [12, 3], [12, 0], [4, 0]], dtype=float)
     funnel = trimesh.creation.revolve(profile, sections=90)
     slope = (np.abs(funnel.face_normals[:, 2]) > 0.1) & (np.abs(funnel.face_normals[:, 2]) < 0.99)
-    form = fitted(funnel.triangles[slope], 1e-6)
-    assert form.kind == "cone" and form.angle == pytest.approx(np.arctan(5 / 3), abs=1e-9)
+    surface = fit_surface(funnel.triangles[slope], 1e-6)
+    assert surface.kind == "cone" and surface.angle == pytest.approx(np.arctan(5 / 3), abs=1e-9)
     egg = trimesh.creation.icosphere(5, radius=10).apply_scale([1.001, 1, 1])
-    assert len(egg.faces) > 10_000 and fitted(egg.triangles, 1e-3) is None
+    assert len(egg.faces) > 10_000 and fit_surface(egg.triangles, 1e-3) is None
 
 
 def test_vertices_of_a_step_file_lie_on_its_surfaces_in_double_precision():
     mesh = shape(tc.Mesh(COVER)).mesh
     brep = np.asarray(mesh.face_attributes[BREP])
-    for number, form in enumerate(mesh.metadata[SURFACES]):
+    for number, surface in enumerate(mesh.metadata[SURFACES]):
         own = mesh.vertices[np.unique(mesh.faces[brep == number])]
-        assert np.abs(form.distance(own)[0]).max() < 1e-11
+        assert np.abs(surface.distance(own)[0]).max() < 1e-11
     assert mesh.is_watertight
 
 
@@ -306,13 +307,13 @@ def test_surfaces_have_the_numbers_of_the_file(name):
     placed = [axes[key] for key in re.findall(r"=PLANE\('[^']*',#(\d+)\)", text)]
     planes = np.array([[*directions[n], points[p] @ directions[n]] for p, n in placed])
     radii = np.array(re.findall(r"=CYLINDRICAL_SURFACE\('[^']*',#\d+,([^)]*)\)", text), dtype=float)
-    forms = shape(tc.Mesh(path)).mesh.metadata[SURFACES]
-    assert {form.kind for form in forms} == ({"plane", "cylinder"} if len(radii) else {"plane"})
-    for form in forms:
-        if form.kind == "cylinder":
-            assert np.abs(radii - form.radius).min() < 1e-12
+    surfaces = shape(tc.Mesh(path)).mesh.metadata[SURFACES]
+    assert {surface.kind for surface in surfaces} == ({"plane", "cylinder"} if len(radii) else {"plane"})
+    for surface in surfaces:
+        if surface.kind == "cylinder":
+            assert np.abs(radii - surface.radius).min() < 1e-12
         else:
-            own = np.array([*form.axis, form.axis @ form.origin])
+            own = np.array([*surface.axis, surface.axis @ surface.origin])
             assert min(np.abs(planes - sign * own).max(axis=1).min() for sign in (1, -1)) < 1e-9
 
 

@@ -11,7 +11,7 @@ from tests.cases import round_contact as round_cases
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import RoundPoint, RoundPoints, discretize
 from tolcontact.discretization.round_points import NONE
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.analytic_surfaces import ANALYTIC_SURFACES, Cone, Cylinder, Plane
 from tolcontact.mechanics.round_gap import round_gaps
 
 
@@ -62,7 +62,7 @@ def test_a_ball_beside_walls_of_every_kind():
         x = np.cross(w, unit(rng))
         x /= np.linalg.norm(x)
         sizes = {"cone": {"angle": 0.6}, "plane": {}, "torus": {"radius": 20.0, "minor": 5.0}}.get(kind, {"radius": 20.0})
-        wall = Form(kind, rng.normal(size=3), w, **sizes)
+        wall = ANALYTIC_SURFACES[kind](rng.normal(size=3), w, **sizes)
         beside = 30 * x + 3 * w if not is_hollow else 6 * x + 20 * w if kind == "cone" else 19 * x + 3 * w
         points.append(RoundPoint(wall, is_hollow, wall.origin + beside, NONE, NONE, 2.0, on_moving, x, np.pi))
     check_gaps(RoundPoints.of(points), rng, turn=3e-2)
@@ -70,9 +70,9 @@ def test_a_ball_beside_walls_of_every_kind():
 
 def test_a_wall_beside_a_hollow_has_gaps_of_its_own():
     """One that is tangent to the hollow, and before another ball; and one that is no plane, before the same ball."""
-    hollow = Form("cylinder", np.zeros(3), np.array([0, 0, 1.0]), radius=20.0)
-    tangent = Form("plane", np.array([20.0, 0, 0]), np.array([-1.0, 0, 0]))
-    beside = Form("cylinder", np.array([32.0, 0, 0]), np.array([-1.0, 0, 0]), radius=5.0)  # along x: its end is not seen
+    hollow = Cylinder(np.zeros(3), np.array([0, 0, 1.0]), radius=20.0)
+    tangent = Plane(np.array([20.0, 0, 0]), np.array([-1.0, 0, 0]))
+    beside = Cylinder(np.array([32.0, 0, 0]), np.array([-1.0, 0, 0]), radius=5.0)  # along x: its end is not seen
     ball, other, x = np.array([18.0, 0, 0]), np.array([10.0, 0, 0]), np.array([1.0, 0, 0])
     points = RoundPoints.of(
         [
@@ -92,13 +92,13 @@ def test_a_ball_in_a_hollow_that_is_open_is_free_to_leave():
         w = unit(rng)
         x = np.cross(w, unit(rng))
         x /= np.linalg.norm(x)
-        wall = Form(kind, np.zeros(3), w, **({"angle": 0.6} if kind == "cone" else {"radius": 20.0}))
+        wall = ANALYTIC_SURFACES[kind](np.zeros(3), w, **({"angle": 0.6} if kind == "cone" else {"radius": 20.0}))
         aside = np.cos(angle) * x + np.sin(angle) * np.cross(w, x)
         beside = 6 * aside + 20 * w if kind == "cone" else 18.5 * aside
         points.append(RoundPoint(wall, True, beside, NONE, NONE, 2.0, True, x, 1.0))
         out.append(-100 * x)
     check_gaps(RoundPoints.of(points), rng, turn=3e-2)
-    shaft, x = Form("cylinder", np.zeros(3), np.array([0, 0, 1.0]), radius=5.05), np.array([1.0, 0, 0])
+    shaft, x = Cylinder(np.zeros(3), np.array([0, 0, 1.0]), radius=5.05), np.array([1.0, 0, 0])
     ends = [
         RoundPoint(shaft, True, np.array([-1.0, aside, 5.0]), shaft.axis, cut, 5.0, True, x, 1.0)
         for aside, cut in itertools.product((-0.5, 0.7), (NONE, shaft.axis))
@@ -113,8 +113,8 @@ def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
     """In the middle of a hollow all directions are as near; what curvature counts there is that of a thousandth of the ball."""
     axis, x = np.array([0, 0, 1.0]), np.array([1.0, 0, 0])
     for wall, centre, expected in (
-        (Form("cone", np.zeros(3), axis, angle=0.6), np.array([0, 0, 20.0]), np.cos(0.6)),
-        (Form("cylinder", np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
+        (Cone(np.zeros(3), axis, angle=0.6), np.array([0, 0, 20.0]), np.cos(0.6)),
+        (Cylinder(np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
     ):
         evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]))
         *_, bow, wrap = (each.full() for each in evaluate(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), [1]))

@@ -115,8 +115,8 @@ def test_faces_that_look_opposite_ways_are_two():
     face = patch(part.face(tc.Cylinder(radius=5)), {part: both})
     assert sorted(piece.is_hollow for piece in face.pieces) == [False, True]
     for k, piece in enumerate(face.pieces):
-        normals = face.corner_normals[face.form_of == k].mean(axis=1)
-        assert ((normals * piece.surface.mesh.face_normals).sum(axis=1) > 0.9).all()
+        normals = face.corner_normals[face.surface_numbers == k].mean(axis=1)
+        assert ((normals * piece.face.mesh.face_normals).sum(axis=1) > 0.9).all()
 
 
 def test_points_on_the_axis_of_a_hole_do_not_touch_its_wall():

@@ -53,13 +53,13 @@ def main() -> None:
             continue
         files += 1
         stated[:, 3:], radii = stated[:, 3:] * size, radii * size
-        for form in (form for forms in content.product.forms for form in forms if form is not None):
-            if form.kind == "plane":
-                own = np.array([*form.axis, form.axis @ form.origin])
+        for surface in (surface for surfaces in content.product.surfaces for surface in surfaces if surface is not None):
+            if surface.kind == "plane":
+                own = np.array([*surface.axis, surface.axis @ surface.origin])
                 off = min(np.abs((stated - sign * own) * [FAR, FAR, FAR, 1]).max(axis=1).min() for sign in (1, -1))
                 planes, worst[0] = planes + 1, max(worst[0], (off, name))
-            elif form.kind == "cylinder":
-                cylinders, worst[1] = cylinders + 1, max(worst[1], (np.abs(radii - form.radius).min(), name))
+            elif surface.kind == "cylinder":
+                cylinders, worst[1] = cylinders + 1, max(worst[1], (np.abs(radii - surface.radius).min(), name))
     print(f"{files} files")
     print(f"{planes} planes: within {worst[0][0]:.2g} mm (normals at {FAR:g} mm) of the text; {worst[0][1]}")
     print(f"{cylinders} cylinders: radii within {worst[1][0]:.2g} mm; {worst[1][1]}")

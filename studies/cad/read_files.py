@@ -24,11 +24,11 @@ def off(product: Product) -> dict[str, float]:
     """How far vertices lie off the surfaces that the file states, by their kind [mm]."""
     worst: dict[str, float] = {}
     vertices = np.asarray(product.mesh.vertices)
-    for k, forms in enumerate(product.forms):
-        for number, form in enumerate(forms):
+    for k, surfaces in enumerate(product.surfaces):
+        for number, surface in enumerate(surfaces):
             own = np.unique(product.mesh.faces[(product.shape == k) & (product.brep == number)])
-            if form is not None and own.size:
-                worst[form.kind] = max(worst.get(form.kind, 0.0), float(np.abs(form.distance(vertices[own])[0]).max()))
+            if surface is not None and own.size:
+                worst[surface.kind] = max(worst.get(surface.kind, 0.0), float(np.abs(surface.distance(vertices[own])[0]).max()))
     return worst
 
 
@@ -44,8 +44,8 @@ def read(path: Path) -> dict:
     return record | {
         "bodies": len(product.bodies),
         "faces": sum(len(np.unique(product.brep[body.triangles])) for body in product.bodies),
-        "analytic": sum(form is not None for forms in product.forms for form in forms),
-        "of": sum(map(len, product.forms)),
+        "analytic": sum(surface is not None for surfaces in product.surfaces for surface in surfaces),
+        "of": sum(map(len, product.surfaces)),
         "triangles": len(product.brep),
         "off": off(product),
     }

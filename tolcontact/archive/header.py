@@ -17,7 +17,7 @@ from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
 from tolcontact.declaration.document import plain_faces, to_document
 from tolcontact.discretization import Nominal, NominalPart
-from tolcontact.geometry import form_arrays, known_surfaces
+from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import ArchiveVariable
@@ -249,12 +249,12 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
             if known is not None:
                 mesh.createDimension(terms.BREP_FACE, len(known[1]))
                 write(mesh, terms.BREP_OF_FACE, known[0])
-                _write_forms(mesh, terms.OF_BREP_FACE, form_arrays(known[1]))
+                _write_surfaces(mesh, terms.OF_BREP_FACE, surface_arrays(known[1]))
                 if known[2]:
                     write(mesh, terms.NAME_OF_BREP_FACE, known[2])
 
 
-def _write_forms(group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]) -> None:
+def _write_surfaces(group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]) -> None:
     for name, variable in variables.items():
         write(group, variable, arrays[name])
 

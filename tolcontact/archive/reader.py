@@ -13,7 +13,7 @@ from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.rebuilding import from_document
 from tolcontact.errors import ArchiveError
-from tolcontact.geometry import forms_of, with_known_surfaces
+from tolcontact.geometry import surfaces_of, with_known_surfaces
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -75,4 +75,4 @@ def _mesh(of: xr.Dataset) -> Any:
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
     named = terms.NAME_OF_BREP_FACE.name
     names = tuple(map(str, of[named].values)) if named in of else ()
-    return with_known_surfaces(vertices, faces, brep, forms_of(arrays), names)
+    return with_known_surfaces(vertices, faces, brep, surfaces_of(arrays), names)

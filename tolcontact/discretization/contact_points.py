@@ -72,7 +72,7 @@ def contact_points(
     elif math.isfinite(finest):
         P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
     P_m = distinct(P_m, SAME * moving.mesh.scale)
-    if placed_own.forms:
+    if placed_own.surfaces:
         P_m, _, _ = placed_own.project(P_m)
     P_r, n_r, over = target.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)

@@ -96,7 +96,7 @@ class ContactPoints:
     def bulge(self) -> float:
         """How far [mm] round surfaces that were fitted to triangles, and count instead, stand out of these."""
         faces = [face for face in (self.own, self.surface) if face is not None]
-        pieces = [piece.surface for face in faces for piece in face.pieces if piece.form.is_fitted]
+        pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
         return max(map(chord_height, pieces), default=0.0)
 
     @property

@@ -7,8 +7,8 @@ import numpy as np
 import trimesh
 
 from tolcontact.discretization.round_points import RoundPoint
-from tolcontact.discretization.round_walls import NotRoundError, arc, directions, tangent, touched
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.discretization.round_walls import NotRoundError, arc, directions
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cylinder, Plane, RoundSurface
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import CREASE, rim
 from tolcontact.geometry.surface import Piece, Surface
@@ -58,15 +58,15 @@ def _pieces(face: Surface) -> list[Piece]:
     for number in range(label.max() + 1):
         own = rest.part(np.flatnonzero(label == number))
         n = (np.asarray(own.mesh.face_normals) * np.asarray(own.mesh.area_faces)[:, None]).sum(axis=0)
-        found.append(Piece(Form("plane", np.asarray(own.mesh.vertices)[0], n / np.linalg.norm(n)), False, own))
+        found.append(Piece(Plane(np.asarray(own.mesh.vertices)[0], n / np.linalg.norm(n)), False, own))
     return found
 
 
 def _outward(piece: Piece) -> Piece:
-    form = piece.form
-    if form.kind != "plane" or not piece.is_hollow:
+    plane = piece.surface
+    if plane.kind != "plane" or not piece.is_hollow:
         return piece
-    return Piece(Form("plane", form.origin, -form.axis), False, piece.surface)
+    return Piece(Plane(plane.origin, -plane.axis), False, piece.face)
 
 
 def _between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint]:
@@ -76,55 +76,55 @@ def _between(moving: Piece, reference: Piece, reach: float) -> list[RoundPoint]:
     """
     for kind, find in (("sphere", _of_ball), ("cylinder", _of_shaft)):
         for body, wall, on_moving in ((moving, reference, True), (reference, moving, False)):
-            if body.form.kind == kind and not body.is_hollow and (kind == "sphere" or _is_wall(body, wall)):
+            if body.surface.kind == kind and not body.is_hollow and (kind == "sphere" or _is_wall(body, wall)):
                 return find(body, wall, reach, on_moving)
     raise NotRoundError
 
 
 def _is_wall(body: Piece, wall: Piece) -> bool:
     """Whether a shaft may lie along a piece: a plane, or a hole."""
-    if wall.form.kind == "plane":
-        return abs(float(body.form.axis @ wall.form.axis)) < PARALLEL
-    across = float(np.linalg.norm(np.cross(body.form.axis, wall.form.axis)))
-    return wall.form.kind == "cylinder" and wall.is_hollow and across < PARALLEL
+    if wall.surface.kind == "plane":
+        return abs(float(body.surface.axis @ wall.surface.axis)) < PARALLEL
+    across = float(np.linalg.norm(np.cross(body.surface.axis, wall.surface.axis)))
+    return wall.surface.kind == "cylinder" and wall.is_hollow and across < PARALLEL
 
 
 def _nothing_if_far(wall: Piece, places: np.ndarray, reach: float) -> list[RoundPoint]:
     """No points. Raises NotRoundError if an edge of the wall is within reach [mm] of some places (place, 3)."""
-    _, nearest = wall.surface.nearest(places)
+    _, nearest = wall.face.nearest(places)
     if np.linalg.norm(nearest - places, axis=1).min() <= reach:
         raise NotRoundError
     return []
 
 
 def _of_ball(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    c, r = body.form.origin, body.form.radius
+    c, r = body.surface.origin, body.surface.radius
     side = -1.0 if wall.is_hollow else 1.0
-    distance, slope = (each[0] for each in wall.form.distance(c[None]))
+    distance, slope = (each[0] for each in wall.surface.distance(c[None]))
     if side * distance - r > reach:
         return []
     if wall.is_hollow:
-        if wall.form.kind == "torus" or (wall.form.kind != "cone" and r > wall.form.radius):
+        if not isinstance(wall.surface, RoundSurface) or (wall.surface.kind != "cone" and r > wall.surface.radius):
             raise NotRoundError  # where a groove is open is not known; what is too large for a hollow touches its rim
-        tangents = [tangent(wall.form, e) for e in directions(wall)]
-        held = [_holds(wall, touched(wall.form, c, e)) for e in directions(wall)]
+        tangents = [wall.surface.tangent(e) for e in directions(wall)]
+        held = [_holds(wall, wall.surface.touched(c, e)) for e in directions(wall)]
         held += [_holds(body, c - r * plane.axis) for plane in tangents]
-        flat = [Piece(plane, False, wall.surface) for plane in tangents]
+        flat = [Piece(plane, False, wall.face) for plane in tangents]
     else:
         held, flat = [_holds(wall, c - distance * slope), _holds(body, c - r * slope)], []
     if not all(held):
         return _nothing_if_far(wall, c[None], r + reach)
-    nearest = RoundPoint.ball(wall, body.form, on_moving, *(arc(wall) if wall.is_hollow else ()))
-    return [nearest, *(RoundPoint.ball(plane, body.form, on_moving) for plane in flat)]
+    nearest = RoundPoint.ball(wall, body.surface, on_moving, *(arc(wall) if wall.is_hollow else ()))
+    return [nearest, *(RoundPoint.ball(plane, body.surface, on_moving) for plane in flat)]
 
 
 def _of_shaft(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    return (_on_plane if wall.form.kind == "plane" else _in_hole)(body, wall, reach, on_moving)
+    return (_on_plane if wall.surface.kind == "plane" else _in_hole)(body, wall, reach, on_moving)
 
 
 def _on_plane(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    shaft, n = body.form, wall.form.axis
-    height = float((shaft.origin - wall.form.origin) @ n) - shaft.radius
+    shaft, n = body.surface, wall.surface.axis
+    height = float((shaft.origin - wall.surface.origin) @ n) - shaft.radius
     if height > reach:
         return []
     towards, opening = arc(body)
@@ -132,19 +132,19 @@ def _on_plane(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[R
         raise NotRoundError  # a little turn, and its edge or the face beside it touches
 
     # Beside a flat triangle's rim what lies on the round face stands aside by some of the height between the two.
-    slacks = [CLOSE * piece.surface.mesh.scale + ASIDE * chord_height(piece.surface) for piece in (body, wall)]
+    slacks = [CLOSE * piece.face.mesh.scale + ASIDE * chord_height(piece.face) for piece in (body, wall)]
 
     def touches(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whether the shaft, and the wall, is where they would touch at places s (place,) [mm] along the axis."""
         line = shaft.origin + np.atleast_1d(s)[:, None] * shaft.axis - shaft.radius * n
-        feet = line - ((line - wall.form.origin) @ n)[:, None] * n
+        feet = line - ((line - wall.surface.origin) @ n)[:, None] * n
         return tuple(  # type: ignore[return-value]
             surface.overhang(where) <= slack
-            for surface, where, slack in ((body.surface, line, slacks[0]), (wall.surface, feet, slacks[1]))
+            for surface, where, slack in ((body.face, line, slacks[0]), (wall.face, feet, slacks[1]))
         )
 
-    start, end = _extent(body.surface, shaft)
-    among = np.concatenate([(np.asarray(each.surface.mesh.vertices) - shaft.origin) @ shaft.axis for each in (body, wall)])
+    start, end = _extent(body.face, shaft)
+    among = np.concatenate([(np.asarray(each.face.mesh.vertices) - shaft.origin) @ shaft.axis for each in (body, wall)])
     places = np.unique(np.concatenate([np.linspace(start, end, STATIONS + 1), among.clip(start, end)]))
     places = np.unique(np.concatenate([places, (places[1:] + places[:-1]) / 2]))
     there = np.flatnonzero(np.logical_and(*touches(places)))
@@ -161,22 +161,23 @@ def _on_plane(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[R
             on_shaft, on_wall = (bool(each[0]) for each in touches(np.array(outside)))
             if on_wall or not on_shaft:
                 raise NotRoundError  # the shaft's end is not square to its axis
-            edge = _edge(wall.surface, shaft.origin + inside * shaft.axis - (height + shaft.radius) * n)
+            edge = _edge(wall.face, shaft.origin + inside * shaft.axis - (height + shaft.radius) * n)
             cut = np.cross(n, edge[1] - edge[0])
             cut /= np.linalg.norm(cut)
             if abs(cut @ shaft.axis) < PARALLEL:
                 raise NotRoundError
             place = float((edge[0] - shaft.origin) @ cut / (shaft.axis @ cut))
-        elif abs(place - limit) > CLOSE * body.surface.mesh.scale:
+        elif abs(place - limit) > CLOSE * body.face.mesh.scale:
             raise NotRoundError
         found.append(RoundPoint.end(wall, shaft, place, cut, on_moving))
     return found
 
 
 def _in_hole(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[RoundPoint]:
-    shaft, hole = body.form, wall.form
-    (start, end), (lower, upper) = (_extent(piece.surface, shaft) for piece in (body, wall))
-    close = CLOSE * max(body.surface.mesh.scale, wall.surface.mesh.scale)
+    shaft, hole = body.surface, wall.surface
+    assert isinstance(hole, Cylinder)
+    (start, end), (lower, upper) = (_extent(piece.face, shaft) for piece in (body, wall))
+    close = CLOSE * max(body.face.mesh.scale, wall.face.mesh.scale)
     ends = ((max(start, lower), start >= lower - close), (min(end, upper), end <= upper + close))
     apart = [shaft.origin + place * shaft.axis - hole.origin for place, _ in ends]
     clear = [hole.radius - shaft.radius - float(np.linalg.norm(p - (p @ hole.axis) * hole.axis)) for p in apart]
@@ -191,11 +192,11 @@ def _in_hole(body: Piece, wall: Piece, reach: float, on_moving: bool) -> list[Ro
         cut = np.zeros(3) if is_own else hole.axis
         found.append(RoundPoint.end(wall, shaft, place, cut, on_moving, towards, opening))
         for e in directions(wall):
-            found.append(RoundPoint.end(Piece(tangent(hole, e), False, wall.surface), shaft, place, cut, on_moving))
+            found.append(RoundPoint.end(Piece(hole.tangent(e), False, wall.face), shaft, place, cut, on_moving))
     return found
 
 
-def _extent(face: Surface, shaft: Form) -> tuple[float, float]:
+def _extent(face: Surface, shaft: AnalyticSurface) -> tuple[float, float]:
     """From where to where a face reaches along an axis [mm]."""
     along = (np.asarray(face.mesh.vertices) - shaft.origin) @ shaft.axis
     return float(along.min()), float(along.max())
@@ -203,17 +204,17 @@ def _extent(face: Surface, shaft: Form) -> tuple[float, float]:
 
 def _is_square(piece: Piece) -> bool:
     """Whether the rim of a cylinder lies in two planes across its axis."""
-    mesh = piece.surface.mesh
-    along = (np.asarray(mesh.vertices)[np.unique(rim(mesh.faces))] - piece.form.origin) @ piece.form.axis
+    mesh = piece.face.mesh
+    along = (np.asarray(mesh.vertices)[np.unique(rim(mesh.faces))] - piece.surface.origin) @ piece.surface.axis
     apart = np.minimum(along - along.min(initial=np.inf), along.max(initial=-np.inf) - along)
-    return bool(along.size) and bool((apart < CLOSE * mesh.scale + piece.form.residual).all())
+    return bool(along.size) and bool((apart < CLOSE * mesh.scale + piece.surface.residual).all())
 
 
 def _holds(piece: Piece, point: np.ndarray) -> bool:
-    """Whether a point (3,) of its form is one of the piece."""
-    scale = piece.surface.mesh.scale
-    return bool(piece.surface.overhang(point[None])[0] <= CLOSE * scale) and bool(
-        np.linalg.norm(piece.surface.project(point[None])[0][0] - point) <= CLOSE * scale
+    """Whether a point (3,) of its surface is one of the piece."""
+    scale = piece.face.mesh.scale
+    return bool(piece.face.overhang(point[None])[0] <= CLOSE * scale) and bool(
+        np.linalg.norm(piece.face.project(point[None])[0][0] - point) <= CLOSE * scale
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from tolcontact.geometry.analytic_surfaces import Form, form_arrays, forms_of
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, surface_arrays, surfaces_of
 from tolcontact.geometry.surface import Piece
 
 NONE = np.zeros(3)
@@ -31,7 +31,7 @@ class RoundPoint:
     opening     [rad] how far it reaches to either side of that; pi of a whole one
     """
 
-    wall: Form
+    wall: AnalyticSurface
     is_hollow: bool
     centre: np.ndarray
     axis: np.ndarray
@@ -43,16 +43,16 @@ class RoundPoint:
 
     @classmethod
     def ball(
-        cls, wall: Piece, ball: Form, on_moving: bool, towards: np.ndarray | None = None, opening: float = math.pi
+        cls, wall: Piece, ball: AnalyticSurface, on_moving: bool, towards: np.ndarray | None = None, opening: float = math.pi
     ) -> "RoundPoint":
         """That of a ball."""
-        return cls(wall.form, wall.is_hollow, ball.origin, NONE, NONE, ball.radius, on_moving, _or_x(towards), opening)
+        return cls(wall.surface, wall.is_hollow, ball.origin, NONE, NONE, ball.radius, on_moving, _or_x(towards), opening)
 
     @classmethod
     def end(
         cls,
         wall: Piece,
-        shaft: Form,
+        shaft: AnalyticSurface,
         place: float,
         cut: np.ndarray,
         on_moving: bool,
@@ -61,7 +61,7 @@ class RoundPoint:
     ) -> "RoundPoint":
         """That of a shaft, at a place [mm] of its axis."""
         centre = shaft.origin + place * shaft.axis
-        return cls(wall.form, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving, _or_x(towards), opening)
+        return cls(wall.surface, wall.is_hollow, centre, shaft.axis, cut, shaft.radius, on_moving, _or_x(towards), opening)
 
     def nominal(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """P^m, P^r and n^r (3,): where the two touch nominally, and the reference's normal; in a hollow wall its axis' place.
@@ -83,7 +83,7 @@ def _or_x(towards: np.ndarray | None) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class RoundPoints:
-    """The points of a pair as arrays (point, ...), by name: `walls` what their Forms are, `points` what else RoundPoint has."""
+    """The points of a pair as arrays (point, ...), by name: `walls` what their surfaces are, `points` the rest."""
 
     walls: Mapping[str, np.ndarray]
     points: Mapping[str, np.ndarray]
@@ -96,10 +96,11 @@ class RoundPoints:
         """The arrays of some points."""
         own = [field.name for field in fields(RoundPoint) if field.name != "wall"]
         return cls(
-            form_arrays([point.wall for point in points]), {name: np.array([getattr(p, name) for p in points]) for name in own}
+            surface_arrays([point.wall for point in points]),
+            {name: np.array([getattr(p, name) for p in points]) for name in own},
         )
 
     def __iter__(self) -> Iterator[RoundPoint]:
-        for k, wall in enumerate(forms_of(self.walls)):
+        for k, wall in enumerate(surfaces_of(self.walls)):
             assert wall is not None
             yield RoundPoint(wall, **{name: values[k] for name, values in self.points.items()})

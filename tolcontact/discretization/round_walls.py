@@ -5,7 +5,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tolcontact.geometry.analytic_surfaces import Form
 from tolcontact.geometry.surface import Piece
 
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
@@ -24,13 +23,13 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
 
     Raises NotRoundError if something is missing in between.
     """
-    if wall.form.kind == "sphere":
+    if wall.surface.kind == "sphere":
         return _cap(wall)
-    vertices, axis = np.asarray(wall.surface.mesh.vertices), wall.form.axis
-    across = vertices - wall.form.origin
+    vertices, axis = np.asarray(wall.face.mesh.vertices), wall.surface.axis
+    across = vertices - wall.surface.origin
     across -= (across @ axis)[:, None] * axis
-    across = across[np.linalg.norm(across, axis=1) > SMALL * wall.surface.mesh.scale]
-    if wall.form.kind == "plane" or not len(across):
+    across = across[np.linalg.norm(across, axis=1) > SMALL * wall.face.mesh.scale]
+    if wall.surface.kind == "plane" or not len(across):
         return np.linalg.svd(axis[None])[2][1], math.pi
     x = across[0] / np.linalg.norm(across[0])
     y = np.cross(axis, x)
@@ -51,28 +50,28 @@ def arc(wall: Piece) -> tuple[np.ndarray, float]:
 
 def _check_area(wall: Piece, opening: float) -> None:
     """Raise NotRoundError if a cylinder or cone has less area than from end to end of its axis and of its arc."""
-    along = (np.asarray(wall.surface.mesh.vertices) - wall.form.origin) @ wall.form.axis
-    if wall.form.kind == "cylinder":
-        expected = 2 * opening * wall.form.radius * float(np.ptp(along))
-    elif wall.form.kind == "cone":
-        slants = along / math.cos(wall.form.angle)
-        expected = opening * math.sin(wall.form.angle) * abs(float(slants.max() ** 2 - slants.min() ** 2))
+    along = (np.asarray(wall.face.mesh.vertices) - wall.surface.origin) @ wall.surface.axis
+    if wall.surface.kind == "cylinder":
+        expected = 2 * opening * wall.surface.radius * float(np.ptp(along))
+    elif wall.surface.kind == "cone":
+        slants = along / math.cos(wall.surface.angle)
+        expected = opening * math.sin(wall.surface.angle) * abs(float(slants.max() ** 2 - slants.min() ** 2))
     else:
         return
-    if wall.surface.mesh.area < (1 - MISSING) * expected:
+    if wall.face.mesh.area < (1 - MISSING) * expected:
         raise NotRoundError
 
 
 def _cap(wall: Piece) -> tuple[np.ndarray, float]:
-    mesh, form = wall.surface.mesh, wall.form
-    outward = (np.asarray(mesh.vertices) - form.origin) / form.radius
-    middle = (np.asarray(mesh.area_faces)[:, None] * (np.asarray(mesh.triangles_center) - form.origin)).sum(axis=0)
-    if np.linalg.norm(middle) < MISSING * mesh.area * form.radius:
+    mesh, sphere = wall.face.mesh, wall.surface
+    outward = (np.asarray(mesh.vertices) - sphere.origin) / sphere.radius
+    middle = (np.asarray(mesh.area_faces)[:, None] * (np.asarray(mesh.triangles_center) - sphere.origin)).sum(axis=0)
+    if np.linalg.norm(middle) < MISSING * mesh.area * sphere.radius:
         middle, opening = outward[0], math.pi
     else:
         middle /= np.linalg.norm(middle)
         opening = math.acos(min(max(float((outward @ middle).min()), -1.0), 1.0))
-    if mesh.area < (1 - MISSING) * 2 * math.pi * form.radius**2 * (1 - math.cos(opening)):
+    if mesh.area < (1 - MISSING) * 2 * math.pi * sphere.radius**2 * (1 - math.cos(opening)):
         raise NotRoundError
     return middle, opening
 
@@ -83,13 +82,13 @@ def directions(wall: Piece) -> Sequence[np.ndarray]:
     They turn with the part, since they are counted from a vertex.
     """
     x, opening = arc(wall)
-    if wall.form.kind == "sphere":
+    if wall.surface.kind == "sphere":
         y, z = _beside(wall, x)
         lean, turns = min(LEAN * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
         aside = [math.cos(turn) * y + math.sin(turn) * z for turn in turns]
         found = [x, *(math.cos(lean) * x + math.sin(lean) * each for each in aside)]
         return [*found, -x] if opening == math.pi else found
-    y = np.cross(wall.form.axis, x)
+    y = np.cross(wall.surface.axis, x)
     if opening == math.pi:
         azimuths = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
     else:
@@ -99,25 +98,8 @@ def directions(wall: Piece) -> Sequence[np.ndarray]:
 
 def _beside(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors across x (3,) and each other, by the vertex that is farthest from its line."""
-    across = np.asarray(wall.surface.mesh.vertices) - wall.form.origin
+    across = np.asarray(wall.face.mesh.vertices) - wall.surface.origin
     across -= (across @ x)[:, None] * x
     y = across[np.linalg.norm(across, axis=1).argmax()]
     y /= np.linalg.norm(y)
     return y, np.cross(x, y)
-
-
-def tangent(wall: Form, e: np.ndarray) -> Form:
-    """The plane that touches a hollow wall in a direction e (3,); it looks inward."""
-    if wall.kind == "cone":
-        return Form("plane", wall.origin, math.sin(wall.angle) * wall.axis - math.cos(wall.angle) * e)
-    return Form("plane", wall.origin + wall.radius * e, -e)
-
-
-def touched(wall: Form, c: np.ndarray, e: np.ndarray) -> np.ndarray:
-    """Where a hollow wall in a direction e (3,) is nearest to c (3,)."""
-    if wall.kind == "sphere":
-        return np.asarray(wall.origin + wall.radius * e)
-    if wall.kind == "cylinder":
-        return np.asarray(wall.origin + ((c - wall.origin) @ wall.axis) * wall.axis + wall.radius * e)
-    along = math.cos(wall.angle) * wall.axis + math.sin(wall.angle) * e
-    return np.asarray(wall.origin + ((c - wall.origin) @ along) * along)

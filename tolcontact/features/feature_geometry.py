@@ -10,12 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.brep_face import FIT
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.fault import GeometryFault
-from tolcontact.geometry.fitting import nearest
+from tolcontact.geometry.fitting import nearest_surface
 from tolcontact.geometry.surface import Surface
 
 ALIKE = 1e-3  # of an area: rectangles of sizes nearer than that are alike
@@ -61,7 +61,7 @@ class FeatureGeometry:
     normals: tuple[np.ndarray, ...]
     is_inner: bool
     walls: tuple[np.ndarray, np.ndarray] | None = None
-    nearest: Form | None = None
+    nearest: AnalyticSurface | None = None
 
     @property
     def extremes(self) -> np.ndarray:
@@ -108,39 +108,40 @@ class FeatureGeometry:
 
 def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
     """What the faces of a feature are. Raises GeometryFault if one of them spans several surfaces, or two are not opposed."""
-    forms = [_form(face) for face in faces]
+    surfaces = [_surface(face) for face in faces]
     if len(faces) == 2:
-        return _planes(faces, forms)
-    face, form = faces[0], forms[0]
-    if form is None or form.kind == "torus":
+        return _planes(faces, surfaces)
+    face, surface = faces[0], surfaces[0]
+    if surface is None or surface.kind == "torus":
         return _general(face)
-    if form.kind == "plane":
-        return _plane("plane", form.origin, form.axis, np.asarray(face.mesh.vertices), (form.axis,), np.nan, False)
-    if form.kind == "sphere":
+    if surface.kind == "plane":
+        return _plane("plane", surface.origin, surface.axis, np.asarray(face.mesh.vertices), (surface.axis,), np.nan, False)
+    if surface.kind == "sphere":
         is_inner = face.pieces[0].is_hollow
         names = tuple(f"shift {axis}" for axis in "xyz")
         T = np.vstack([AXES, np.zeros((3, 3))])
         return FeatureGeometry(
-            "sphere", form.origin, names, T, T.T, form.origin[None], AXES[None], AXES[2], 0.0, 2 * form.radius, (), is_inner,
+            "sphere", surface.origin, names, T, T.T, surface.origin[None], AXES[None], AXES[2], 0.0, 2 * surface.radius, (),
+            is_inner,
         )  # fmt: skip
-    return _axis(face, form)
+    return _axis(face, surface)
 
 
-def _form(face: Surface) -> Form | None:
+def _surface(face: Surface) -> AnalyticSurface | None:
     """The one surface that a face lies on; None of a general one."""
     if is_flat(face):
         corner = face.corner_normals.reshape(-1, 3).mean(axis=0)
         n = corner / np.linalg.norm(corner)
-        stated = [form for form in face.forms if form.kind == "plane"]
+        stated = [surface for surface in face.surfaces if surface.kind == "plane"]
         if stated:
             n = stated[0].axis * np.sign(stated[0].axis @ n)
         height = float((np.asarray(face.mesh.vertices) @ n).mean()) if not stated else float(stated[0].origin @ n)
-        return Form("plane", height * n, n)
-    known = sorted({int(number) for number in face.form_of})
+        return Plane(height * n, n)
+    known = sorted({int(number) for number in face.surface_numbers})
     pieces = int(smooth_pieces(face.mesh, np.arange(len(face.mesh.faces))).max()) + 1
     if len(known) == 1 and known[0] >= 0:
-        return face.forms[known[0]]
-    kinds = [face.forms[number].kind if number >= 0 else "general" for number in known]
+        return face.surfaces[known[0]]
+    kinds = [face.surfaces[number].kind if number >= 0 else "general" for number in known]
     if len(known) > 1 or pieces > 1:
         said = ", ".join(kinds) if len(known) > 1 else f"{pieces} faces with creases between them"
         raise GeometryFault(f"its face spans more than one surface ({said}); a feature is one of them, so choose one")
@@ -190,10 +191,10 @@ def _turned(corners: np.ndarray, turn: float) -> np.ndarray:
     return np.asarray(corners @ np.array([[cos, -sin], [sin, cos]]))
 
 
-def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGeometry:
-    first, second = forms
+def _planes(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) -> FeatureGeometry:
+    first, second = surfaces
     if first is None or second is None or first.kind != "plane" or second.kind != "plane":
-        kinds = " and ".join("a general face" if form is None else f"a {form.kind}" for form in forms)
+        kinds = " and ".join("a general face" if surface is None else f"a {surface.kind}" for surface in surfaces)
         raise GeometryFault(f"it has two faces, {kinds}; expected two planes that are opposed")
     if np.linalg.norm(first.axis + second.axis) > OPPOSED:
         raise GeometryFault("its two planes are not opposed; expected outward normals in opposite directions")
@@ -205,36 +206,36 @@ def _planes(faces: Sequence[Surface], forms: Sequence[Form | None]) -> FeatureGe
     return _plane("planes", middle * n, n, both, (first.axis, second.axis), abs(distance), distance < 0)
 
 
-def _axis(face: Surface, form: Form) -> FeatureGeometry:
+def _axis(face: Surface, surface: AnalyticSurface) -> FeatureGeometry:
     """Of a cylinder or a cone."""
-    a = form.axis * np.sign(form.axis[np.abs(form.axis).argmax()])  # whichever way the file has it
+    a = surface.axis * np.sign(surface.axis[np.abs(surface.axis).argmax()])  # whichever way the file has it
     u, v, names = _frame(a)
     points = np.asarray(face.mesh.vertices)
     along = points @ a
     half, middle = float(np.ptp(along)) / 2, float(along.max() + along.min()) / 2
-    centre = form.origin + (middle - float(form.origin @ a)) * a
-    count = 5 if form.kind == "cone" else 4
+    centre = surface.origin + (middle - float(surface.origin @ a)) * a
+    count = 5 if surface.kind == "cone" else 4
     T, B = np.zeros((6, count)), np.zeros((count, 6))
     for k, e in enumerate((u, v)):
         T[:3, k], B[k, :3] = e, e
         T[3:, 2 + k], B[2 + k, 3:] = np.cross(a, e) / half, np.cross(a, e) * half
     coordinates = [f"shift {names[0]}", f"shift {names[1]}", f"tilt {names[0]}", f"tilt {names[1]}"]
-    if form.kind == "cone":
+    if surface.kind == "cone":
         T[:3, 4], B[4, :3] = a, a
         coordinates.append("along")
-    size = 2 * form.radius if form.kind == "cylinder" else np.nan
+    size = 2 * surface.radius if surface.kind == "cylinder" else np.nan
     ends = centre + half * np.array([[-1.0], [1.0]]) * a
     directions = np.array([[u, v]] * 2)
     is_inner = face.pieces[0].is_hollow
     walls = None
-    if form.kind == "cone":
+    if surface.kind == "cone":
         around = np.arange(ROUND) * 2 * np.pi / ROUND
         out = np.cos(around)[:, None] * u + np.sin(around)[:, None] * v
-        reach = np.abs((ends - form.origin) @ form.axis)[:, None, None] * np.tan(form.angle)
+        reach = np.abs((ends - surface.origin) @ surface.axis)[:, None, None] * np.tan(surface.angle)
         places = (ends[:, None] + reach * out).reshape(-1, 3)
-        normals = np.cos(form.angle) * np.tile(out, (2, 1)) - np.sin(form.angle) * form.axis
+        normals = np.cos(surface.angle) * np.tile(out, (2, 1)) - np.sin(surface.angle) * surface.axis
         walls = (places, normals[:, None])
-    return FeatureGeometry(form.kind, centre, tuple(coordinates), T, B, ends, directions, a, half, size, (), is_inner, walls)
+    return FeatureGeometry(surface.kind, centre, tuple(coordinates), T, B, ends, directions, a, half, size, (), is_inner, walls)
 
 
 def axis_rows(places: np.ndarray, coordinates: int, across: np.ndarray | None = None) -> np.ndarray:
@@ -277,7 +278,7 @@ def _general(face: Surface) -> FeatureGeometry:
     outer = np.unique(np.abs(every @ scaled @ ways).argmax(axis=0))
     return FeatureGeometry(
         "general", centre, names, to_twist @ scaled, values, points[outer], normals[outer, None], first, 0.0, np.nan, (), False,
-        nearest=nearest(np.asarray(mesh.triangles)),
+        nearest=nearest_surface(np.asarray(mesh.triangles)),
     )  # fmt: skip
 
 

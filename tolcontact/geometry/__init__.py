@@ -1,6 +1,6 @@
 """Geometry: shapes, their surfaces and faces, and the files they come from. Part's own frame, mm."""
 
-from tolcontact.geometry.analytic_surfaces import form_arrays, forms_of
+from tolcontact.geometry.analytic_surfaces import surface_arrays, surfaces_of
 from tolcontact.geometry.brep_face import FaceInFile
 from tolcontact.geometry.part_preview import SeenPart, seen
 from tolcontact.geometry.step_listing import BodyInFile, bodies_in, faces_in, parts_from
@@ -12,10 +12,10 @@ __all__ = [
     "SeenPart",
     "bodies_in",
     "faces_in",
-    "form_arrays",
-    "forms_of",
     "known_surfaces",
     "parts_from",
     "seen",
+    "surface_arrays",
+    "surfaces_of",
     "with_known_surfaces",
 ]

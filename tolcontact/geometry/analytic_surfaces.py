@@ -1,157 +1,247 @@
-"""Surfaces that are known exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm."""
+"""Surfaces known exactly: planes, cylinders, cones, spheres and tori, in double precision. Lengths in mm.
 
-import json
+Each kind is a class, which `ANALYTIC_SURFACES` lists by the kind's name.
+"""
+
+import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from tolcontact.vocabulary import SURFACE_KINDS
 
-NUMBERS = ("origin", "axis", "radius", "minor", "angle")
-METRE = 1e3  # [mm], the reader's unit
-ROUNDS = 4  # of Newton's method: as many as bring vertices off by micrometres to the last digit
-PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different ones
+PROJECTIONS = 2  # one is exact but for rounding
 
 
 @dataclass(frozen=True, eq=False)
-class Form:
-    """A surface without ends.
+class AnalyticSurface(ABC):
+    """A surface without ends. A size that its kind does not have is 0.
 
-    kind     one of `SURFACE_KINDS`
-    origin   a point of a plane or of the axis (3,) [mm]: a cone's apex, the centre of a sphere or torus
-    axis     normal of a plane, or unit vector along the axis (3,): from a cone's apex into it; of a sphere it has no meaning
-    radius   [mm] of a cylinder or sphere, or of the circle in a torus' middle; else 0
-    minor    [mm] radius of a torus' tube; else 0
-    angle    [rad] between axis and surface of a cone; else 0
-    residual [mm] how far the vertices that it was fitted to lie off it at most
-    is_fitted  whether it was; else a file states it
+    origin     a point of a plane or of the axis (3,) [mm]: the apex of a cone, the centre of a sphere or torus
+    axis       normal of a plane, or unit vector along the axis (3,): from the apex into a cone; of a sphere without meaning
+    residual   [mm] largest distance of the vertices to which it was fitted
+    is_fitted  whether it was fitted; otherwise a file states it
     """
 
-    kind: str
+    kind: ClassVar[str]
+    sizes: ClassVar[tuple[str, ...]] = ()  # the names of its sizes
+    radius = 0.0
+    minor = 0.0
+    angle = 0.0
+
     origin: np.ndarray
     axis: np.ndarray
-    radius: float = 0.0
-    minor: float = 0.0
-    angle: float = 0.0
-    residual: float = 0.0
-    is_fitted: bool = False
+    residual: float = field(default=0.0, kw_only=True)
+    is_fitted: bool = field(default=False, kw_only=True)
 
-    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Signed distances (point,) [mm] of `points` (point, 3) [mm], and their gradients (point, 3): unit vectors.
+    @classmethod
+    def of(cls, numbers: Mapping[str, Any]) -> Self:
+        """Return the surface with an origin, an axis and sizes by name; sizes that its kind does not have are ignored."""
+        return cls(**{name: numbers[name] for name in ("origin", "axis", *cls.sizes)})
 
-        Positive in front of a plane, and outside of anything round. Where the nearest point is not unique (on an axis) the
-        gradient is 0.
+    @abstractmethod
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] of a point from the surface, positive in front of a plane or outside.
+
+        radial  distance [mm] from the centre of a sphere, the axis of a cylinder or cone, or the circle inside a torus
+        along   height [mm] over a plane, or place along the axis of a cone, from its apex
+
+        Numbers, NumPy arrays and CasADi expressions are accepted alike.
         """
-        apart = points - self.origin
-        if self.kind == "plane":
-            return apart @ self.axis, np.broadcast_to(self.axis, points.shape)
-        if self.kind == "sphere":
-            r, outward = _length_and_direction(apart)
-            return r - self.radius, outward
-        along = apart @ self.axis
-        r, outward = _length_and_direction(apart - along[:, None] * self.axis)
-        if self.kind == "cylinder":
-            return r - self.radius, outward
-        if self.kind == "cone":
-            cos, sin = np.cos(self.angle), np.sin(self.angle)
-            # The nearest of the two nappes' lines, which are one line through the apex for each side.
-            side = np.where(along < 0, -1.0, 1.0)
-            return r * cos - side * along * sin, cos * outward - (side * sin)[:, None] * self.axis
-        tube, away = _length_and_direction((r - self.radius)[:, None] * outward + along[:, None] * self.axis)
-        return tube - self.minor, away
 
-    def placed(self, R: np.ndarray, t: np.ndarray) -> "Form":
-        """It turned by R (3, 3), then moved by t (3,) [mm]."""
+    @abstractmethod
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm] of `points` (point, 3) [mm], and their gradients (point, 3), unit vectors.
+
+        Where the nearest point is not unique (on an axis) the gradient is 0.
+        """
+
+    def offset(self, point: np.ndarray) -> np.ndarray:
+        """Return the vector (3,) from the origin to a point (3,), without its part along which the origin is arbitrary."""
+        return point - self.origin
+
+    def placed(self, R: np.ndarray, t: np.ndarray) -> Self:
+        """Return the surface turned by R (3, 3), then moved by t (3,) [mm]."""
         return replace(self, origin=R @ self.origin + t, axis=R @ self.axis)
 
     def project(self, points: np.ndarray) -> np.ndarray:
-        """The nearest points of the surface (point, 3) [mm]."""
-        for _ in range(2):  # once is exact but for rounding
+        """Return the points of the surface (point, 3) [mm] nearest to `points` (point, 3) [mm]."""
+        for _ in range(PROJECTIONS):
             value, slope = self.distance(points)
             points = points - value[:, None] * slope
         return points
 
+    def _around_axis(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return distances (point,) from the axis, unit vectors (point, 3) away from it, and places (point,) along it."""
+        offset = points - self.origin
+        along = offset @ self.axis
+        return *_length_and_direction(offset - along[:, None] * self.axis), along
 
-def form_arrays(of: Sequence[Form | None]) -> dict[str, np.ndarray]:
-    """Surfaces as arrays (surface, ...) by name, as an archive has them; `kind` is its number in SURFACE_KINDS, -1 of None."""
-    known = [form or Form("plane", np.zeros(3), np.zeros(3)) for form in of]
-    kinds = np.array([-1 if form is None else SURFACE_KINDS.index(form.kind) for form in of])
-    return {"kind": kinds} | {name: np.array([getattr(form, name) for form in known]) for name in NUMBERS}
+
+class RoundSurface(AnalyticSurface):
+    """A surface whose hollow side has tangent planes around it: a cylinder, cone or sphere."""
+
+    def tangent(self, direction: np.ndarray) -> "Plane":
+        """Return the tangent plane in a direction (3,) from the axis or centre; its normal points inward."""
+        return Plane(self.origin + self.radius * direction, -direction)
+
+    @abstractmethod
+    def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the place (3,) nearest to a point (3,) among those in a direction (3,) from the axis or centre."""
 
 
-def forms_of(arrays: Mapping[str, np.ndarray]) -> list[Form | None]:
-    """Surfaces from such arrays."""
-    numbers = {name: values for name, values in arrays.items() if name != "kind"}
+@dataclass(frozen=True, eq=False)
+class Plane(AnalyticSurface):
+    """A plane; its axis is its normal."""
+
+    kind = "plane"
+
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the height over the plane [mm]."""
+        return along
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return heights (point,) [mm] over the plane, and its normal (point, 3)."""
+        return (points - self.origin) @ self.axis, np.broadcast_to(self.axis, points.shape)
+
+    def offset(self, point: np.ndarray) -> np.ndarray:
+        """Return the part of the offset that is along the normal."""
+        return float((point - self.origin) @ self.axis) * self.axis
+
+
+@dataclass(frozen=True, eq=False)
+class Cylinder(RoundSurface):
+    """A cylinder with a `radius` [mm] around its axis."""
+
+    kind, sizes = "cylinder", ("radius",)
+    radius: float
+
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the cylinder."""
+        return radial - self.radius
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
+        radial, outward, along = self._around_axis(points)
+        return self.height(radial, along), outward
+
+    def offset(self, point: np.ndarray) -> np.ndarray:
+        """Return the part of the offset that is across the axis."""
+        return _across(point - self.origin, self.axis)
+
+    def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the nearest place of the line in a direction from the axis."""
+        return self.origin + ((point - self.origin) @ self.axis) * self.axis + self.radius * direction
+
+
+@dataclass(frozen=True, eq=False)
+class Cone(RoundSurface):
+    """A cone with an `angle` [rad] between its axis and its surface."""
+
+    kind, sizes = "cone", ("angle",)
+    angle: float
+
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the nappe on the side of the axis."""
+        return radial * np.cos(self.angle) - along * np.sin(self.angle)
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm] from the nearest of both nappes, and their gradients (point, 3)."""
+        radial, outward, along = self._around_axis(points)
+        side = np.where(along < 0, -1.0, 1.0)  # the nappes meet in one line through the apex
+        slope = np.cos(self.angle) * outward - (side * np.sin(self.angle))[:, None] * self.axis
+        return self.height(radial, side * along), slope
+
+    def offset(self, point: np.ndarray) -> np.ndarray:
+        """Return the part of the offset that is across the axis: files place cones anywhere along it."""
+        return _across(point - self.origin, self.axis)
+
+    def tangent(self, direction: np.ndarray) -> Plane:
+        """Return the tangent plane in a direction (3,) from the axis; its normal points inward."""
+        return Plane(self.origin, math.sin(self.angle) * self.axis - math.cos(self.angle) * direction)
+
+    def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the nearest place of the line in a direction from the axis."""
+        line = math.cos(self.angle) * self.axis + math.sin(self.angle) * direction
+        return self.origin + ((point - self.origin) @ line) * line
+
+
+@dataclass(frozen=True, eq=False)
+class Sphere(RoundSurface):
+    """A sphere with a `radius` [mm]."""
+
+    kind, sizes = "sphere", ("radius",)
+    radius: float
+
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the sphere."""
+        return radial - self.radius
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
+        radial, outward = _length_and_direction(points - self.origin)
+        return self.height(radial, 0.0), outward
+
+    def touched(self, point: np.ndarray, direction: np.ndarray) -> np.ndarray:
+        """Return the place in a direction from the centre."""
+        return self.origin + self.radius * direction
+
+
+@dataclass(frozen=True, eq=False)
+class Torus(AnalyticSurface):
+    """A torus: a tube with the radius `minor` [mm] along a circle with a `radius` [mm] around the axis."""
+
+    kind, sizes = "torus", ("radius", "minor")
+    radius: float
+    minor: float
+
+    def height(self, radial: Any, along: Any) -> Any:
+        """Return the signed distance [mm] from the tube."""
+        return radial - self.minor
+
+    def from_circle(self, radial: Any, outward: Any, along: Any, axis: Any) -> Any:
+        """Return the vector from the circle to a point, given by its place `along` the axis and distance `radial` from it.
+
+        `outward` is the unit vector from the axis to the point. Arrays and CasADi expressions are accepted alike.
+        """
+        return (radial - self.radius) * outward + along * axis
+
+    def distance(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return signed distances (point,) [mm], and their gradients (point, 3)."""
+        radial, outward, along = self._around_axis(points)
+        tube, slope = _length_and_direction(self.from_circle(radial[:, None], outward, along[:, None], self.axis))
+        return self.height(tube, along), slope
+
+
+ANALYTIC_SURFACES: dict[str, type[AnalyticSurface]] = {
+    surface.kind: surface for surface in (Plane, Cylinder, Cone, Sphere, Torus)
+}
+_NUMBERS = ("origin", "axis", "radius", "minor", "angle")
+
+
+def surface_arrays(surfaces: Sequence[AnalyticSurface | None]) -> dict[str, np.ndarray]:
+    """Return surfaces as arrays (surface, ...) by name, as archives hold them.
+
+    `kind` is the place in SURFACE_KINDS; it is -1 for None.
+    """
+    filled = [surface or Plane(np.zeros(3), np.zeros(3)) for surface in surfaces]
+    kinds = np.array([-1 if surface is None else SURFACE_KINDS.index(surface.kind) for surface in surfaces])
+    return {"kind": kinds} | {name: np.array([getattr(surface, name) for surface in filled]) for name in _NUMBERS}
+
+
+def surfaces_of(arrays: Mapping[str, np.ndarray]) -> list[AnalyticSurface | None]:
+    """Return the surfaces that `surface_arrays` wrote."""
     return [
-        None if kind < 0 else Form(SURFACE_KINDS[kind], **{name: values[k] for name, values in numbers.items()})
-        for k, kind in enumerate(arrays["kind"])
+        None if kind < 0 else ANALYTIC_SURFACES[SURFACE_KINDS[kind]].of({name: arrays[name][number] for name in _NUMBERS})
+        for number, kind in enumerate(arrays["kind"])
     ]
 
 
-def forms(text: str) -> list[Form | None]:
-    """The surface of each B-rep face, from what the reader said of them; None of those that are none of these."""
-    return [_form(said) if said and said.get("type") in SURFACE_KINDS else None for said in json.loads(text)]
-
-
-def _form(said: dict[str, Any]) -> Form | None:
-    kind = said["type"]
-    origin = METRE * np.array(said[{"cone": "apex", "sphere": "center", "torus": "center"}.get(kind, "origin")], dtype=float)
-    axis = np.array(said.get("normal" if kind == "plane" else "axis", (0.0, 0.0, 1.0)), dtype=float)
-    sizes = [METRE * float(said.get(word, 0.0)) for word in (("major_radius" if kind == "torus" else "radius"), "minor_radius")]
-    angle = float(said.get("semi_angle", 0.0))
-    numbers = np.concatenate([origin, axis, sizes, [angle]])
-    if not (np.isfinite(numbers).all() and np.linalg.norm(axis) > 0):
-        return None
-    # The kernel's cones may open against their axis.
-    return Form(kind, origin, np.sign(angle or 1.0) * axis / np.linalg.norm(axis), sizes[0], sizes[1], abs(angle))
-
-
-def believed(
-    vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, of: Sequence[Form | None], most: float
-) -> list[Form | None]:
-    """The surfaces `of` a shape's B-rep faces, but for those that its own vertices are farther from than `most` [mm]."""
-    kept = list(of)
-    for number, form in enumerate(of):
-        own = np.unique(faces[brep == number]) if form is not None else ()
-        if form is not None and not (len(own) and np.abs(form.distance(vertices[own])[0]).max() <= most):
-            kept[number] = None
-    return kept
-
-
-def onto(vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, of: Sequence[Form | None], most: float) -> np.ndarray:
-    """`vertices` (vertex, 3) [mm], moved the shortest way onto all analytic surfaces that meet in them, by `most` at most.
-
-    faces   (face, 3), each of the B-rep face `brep` (face,) whose surface is one of those `of` the shape
-    """
-    known = np.array([form is not None for form in of])
-    meetings = np.unique(np.column_stack([faces.ravel(), np.repeat(brep, 3)]), axis=0)
-    meetings = meetings[known[meetings[:, 1]]]
-    moved = np.array(vertices)
-    for _ in range(ROUNDS):
-        moved -= _steps(moved, meetings, of)
-    is_near = np.linalg.norm(moved - vertices, axis=1) <= most
-    return np.where(is_near[:, None], moved, vertices)
-
-
-def _steps(vertices: np.ndarray, meetings: np.ndarray, of: Sequence[Form | None]) -> np.ndarray:
-    """Shortest steps (vertex, 3) that end, to first order, on all surfaces that meet there: `meetings` (meeting, 2)."""
-    value, slope = np.zeros(len(meetings)), np.zeros((len(meetings), 3))
-    for number in np.unique(meetings[:, 1]):
-        form, own = of[number], np.flatnonzero(meetings[:, 1] == number)
-        if form is not None:
-            value[own], slope[own] = form.distance(vertices[meetings[own, 0]])
-    step = np.zeros_like(vertices)
-    vertex, first, count = np.unique(meetings[:, 0], return_index=True, return_counts=True)
-    for size in np.unique(count):
-        own, at = vertex[count == size], first[count == size]
-        rows = at[:, None] + np.arange(size)
-        if size == 1:
-            step[own] = value[at][:, None] * slope[at]
-        else:
-            step[own] = np.einsum("nij,nj->ni", np.linalg.pinv(slope[rows], rcond=PARALLEL), value[rows])
-    return step
+def _across(vector: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    return vector - float(vector @ axis) * axis
 
 
 def _length_and_direction(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,10 +8,10 @@ import trimesh
 
 from tolcontact.declaration.vectors import Vector
 from tolcontact.errors import shown
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere
 from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
-from tolcontact.geometry.fitting import fitted
+from tolcontact.geometry.fitting import fit_surface
 from tolcontact.readable import Readable
 
 FIT = 1e-3  # [mm] a face none of whose vertices is farther off a plane, cylinder, cone or sphere is on one
@@ -55,7 +55,7 @@ class FaceInFile(Readable):
         return ", ".join([*words, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
-def numbered(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[Form | None]]:
+def numbered(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:
     """The number of each triangle's face (face,), from 0, and the surfaces that are stated: of the B-rep faces of a STEP file.
 
     Other meshes have smooth pieces instead, of which nothing is stated.
@@ -73,27 +73,28 @@ def described(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         surfaces = enumerate(zip(groups, stated, strict=True), start=1)
-        found = (_described(mesh, number, own, form) for number, (own, form) in surfaces)
+        found = (_described(mesh, number, own, surface) for number, (own, surface) in surfaces)
         names = mesh.metadata.get(FACE_NAMES) or [""] * len(stated)
         mesh.metadata[DESCRIBED] = tuple(replace(face, name=name) for face, name in zip(found, names, strict=True))
     return mesh.metadata[DESCRIBED]  # type: ignore[no-any-return]
 
 
-def _described(mesh: trimesh.Trimesh, number: int, own: np.ndarray, form: Form | None) -> FaceInFile:
-    """The face of a number that consists of the triangles `own` (face,), on the `form` that the file states."""
+def _described(mesh: trimesh.Trimesh, number: int, own: np.ndarray, surface: AnalyticSurface | None) -> FaceInFile:
+    """The face of a number that consists of the triangles `own` (face,), on the `surface` that the file states."""
     areas, normals = np.asarray(mesh.area_faces)[own], np.asarray(mesh.face_normals)[own]
-    form = form or fitted(np.asarray(mesh.triangles)[own], FIT)
+    surface = surface or fit_surface(np.asarray(mesh.triangles)[own], FIT)
     largest = int(areas.argmax())
     point, area = np.asarray(mesh.triangles_center)[own[largest]], float(areas.sum())
-    if form is None:
+    if surface is None:
         return FaceInFile(number, "general", in_words(point), None, None, False, area)
-    point = form.project(point[None])[0]
-    _, outward = form.distance(point[None] + 1e-6 * normals[largest])
+    point = surface.project(point[None])[0]
+    _, outward = surface.distance(point[None] + 1e-6 * normals[largest])
     is_inward = float(outward[0] @ normals[largest]) < 0
-    direction = None if form.kind == "sphere" else in_words(-form.axis if form.kind == "plane" and is_inward else form.axis)
-    radius = form.radius if form.kind in ("cylinder", "sphere", "torus") else None
-    is_inner = is_inward and form.kind != "plane"
-    return FaceInFile(number, form.kind, in_words(point), direction, radius, is_inner, area, form.residual)
+    is_plane = isinstance(surface, Plane)
+    direction = None if isinstance(surface, Sphere) else in_words(-surface.axis if is_plane and is_inward else surface.axis)
+    radius = surface.radius if "radius" in surface.sizes else None
+    is_inner = is_inward and not is_plane
+    return FaceInFile(number, surface.kind, in_words(point), direction, radius, is_inner, area, surface.residual)
 
 
 def in_words(numbers: np.ndarray) -> Vector:

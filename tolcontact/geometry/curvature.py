@@ -89,7 +89,7 @@ def facet_error(own: Surface, target: Surface, within: float) -> float:
     """
     total = 0.0
     for face, other in ((own, target), (target, own)):
-        total += max((form.residual for form in face.forms), default=0.0)
+        total += max((surface.residual for surface in face.surfaces), default=0.0)
         rest = face.unknown
         if len(rest.mesh.faces):
             height, length = _chords(rest)

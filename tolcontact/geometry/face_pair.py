@@ -58,7 +58,7 @@ class Side:
     @cached_property
     def _bulge(self) -> float:
         """How far [mm] known surfaces may stand out of the body's flat triangles."""
-        return max((chord_height(piece.surface) for piece in self.face.pieces), default=0.0)
+        return max((chord_height(piece.face) for piece in self.face.pieces), default=0.0)
 
     @cached_property
     def _plane(self) -> tuple[np.ndarray, float] | None:
@@ -113,7 +113,7 @@ def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
     if len(points) > MOST:
         points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
     triangle, nearest = face.nearest(points)
-    return Side(face, body, face.project(points)[0] if face.forms else points, face.normals(triangle, nearest))
+    return Side(face, body, face.project(points)[0] if face.surfaces else points, face.normals(triangle, nearest))
 
 
 def _all_over(mesh: trimesh.Trimesh, step: float, wanted: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from tolcontact.geometry.brep_face import FaceInFile, described, numbered
 from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
-from tolcontact.geometry.surface_recognition import known_forms
+from tolcontact.geometry.surface_recognition import analytic_surfaces
 
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
@@ -36,8 +36,8 @@ def patch(face: Face, meshes: Meshes) -> Surface:
     mesh = meshes[face.part]
     chosen = triangles(face, meshes)
     used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
-    forms, form_of = known_forms(mesh, chosen)
-    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False), None, forms, form_of)
+    surfaces, surface_numbers = analytic_surfaces(mesh, chosen)
+    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False), None, surfaces, surface_numbers)
     for selection in face.selections:
         if isinstance(selection, Inside):
             own = _cut(own, selection, CUT_MARGIN * mesh.scale)
@@ -198,7 +198,7 @@ def _cut(own: Surface, box: Inside, margin: float) -> Surface:
     # A cut does not change the face: the normals are still those of the whole, also where its triangles end now.
     origin, _ = own.nearest(cut.triangles_center)
     normals = np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
-    return Surface(cut, normals, own.forms, own.form_of[origin])
+    return Surface(cut, normals, own.surfaces, own.surface_numbers[origin])
 
 
 def sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) -> tuple[np.ndarray, np.ndarray]:

@@ -9,11 +9,11 @@ import numpy as np
 import trimesh
 from scipy.sparse import csr_array
 
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import CREASE, on_rim, rim
 
 OVER = 1e-6  # of a face's size: what stands no farther beside its rim is over it
-TURN = 0.3  # rad: what the normals of a triangle and of the form that it stands for differ by at most, and
+TURN = 0.3  # rad: what the normals of a triangle and of the surface that it stands for differ by at most, and
 BULGE = 0.05  # of a face's size: how far it may be off that
 FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
 
@@ -23,20 +23,20 @@ class Surface:
 
     corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated.
                      Without them they follow from the facets around.
-    forms            surfaces that are known exactly; where a triangle stands for one of them, feet and normals are its own
-    form_of          (face,): the number of the form that each triangle stands for; -1: the triangle itself is all that is known
+    surfaces         analytic surfaces; where a triangle stands for one of them, feet and normals are those of the surface
+    surface_numbers  (face,): the number of the surface for which each triangle stands, -1 for none
     """
 
     def __init__(
         self,
         mesh: trimesh.Trimesh,
         corner_normals: np.ndarray | None = None,
-        forms: Sequence[Form] = (),
-        form_of: np.ndarray | None = None,
+        surfaces: Sequence[AnalyticSurface] = (),
+        surface_numbers: np.ndarray | None = None,
     ) -> None:
         self.mesh = mesh
-        self.forms = tuple(forms)
-        self.form_of = np.full(len(mesh.faces), -1) if form_of is None else form_of
+        self.surfaces = tuple(surfaces)
+        self.surface_numbers = np.full(len(mesh.faces), -1) if surface_numbers is None else surface_numbers
         self._given = corner_normals
         self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
@@ -49,38 +49,38 @@ class Surface:
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
         normals = np.array(_corner_normals(self.mesh) if self._given is None else self._given)
-        for form, own, outside in self._known:
+        for surface, own, outside in self._known:
             corners = np.asarray(self.mesh.triangles)[own].reshape(-1, 3)
-            normals[own] = _normals_of(form, outside, corners, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
+            normals[own] = _normals_of(surface, outside, corners, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _known(self) -> list[tuple[Form, np.ndarray, float]]:
-        """Forms, the triangles that stand for each, and 1 or -1: whether their outside is the form's, or they are hollow."""
+    def _known(self) -> list[tuple[AnalyticSurface, np.ndarray, float]]:
+        """The surfaces, the triangles that stand for each, and 1, or -1 if the triangles are hollow."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
         found = []
-        for number, form in enumerate(self.forms):
-            own = np.flatnonzero(self.form_of == number)
+        for number, surface in enumerate(self.surfaces):
+            own = np.flatnonzero(self.surface_numbers == number)
             if own.size:
-                _, slope = form.distance(centres[own])
-                found.append((form, own, 1.0 if (slope * facets[own]).sum() > 0 else -1.0))
+                _, slope = surface.distance(centres[own])
+                found.append((surface, own, 1.0 if (slope * facets[own]).sum() > 0 else -1.0))
         return found
 
     @property
     def pieces(self) -> "list[Piece]":
-        """What lies on each of its forms."""
-        return [Piece(form, outside < 0, self.part(own)) for form, own, outside in self._known]
+        """What lies on each of its surfaces."""
+        return [Piece(surface, outside < 0, self.part(own)) for surface, own, outside in self._known]
 
     @property
     def unknown(self) -> "Surface":
-        """The triangles that stand for no form."""
-        return self.part(np.flatnonzero(self.form_of < 0))
+        """The triangles that stand for no surface."""
+        return self.part(np.flatnonzero(self.surface_numbers < 0))
 
     def part(self, faces: np.ndarray) -> "Surface":
         """Some of its triangles."""
         used, renumbered = np.unique(self._faces[faces], return_inverse=True)
         mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
-        return Surface(mesh, self.corner_normals[faces], self.forms, self.form_of[faces])
+        return Surface(mesh, self.corner_normals[faces], self.surfaces, self.surface_numbers[faces])
 
     @cached_property
     def curvature(self) -> float:
@@ -120,21 +120,25 @@ class Surface:
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for form, some, outside in self._stand_for(triangle):
-            normals[some] = _normals_of(form, outside, points[some], normals[some])
+        for surface, some, outside in self._stand_for(triangle):
+            normals[some] = _normals_of(surface, outside, points[some], normals[some])
         return np.asarray(normals)
 
-    def _stand_for(self, triangle: np.ndarray) -> list[tuple[Form, np.ndarray, float]]:
-        """Forms, which of some triangles (point,) stand for each, and 1 or -1, as in `_known`."""
-        if not self.forms:
+    def _stand_for(self, triangle: np.ndarray) -> list[tuple[AnalyticSurface, np.ndarray, float]]:
+        """Analytic surfaces, which of some triangles (point,) stand for each, and 1 or -1, as in `_known`."""
+        if not self.surfaces:
             return []
-        numbers = self.form_of[triangle]
-        return [(form, np.flatnonzero(numbers == self.form_of[own[0]]), outside) for form, own, outside in self._known]
+        numbers = self.surface_numbers[triangle]
+        return [
+            (surface, np.flatnonzero(numbers == self.surface_numbers[own[0]]), outside) for surface, own, outside in self._known
+        ]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
         """The surface turned by R (3, 3), then moved by t (3,) [mm]."""
         moved = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
-        return Surface(moved, self.corner_normals @ R.T, [form.placed(R, t) for form in self.forms], self.form_of)
+        return Surface(
+            moved, self.corner_normals @ R.T, [surface.placed(R, t) for surface in self.surfaces], self.surface_numbers
+        )
 
     def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
         return np.asarray(trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points))
@@ -144,18 +148,18 @@ class Surface:
 
         Returns the nearest points (point, 3) [mm], the outward unit normals there (point, 3), and a mask (point,) of the
         points that lie over the surface, that is do not overhang its rim by more than `margin` [mm]. Where a triangle stands
-        for a form, nearest points and normals are those of the form. On other curved faces normals are interpolated between
-        the corners of a facet: they change steadily as a point moves.
+        for an analytic surface, nearest points and normals are those of that surface. On other curved faces normals are
+        interpolated between the corners of a facet: they change steadily as a point moves.
         """
         triangle, nearest = self.nearest(points)
         sideways, at_rim = self._sideways(points, triangle, nearest)
         over = ~at_rim | (sideways <= max(margin, OVER * self.mesh.scale))
         feet = np.array(nearest)
-        for form, some, _ in self._stand_for(triangle):
-            below, own = form.project(nearest[some]), form.project(points[some])
+        for surface, some, _ in self._stand_for(triangle):
+            below, own = surface.project(nearest[some]), surface.project(points[some])
             apart = np.linalg.norm(own - nearest[some], axis=1)
             height = np.linalg.norm(points[some] - nearest[some], axis=1)
-            # Near its axis, and beyond, a form has feet elsewhere.
+            # Near its axis, and beyond, a surface has feet elsewhere.
             is_here = ~at_rim[some] & (apart <= TURN * height + BULGE * self.mesh.scale)
             feet[some] = np.where(is_here[:, None], own, below)
         return feet, self.normals(triangle, feet), over
@@ -166,8 +170,8 @@ class Surface:
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
         depth = np.linalg.norm(offset, axis=1)
-        for form, some, outside in self._stand_for(triangle):
-            height[some] = outside * form.distance(points[some])[0]
+        for surface, some, outside in self._stand_for(triangle):
+            height[some] = outside * surface.distance(points[some])[0]
             depth[some] = np.abs(height[some])
         behind = np.flatnonzero(height < 0)
         sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
@@ -184,8 +188,8 @@ class Surface:
     def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far points stand beside their nearest ones, across normals there (point,) [mm]; whether those are on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for form, some, _ in self._stand_for(triangle):
-            normal[some] = form.distance(nearest[some])[1]
+        for surface, some, _ in self._stand_for(triangle):
+            normal[some] = surface.distance(nearest[some])[1]
         offset = points - nearest
         sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
         coordinates = self._barycentric(triangle, nearest)
@@ -197,16 +201,16 @@ class Surface:
 
 
 class Piece(NamedTuple):
-    """What of a face lies on one form; hollow if the material is around it."""
+    """What of a face lies on one surface; hollow if the material is around it."""
 
-    form: Form
+    surface: AnalyticSurface
     is_hollow: bool
-    surface: Surface
+    face: Surface
 
 
-def _normals_of(form: Form, outside: float, points: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Outward normals (point, 3) of a form; those given (point, 3) where it has none: in the apex of a cone, on an axis."""
-    _, slope = form.distance(points)
+def _normals_of(surface: AnalyticSurface, outside: float, points: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+    """Outward normals (point, 3) of a surface; those given (point, 3) where it has none: in the apex of a cone, on an axis."""
+    _, slope = surface.distance(points)
     has_one = np.linalg.norm(slope, axis=1) > 0.5
     return np.where(has_one[:, None], outside * slope, otherwise)
 

@@ -183,9 +183,9 @@ def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Ter
 def _distance(point: RoundPoint, c: ca.SX, grown: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
     """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
 
-    Positive outside; see Form.distance. Of a hollow wall that is not whole it is that of the nearest tangent plane which the
-    wall has. The second derivative is in two parts, of which the first is positive semidefinite; it depends on what freedom
-    is left once ball and wall have grown by `grown` [mm] together.
+    Positive outside; see AnalyticSurface.distance. Of a hollow wall that is not whole it is that of the nearest tangent plane
+    which the wall has. The second derivative is in two parts, of which the first is positive semidefinite; it depends on
+    what freedom is left once ball and wall have grown by `grown` [mm] together.
     """
     kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
     R, r, one, nothing = float(point.wall.radius), float(point.radius), ca.SX.eye(3), ca.SX.zeros(3, 3)

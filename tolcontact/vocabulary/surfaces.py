@@ -8,8 +8,8 @@ SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order
 KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 
-def _of_form(word: str, dim: str, whose: str) -> dict[str, ArchiveVariable]:
-    """What a surface is, by the names that its parts have in the program."""
+def _surface_variables(word: str, dim: str, whose: str) -> dict[str, ArchiveVariable]:
+    """Return the variables of a surface, by the names of the attributes that they hold."""
     return {
         "kind": ArchiveVariable(f"{word}_kind", (dim,), "i1", f"kind of {whose}; -1: not known", "1", KINDS_MEAN),
         "origin": ArchiveVariable(
@@ -27,7 +27,7 @@ def _of_form(word: str, dim: str, whose: str) -> dict[str, ArchiveVariable]:
 
 
 BREP_OF_FACE = ArchiveVariable("brep_of_face", (FACE,), "i4", "number of the B-rep face of each triangle, counted from 0")
-OF_BREP_FACE = _of_form("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
+OF_BREP_FACE = _surface_variables("surface", BREP_FACE, "the surface of a B-rep face, as the file stated it")
 NAME_OF_BREP_FACE = ArchiveVariable(
     "surface_name", (BREP_FACE,), str, "what the file calls a B-rep face; empty: it has no name"
 )
@@ -35,7 +35,7 @@ NAME_OF_BREP_FACE = ArchiveVariable(
 POINT_OF_ROUND = ArchiveVariable(
     "point_of_round", (ROUND_POINT,), "i4", "number of the contact point that is one of round faces, counted from 0"
 )
-OF_WALL = _of_form("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
+OF_WALL = _surface_variables("wall", ROUND_POINT, "the wall that a ball or shaft may touch, nominal")
 OF_ROUND = {
     "is_hollow": ArchiveVariable("wall_is_hollow", (ROUND_POINT,), "i1", "1 if the wall is around the ball or shaft", "1"),
     "towards": ArchiveVariable(

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tolcontact.geometry.analytic_surfaces import Form
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import edges
 from tolcontact.geometry.fault import clipped
 from tolcontact.geometry.files.step_text import NamedFace, Solid
@@ -54,7 +54,7 @@ class Triangles:
     shape, brep          (face,) the shape, in whose own frame it is, and the B-rep face within it
     products             (shape,) what the file calls each shape
     coloured             (shape,) bool: of several colours, by which its B-rep faces are ordered, and not by solids
-    forms                (shape,): the surface of each B-rep face, None if it is not known
+    surfaces                (shape,): the surface of each B-rep face, None if it is not known
     unit                 [mm] of length in the file's text
     """
 
@@ -64,7 +64,7 @@ class Triangles:
     brep: np.ndarray
     products: np.ndarray
     coloured: np.ndarray
-    forms: Sequence[Sequence[Form | None]]
+    surfaces: Sequence[Sequence[AnalyticSurface | None]]
     unit: float
 
 
@@ -133,12 +133,12 @@ def _body(
     if not len(chosen):
         return Body(name, place.path, place.place)
     corners = triangles.corners[chosen].reshape(-1, 3) @ place.place[:3, :3].T + place.place[:3, 3]
-    forms = [triangles.forms[place.shape][number] for number in np.unique(triangles.brep[chosen])]
-    names = () if triangles.coloured[place.shape] else _face_names(forms, solids, triangles.unit)
+    surfaces = [triangles.surfaces[place.shape][number] for number in np.unique(triangles.brep[chosen])]
+    names = () if triangles.coloured[place.shape] else _face_names(surfaces, solids, triangles.unit)
     return Body(name, place.path, place.place, chosen, corners.min(axis=0), corners.max(axis=0), is_open, names)
 
 
-def _face_names(forms: Sequence[Form | None], solids: Sequence[Solid], unit: float) -> tuple[str, ...]:
+def _face_names(surfaces: Sequence[AnalyticSurface | None], solids: Sequence[Solid], unit: float) -> tuple[str, ...]:
     """What the only solid calls its faces that has as many, with these surfaces in this order; of several such, if all agree.
 
     The kernel puts faces in another order where it mends a shell.
@@ -146,21 +146,20 @@ def _face_names(forms: Sequence[Form | None], solids: Sequence[Solid], unit: flo
     alike = {
         tuple(face.name for face in solid.faces)
         for solid in solids
-        if len(solid.faces) == len(forms) and all(_is_on(f, form, unit) for f, form in zip(solid.faces, forms, strict=True))
+        if len(solid.faces) == len(surfaces)
+        and all(_is_on(f, surface, unit) for f, surface in zip(solid.faces, surfaces, strict=True))
     }
     return alike.pop() if len(alike) == 1 else ()
 
 
-def _is_on(face: NamedFace, form: Form | None, unit: float) -> bool:
+def _is_on(face: NamedFace, surface: AnalyticSurface | None, unit: float) -> bool:
     """Whether a face of the file's text may have a surface: nothing that is known of both contradicts it."""
-    if form is None:
+    if surface is None:
         return True
-    if face.kind != form.kind or face.location is None:
+    if face.kind != surface.kind or face.location is None:
         return False
-    apart = unit * np.array(face.location) - form.origin
-    along = float(apart @ form.axis) * form.axis
-    off = along if form.kind == "plane" else apart - along if form.kind in ("cylinder", "cone") else apart
-    return float(np.linalg.norm(off)) < SAME * max(1.0, float(np.abs(form.origin).max()))
+    offset = surface.offset(unit * np.array(face.location))
+    return float(np.linalg.norm(offset)) < SAME * max(1.0, float(np.abs(surface.origin).max()))
 
 
 def _runs(triangles: Triangles, own: np.ndarray) -> list[tuple[np.ndarray, bool]]:

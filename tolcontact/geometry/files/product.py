@@ -11,10 +11,11 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration.geometry import UNITS
-from tolcontact.geometry.analytic_surfaces import Form, believed, forms, onto
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files.bodies import Body, Place, Triangles, bodies, listed
+from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
@@ -34,14 +35,14 @@ class Product:
     """All shapes in one mesh, each in its own frame, and the bodies that they are at their places.
 
     shape, brep   (face,) the shape of each triangle, and the B-rep face within it
-    forms         (shape,): what is known of the surface of each B-rep face
+    surfaces       (shape,): what is known of the surface of each B-rep face
     """
 
     path: Path
     mesh: trimesh.Trimesh
     shape: np.ndarray
     brep: np.ndarray
-    forms: tuple[list[Form | None], ...]
+    surfaces: tuple[list[AnalyticSurface | None], ...]
     bodies: tuple[Body, ...]
     text: StepText
 
@@ -76,11 +77,13 @@ class Product:
         used, faces = np.unique(self.mesh.faces[own], return_inverse=True)
         vertices = np.asarray(self.mesh.vertices)[used]
         numbers, brep = np.unique(self.brep[own], return_inverse=True)
-        known = self.forms[int(self.shape[own[0]])]
+        known = self.surfaces[int(self.shape[own[0]])]
         surfaces = [known[number] if number < len(known) else None for number in numbers]
         if wanted is None and not np.array_equal(body.place, np.eye(4)):
             vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
-            surfaces = [None if form is None else form.placed(body.place[:3, :3], body.place[:3, 3]) for form in surfaces]
+            surfaces = [
+                None if surface is None else surface.placed(body.place[:3, :3], body.place[:3, 3]) for surface in surfaces
+            ]
         mesh = trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = brep.ravel()
@@ -117,12 +120,12 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     mesh.update_faces(whole)
     shape, brep = arrays["piece"][whole], arrays["brep"][whole]
     vertices, off = np.array(mesh.vertices), OFF * float(arrays["chord"])
-    known: list[list[Form | None]] = []
+    known: list[list[AnalyticSurface | None]] = []
     for k, said in enumerate(arrays["surfaces"]):
         chosen = np.flatnonzero(shape == k)
         used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
         own, faces = vertices[used], faces.reshape(-1, 3)
-        known.append(believed(own, faces, brep[chosen], forms(str(said)), off))
+        known.append(credible(own, faces, brep[chosen], stated_surfaces(str(said)), off))
         vertices[used] = onto(own, faces, brep[chosen], known[-1], off)
     mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
     places = [

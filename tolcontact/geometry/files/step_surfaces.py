@@ -1,0 +1,98 @@
+"""The surfaces that a STEP file states for its B-rep faces, and vertices moved onto them. Lengths in mm."""
+
+import json
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tolcontact.geometry.analytic_surfaces import ANALYTIC_SURFACES, AnalyticSurface
+
+METRE = 1e3  # [mm], the reader's unit
+MAX_ITERATIONS = 4  # of Newton's method: they bring vertices that are off by micrometres to the last digit
+PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different
+# The reader's names of what AnalyticSurface calls otherwise.
+_KEYS = {
+    "plane": {"axis": "normal"},
+    "cone": {"origin": "apex", "angle": "semi_angle"},
+    "sphere": {"origin": "center"},
+    "torus": {"origin": "center", "radius": "major_radius", "minor": "minor_radius"},
+}
+
+
+def stated_surfaces(text: str) -> list[AnalyticSurface | None]:
+    """Return the surface of each B-rep face, from the reader's JSON; None for a face of another kind."""
+    return [_surface(entry) if entry and entry.get("type") in ANALYTIC_SURFACES else None for entry in json.loads(text)]
+
+
+def _surface(entry: dict[str, Any]) -> AnalyticSurface | None:
+    surface, keys = ANALYTIC_SURFACES[entry["type"]], _KEYS.get(entry["type"], {})
+    origin = METRE * np.array(entry[keys.get("origin", "origin")], dtype=float)
+    axis = np.array(entry.get(keys.get("axis", "axis"), (0.0, 0.0, 1.0)), dtype=float)
+    sizes = {name: (1.0 if name == "angle" else METRE) * float(entry.get(keys.get(name, name), 0.0)) for name in surface.sizes}
+    if not (np.isfinite([*origin, *axis, *sizes.values()]).all() and np.linalg.norm(axis) > 0):
+        return None
+    direction = np.sign(sizes.get("angle") or 1.0) * axis / np.linalg.norm(axis)
+    if "angle" in sizes:  # the kernel's cones may open against their axis
+        sizes["angle"] = abs(sizes["angle"])
+    return surface.of({"origin": origin, "axis": direction, **sizes})
+
+
+def credible(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    brep: np.ndarray,
+    surfaces: Sequence[AnalyticSurface | None],
+    max_distance: float,
+) -> list[AnalyticSurface | None]:
+    """Return the surfaces of B-rep faces; None for one from which a vertex of its face is farther than `max_distance` [mm]."""
+    checked = list(surfaces)
+    for number, surface in enumerate(surfaces):
+        corners = np.unique(faces[brep == number]) if surface is not None else ()
+        if surface is not None and not (len(corners) and np.abs(surface.distance(vertices[corners])[0]).max() <= max_distance):
+            checked[number] = None
+    return checked
+
+
+def onto(
+    vertices: np.ndarray,
+    faces: np.ndarray,
+    brep: np.ndarray,
+    surfaces: Sequence[AnalyticSurface | None],
+    max_distance: float,
+) -> np.ndarray:
+    """Return `vertices` (vertex, 3) [mm], each moved the shortest way onto all analytic surfaces that meet in it.
+
+    A vertex that would move by more than `max_distance` [mm] keeps its place. `faces` (face, 3) belong to the B-rep faces
+    `brep` (face,), whose surfaces are `surfaces`.
+    """
+    is_analytic = np.array([surface is not None for surface in surfaces])
+    meetings = np.unique(np.column_stack([faces.ravel(), np.repeat(brep, 3)]), axis=0)
+    meetings = meetings[is_analytic[meetings[:, 1]]]
+    moved = np.array(vertices)
+    for _ in range(MAX_ITERATIONS):
+        moved -= _steps(moved, meetings, surfaces)
+    is_near = np.linalg.norm(moved - vertices, axis=1) <= max_distance
+    return np.where(is_near[:, None], moved, vertices)
+
+
+def _steps(vertices: np.ndarray, meetings: np.ndarray, surfaces: Sequence[AnalyticSurface | None]) -> np.ndarray:
+    """Return the shortest steps (vertex, 3) that end, to first order, on all surfaces that meet in a vertex.
+
+    `meetings` (meeting, 2) are the numbers of a vertex and of a surface there, in order of vertices.
+    """
+    value, slope = np.zeros(len(meetings)), np.zeros((len(meetings), 3))
+    for number in np.unique(meetings[:, 1]):
+        surface, rows = surfaces[number], np.flatnonzero(meetings[:, 1] == number)
+        if surface is not None:
+            value[rows], slope[rows] = surface.distance(vertices[meetings[rows, 0]])
+    step = np.zeros_like(vertices)
+    vertex, start, count = np.unique(meetings[:, 0], return_index=True, return_counts=True)
+    for size in np.unique(count):
+        movers, starts = vertex[count == size], start[count == size]
+        rows = starts[:, None] + np.arange(size)
+        if size == 1:
+            step[movers] = value[starts][:, None] * slope[starts]
+        else:
+            step[movers] = np.einsum("nij,nj->ni", np.linalg.pinv(slope[rows], rcond=PARALLEL), value[rows])
+    return step
