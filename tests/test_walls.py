@@ -1,6 +1,10 @@
-"""The walls of the house, read from the imports: one direction, and libraries kept in their rooms."""
+"""The walls of the house, read from the imports: one direction, and libraries kept in their rooms.
+
+An import is a statement, also one for the type checker alone, the stub of a lazy package, or a call that names a module.
+"""
 
 import ast
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -31,8 +35,20 @@ NOT_IN = {
         "simulation/",
     )
 }  # fmt: skip
+# Who may import a library by a call, when it is first needed: it is optional, or slow to import.
+LAZY = {
+    "cloudpickle": ("simulation/cluster.py",),
+    "dask": ("simulation/cluster.py", "simulation/lazy.py"),
+    "dask.array": ("simulation/lazy.py",),
+    "distributed": ("simulation/cluster.py",),
+    "jsonschema": ("declaration/",),
+    "pandas": ("declaration/contributor.py",),
+    "scipy.stats": ("declaration/tolerance.py",),
+    "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
+}
+IMPORTERS = ("import_module", "__import__", "load")
 # Rooms that a room does not import from, though they stand before it.
-NEVER = {
+APART = {
     "statistics": ("contact", "simulation"),
     "archive": ("contact", "statistics"),
     "report": ("contact", "simulation", "archive"),
@@ -47,14 +63,44 @@ ORDER = (
 )  # fmt: skip
 
 
+def name_of(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(file) for file in FILES}
+
+
+def trees(file: Path) -> Iterator[ast.AST]:
+    """The source of a module, and its stub, if it has one."""
+    yield ast.parse(file.read_text())
+    if file.with_suffix(".pyi").exists():
+        yield ast.parse(file.with_suffix(".pyi").read_text())
+
+
+def called(tree: ast.AST) -> Iterator[str]:
+    """Modules that are imported by a call: their names stand in it."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call):
+            function = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+            base = node.func.value if isinstance(node.func, ast.Attribute) else None
+            if function in IMPORTERS and (function != "load" or getattr(base, "id", "") == "lazy_loader"):
+                name = node.args[0]
+                assert isinstance(name, ast.Constant), f"line {node.lineno}: the name of an imported module is no literal"
+                yield name.value
+
+
 def imports(file: Path) -> set[str]:
     names = set()
-    for node in ast.walk(ast.parse(file.read_text())):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
-            assert node.level == 0, f"{file}: relative import"
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
+    for tree in trees(file):
+        names |= set(called(tree))
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Import):
+                names |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                assert node.level <= (file.with_suffix(".pyi").exists()), f"{file}: relative import"
+                module = ".".join(filter(None, [name_of(file) if node.level else "", node.module]))
+                names |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
     return names
 
 
@@ -64,19 +110,21 @@ def room(name: str) -> str:
 
 @pytest.mark.parametrize("file", FILES, ids=lambda f: str(f.relative_to(PACKAGE)))
 def test_imports_keep_to_the_walls(file):
-    where = str(file.relative_to(PACKAGE))
-    own = ORDER.index(room(where))
+    place = str(file.relative_to(PACKAGE))
+    position = ORDER.index(room(place))
     for name in imports(file):
         library = name.split(".")[0]
         if library in ROOMS:
-            assert where.startswith(ROOMS[library]) if ROOMS[library] else False, f"{where} imports {library}"
+            assert place.startswith(ROOMS[library]), f"{place} imports {library}"
         if library in NOT_IN:
-            assert not where.startswith(NOT_IN[library]), f"{where} imports {library}"
+            assert not place.startswith(NOT_IN[library]), f"{place} imports {library}"
         if library == "tolcontact" and name != "tolcontact":
-            other = name.split(".")[1]
-            if other in ORDER:
-                assert ORDER.index(other) <= own, f"{where} imports {name}, which stands below it"
-                assert other not in NEVER.get(room(where), ()), f"{where} imports {name}"
+            target = name.split(".")[1]
+            if target in ORDER:
+                assert ORDER.index(target) <= position, f"{place} imports {name}, which stands below it"
+                assert target not in APART.get(room(place), ()), f"{place} imports {name}"
+    for name in called(ast.parse(file.read_text())):
+        assert place.startswith(LAZY.get(name, ("nowhere",))), f"{place} imports {name} by a call"
 
 
 def test_every_room_is_in_the_order():

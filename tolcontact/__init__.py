@@ -60,6 +60,18 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 `tolcontact.testing` has asserts for tests of your own models.
 """
 
+from importlib import import_module
+
 import lazy_loader
+
+from tolcontact.readable import FORMATTERS, HTML
+
+
+def _notebook_html(thing: object) -> str:
+    """Return an object as HTML. The formatter is imported when a notebook first asks for it."""
+    return str(import_module("tolcontact.report.notebook").html_of(thing))
+
+
+FORMATTERS[HTML] = _notebook_html
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

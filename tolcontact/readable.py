@@ -1,11 +1,15 @@
-"""Things that show themselves: as readable rows in a console, and as pictures in a notebook."""
+"""Base classes for objects that print as readable rows in a console, and show pictures in a notebook."""
 
 import html
-import importlib
+from collections.abc import Callable
+
+# Formatters by media type. The front of the package registers them, so that this file imports nothing that comes after it.
+FORMATTERS: dict[str, Callable[[object], str]] = {}
+HTML = "text/html"
 
 
 class Readable:
-    """Shows its `str`."""
+    """An object whose representation is its `str`."""
 
     def __repr__(self) -> str:
         return str(self)
@@ -15,15 +19,7 @@ class Readable:
 
 
 class Pictured(Readable):
-    """Shows its `picture_of` in a notebook."""
+    """An object that a notebook shows as a picture."""
 
     def _repr_html_(self) -> str:
-        return picture_of(self)
-
-
-def picture_of(thing: object) -> str:
-    """What `tolcontact.report.notebook` makes of a thing, as HTML.
-
-    That stands after everything that is shown, so it is looked up by its name, and only when a notebook asks.
-    """
-    return str(importlib.import_module("tolcontact.report.notebook").html_of(thing))
+        return FORMATTERS[HTML](self)

@@ -7,7 +7,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.readable import picture_of
+from tolcontact.readable import FORMATTERS, HTML
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import capability, contact, intervals
 from tolcontact.statistics.intervals import Estimate
@@ -23,7 +23,7 @@ class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        return picture_of(self)
+        return FORMATTERS[HTML](self)
 
 
 def summarize(results: xr.DataTree) -> Summary:
