@@ -276,7 +276,7 @@ class Assembly(Pictured):
                     if letter not in letters:
                         known = ", ".join(sorted(letters)) or "none"
                         yield (
-                            f'part "{part.name}": feature "{feature.name}" ({feature.declared_at}): {tolerance.word} refers to '
+                            f'part "{part.name}": feature "{feature.name}" ({feature.declared_at}): {tolerance.kind} refers to '
                             f"datum {letter}, which no feature of the part is; its datums are: {known}; "
                             f'declare it with part.feature(..., datum="{letter}")'
                         )

@@ -13,7 +13,7 @@ from tolcontact.readable import Readable
 INSIDE = "99.73 % inside"
 EXTREMES = "6 sigma at the extremes"
 RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
-TRANSLATIONS = ("translation", "polar")  # rules that tilt nothing
+TRANSLATIONS = ("translation", "polar")  # rules without tilts
 BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 MOVES = ("both", "first", "second")
@@ -25,12 +25,12 @@ COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?")
 class Size(Readable):
     """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
 
-    `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` 8.05 and 8.15. Between them sizes are
-    distributed as `distribution` says (see tc.Tolerance), about their middle. Of two planes `moves` says which take part:
+    `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` has 8.05 and 8.15. Sizes vary about the
+    middle of the limits by `distribution` (see tc.Tolerance). Of two planes `moves` chooses those that move with the size:
     "both" by a half each, or the "first" or "second" alone.
     """
 
-    word: ClassVar[str] = "size"
+    kind: ClassVar[str] = "size"
 
     nominal: float
     upper: float
@@ -61,17 +61,17 @@ class Size(Readable):
 
     @property
     def tolerance(self) -> Tolerance:
-        """How the size deviates from the nominal one [mm]; the limits have to be numbers."""
+        """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
         if not isinstance(self.distribution, str):
             return Tolerance(distribution=self.distribution)
         width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
         return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
 
     def faults(self) -> Iterator[str]:
-        wrong = [word for word in ("nominal", "upper", "lower") if not is_length(getattr(self, word))]
-        if wrong:
-            yield f"{wrong[0]} is {getattr(self, wrong[0])!r}; expected a number in mm"
-            return
+        for name in ("nominal", "upper", "lower"):
+            if not is_length(getattr(self, name)):
+                yield f"{name} is {getattr(self, name)!r}; expected a number in mm"
+                return
         if not self.nominal > 0:
             yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
         if not self.lower < self.upper:
@@ -91,20 +91,25 @@ class GeometricTolerance(Readable):
 
     datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier
     zone        "round" or "flat", for axes; by default round. `along` is the direction across a flat zone's planes
-    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size, and
-    bonus       what the process makes of that: "fills" the larger zone, "accepts" it only where parts are checked, or "none"
-    projected   [mm] the zone lies beyond the material, that far out of the face of the primary datum
-    outside     [mm] of a profile: how much of the zone lies outside the material; by default half
-    rule        from the zone to a spread, of all the freedoms together: "99.73 % inside" (default): so many features lie
-                inside, if components are equal, independent and normal; "6 sigma at the extremes" of the feature equal the
-                width; "truncated": the same, and features outside are left out; "uniform" in the zone; "translation": no
-                tilt; "polar": uniform angle and normal radius, 6 sigma of which equal the width
-    cp, cpk     how capable the process is: the spread is divided by `cp`, and its mean lies so far off that `cpk` results
+    material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size
+    bonus       "fills": the process fills the larger zone; "accepts": only a check of parts uses it; or "none"
+    projected   [mm] the zone lies beyond the material, from the face of the primary datum up to this height
+    outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
+    rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
+                inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
+                at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
+                "uniform": uniform in the zone. "translation": no tilts. "polar": uniform angle and normal radius, 6 sigma of
+                which equal the width
+    cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
+
+    A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. Of zone, along, material, projected
+    and outside it has those in `options`. `is_form` says that it limits form alone. `features/tolerance_kinds.py` has its zone.
     """
 
     kind: ClassVar[str] = ""
     needs_datums: ClassVar[bool] = True
-    own: ClassVar[tuple[str, ...]] = ()  # options that only some kinds have
+    is_form: ClassVar[bool] = False
+    options: ClassVar[tuple[str, ...]] = ()
 
     width: float
     datums: str = ""
@@ -120,47 +125,49 @@ class GeometricTolerance(Readable):
     cpk: float | None = None
 
     @property
-    def word(self) -> str:
-        """How a message names it."""
-        return self.kind
-
-    @property
     def system(self) -> tuple[tuple[str, ...], ...]:
-        """Letters of the datum system: for each place those that are common there."""
-        found = [COMPARTMENT.fullmatch(place) for place in self._places]
-        return tuple(tuple(each.group(1).split("-")) for each in found if each)
+        """The letters of the datum system: for each compartment one, or those of a common datum."""
+        matches = [COMPARTMENT.fullmatch(compartment) for compartment in self._compartments]
+        return tuple(tuple(match.group(1).split("-")) for match in matches if match)
 
     @property
-    def _places(self) -> list[str]:
-        return [place.strip() for place in self.datums.split("|")] if self.datums and isinstance(self.datums, str) else []
+    def _compartments(self) -> list[str]:
+        if not (self.datums and isinstance(self.datums, str)):
+            return []
+        return [compartment.strip() for compartment in self.datums.split("|")]
 
     @property
     def across(self) -> Vector | None:
-        """Unit vector across a flat zone."""
+        """The unit vector across a flat zone."""
         return None if self.along is None else _direction(self.along)
 
     def faults(self) -> Iterator[str]:
-        least = "0 or above" if self.material else "above 0"
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
-            yield f"width is {self.width!r}; expected the full width of the zone in mm, {least}"
+            bound = "0 or above" if self.material else "above 0"
+            yield f"width is {self.width!r}; expected the full width of the zone in mm, {bound}"
         yield from self._datum_faults()
         yield from self._zone_faults()
         yield from self._process_faults()
 
     def _datum_faults(self) -> Iterator[str]:
-        if not isinstance(self.datums, str) or not all(map(COMPARTMENT.fullmatch, self._places)) or len(self._places) > 3:
+        if (
+            not isinstance(self.datums, str)
+            or not all(map(COMPARTMENT.fullmatch, self._compartments))
+            or len(self._compartments) > 3
+        ):
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)" or "A-B"'
             return
         if self.needs_datums and not self.datums:
             yield f'it needs datums; give them as in tc.{type(self).__name__}({self.width!r}, "A|B|C")'
-        letters = [letter for place in self.system for letter in place]
+        letters = [letter for compartment in self.system for letter in compartment]
         if len(set(letters)) < len(letters):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:
-        for word, nothing in (("zone", None), ("along", None), ("material", ""), ("projected", None), ("outside", None)):
-            if getattr(self, word) != nothing and word not in self.own:
-                yield f"{word} is given, which {self.kind} does not have; leave it out"
+        for option in ("zone", "along", "material", "projected", "outside"):
+            is_given = bool(self.material) if option == "material" else getattr(self, option) is not None
+            if is_given and option not in self.options:
+                yield f"{option} is given, which {self.kind} does not have; leave it out"
         if self.zone not in (None, *ZONES):
             yield f"zone is {self.zone!r}; expected one of {', '.join(ZONES)}"
         if self.zone == "flat" and self.along is None:
@@ -175,9 +182,9 @@ class GeometricTolerance(Readable):
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
 
     def _process_faults(self) -> Iterator[str]:
-        for word, known in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
-            if getattr(self, word) not in known:
-                yield f"{word} is {getattr(self, word)!r}; expected one of: {', '.join(map(repr, known))}"
+        for option, choices in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
+            if getattr(self, option) not in choices:
+                yield f"{option} is {getattr(self, option)!r}; expected one of: {', '.join(map(repr, choices))}"
         if not (is_length(self.cp) and self.cp > 0):
             yield f"cp is {self.cp!r}; expected a number above 0"
         elif self.cpk is not None and not (is_length(self.cpk) and self.cpk <= self.cp):
@@ -193,71 +200,64 @@ class GeometricTolerance(Readable):
 class Position(GeometricTolerance):
     """Position of an axis, a centre, or a plane (ISO 1101, 17.12)."""
 
-    kind, own = "position", ("zone", "along", "material", "projected")
+    kind, options = "position", ("zone", "along", "material", "projected")
 
 
 class Coaxiality(GeometricTolerance):
-    """Of an axis to the axis of its datums: a round zone (ISO 1101, 17.13)."""
+    """Coaxiality of an axis with the axis of its datums: a round zone (ISO 1101, 17.13)."""
 
-    kind, own = "coaxiality", ("material",)
+    kind, options = "coaxiality", ("material",)
 
 
 class Symmetry(GeometricTolerance):
-    """Of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)."""
+    """Symmetry of the middle of two opposed planes, or of an axis between planes, to its datums (ISO 1101, 17.14)."""
 
-    kind, own = "symmetry", ("zone", "along", "material")
+    kind, options = "symmetry", ("zone", "along", "material")
 
 
 class Profile(GeometricTolerance):
-    """Of a surface (ISO 1101, 17.8): location, as far as its datums lock it. Without datums it is form alone."""
+    """Profile of a surface (ISO 1101, 17.8): its location, as far as its datums lock it. Without datums it is form alone."""
 
-    kind, own, needs_datums = "profile", ("outside",), False
+    kind, options, needs_datums = "profile", ("outside",), False
 
 
 class Parallelism(GeometricTolerance):
-    """Of a plane or an axis to its datums (ISO 1101, 17.9)."""
+    """Parallelism of a plane or an axis to its datums (ISO 1101, 17.9)."""
 
-    kind, own = "parallelism", ("zone", "along", "material")
+    kind, options = "parallelism", ("zone", "along", "material")
 
 
 class Perpendicularity(GeometricTolerance):
-    """Of a plane or an axis to its datums (ISO 1101, 17.10)."""
+    """Perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)."""
 
-    kind, own = "perpendicularity", ("zone", "along", "material")
+    kind, options = "perpendicularity", ("zone", "along", "material")
 
 
 class Angularity(GeometricTolerance):
-    """Of a plane or an axis, at an angle to its datums (ISO 1101, 17.11)."""
+    """Angularity of a plane or an axis: its angle to its datums (ISO 1101, 17.11)."""
 
-    kind, own = "angularity", ("zone", "along", "material")
+    kind, options = "angularity", ("zone", "along", "material")
 
 
 class CircularRunout(GeometricTolerance):
-    """Radial of a cylinder, in each section, or axial of a plane, to the axis of its datums (ISO 1101, 17.15).
+    """Circular run-out to the axis of its datums: radial of a cylinder, in each section, or axial of a plane (ISO 1101, 17.15).
 
-    Without form it is the same as total run-out: no section may be farther off.
+    Without form deviations it equals total run-out.
     """
 
     kind = "circular run-out"
 
 
 class TotalRunout(GeometricTolerance):
-    """Radial of a cylinder as a whole, or axial of a plane, to the axis of its datums (ISO 1101, 17.16)."""
+    """Total run-out to the axis of its datums: radial of a whole cylinder, or axial of a plane (ISO 1101, 17.16)."""
 
     kind = "total run-out"
 
 
 class Flatness(GeometricTolerance):
-    """Of a plane (ISO 1101, 17.4). It is form: nothing of it moves the plane as a whole."""
+    """Flatness of a plane (ISO 1101, 17.4). It limits form, and does not move the plane as a whole."""
 
-    kind, needs_datums = "flatness", False
+    kind, needs_datums, is_form = "flatness", False, True
 
 
-KINDS = {
-    each.kind: each
-    for each in (
-        Position, Coaxiality, Symmetry, Profile, Parallelism, Perpendicularity, Angularity, CircularRunout, TotalRunout,
-        Flatness,
-    )
-}  # fmt: skip
-ORIENTATIONS = ("parallelism", "perpendicularity", "angularity")
+KINDS = {tolerance.kind: tolerance for tolerance in GeometricTolerance.__subclasses__()}

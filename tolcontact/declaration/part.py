@@ -169,7 +169,7 @@ class Feature(Readable):
         if self.datum is not None and not (isinstance(self.datum, str) and LETTER.fullmatch(self.datum)):
             yield f"its datum letter is {self.datum!r}; expected one or two capital letters"
         for tolerance in self.tolerances:
-            yield from (f"{tolerance.word}: {fault}" for fault in tolerance.faults())
+            yield from (f"{tolerance.kind}: {fault}" for fault in tolerance.faults())
         yield from self._size_faults()
         yield from self._form_faults()
 
@@ -179,12 +179,12 @@ class Feature(Readable):
         for tolerance in self.geometric:
             if tolerance.material and self.size is None:
                 yield (
-                    f"{tolerance.word}: a bonus (material {tolerance.material!r}) needs the tolerance of a size; "
+                    f"{tolerance.kind}: a bonus (material {tolerance.material!r}) needs the tolerance of a size; "
                     "add tc.Size(...)"
                 )
         if self.size and self.size.moves != "both" and len(self.faces) == 1:
             yield f"size: moves is {self.size.moves!r}, but the feature has one face; leave it out"
-        elif self.size and self.size.moves != "both" and any(tolerance.kind != "flatness" for tolerance in self.geometric):
+        elif self.size and self.size.moves != "both" and any(not tolerance.is_form for tolerance in self.geometric):
             yield (
                 f"size: moves is {self.size.moves!r}, so the feature has no middle that could have a place; give its other "
                 'tolerances to a feature of the face alone, in place of the size, or let "both" move'
@@ -192,11 +192,11 @@ class Feature(Readable):
 
     def _form_faults(self) -> Iterator[str]:
         tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
-        for form in (tolerance for tolerance in tolerances if tolerance.kind == "flatness"):
+        for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
-                if tolerance.kind != "flatness" and tolerance.width < form.width:
+                if not tolerance.is_form and tolerance.width < form.width:
                     yield (
-                        f"{form.word} {form.width:g} is wider than {tolerance.word} {tolerance.width:g}, which contains it; "
+                        f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "
                         "expected form within orientation within location"
                     )
 

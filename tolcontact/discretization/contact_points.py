@@ -15,8 +15,7 @@ from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import ContactWarning, shown
-from tolcontact.features.face_deviation import FaceDeviation
-from tolcontact.features.nominal_features import Features
+from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.fault import GeometryFault, where

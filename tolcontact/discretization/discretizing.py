@@ -17,7 +17,7 @@ from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.three_two_one import lay_out
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import ModelError
-from tolcontact.features.nominal_features import Features, in_order
+from tolcontact.features.nominal_features import Features, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.fault import GeometryFault, where
 from tolcontact.geometry.files.reading import read_files
@@ -78,7 +78,7 @@ def discretize(assembly: Assembly) -> Nominal:
 
 def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: list[str]) -> None:
     for index, part in enumerate(assembly.parts):
-        ordered, circular = in_order(part)
+        ordered, circular = datum_order(part)
         for feature in ordered:
             _attempt(faults, f'part "{part.name}": {where("feature", feature)}', features.add, feature, index, meshes)
         if circular:
@@ -100,7 +100,7 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
         ]
         faces = tuple(found[k] for k in (0, 0, 0, 1, 1, 2))
     else:
-        faces = tuple(own.on and features.held_at(own.on, np.array(own.point), part.placement) for own in location)
+        faces = tuple(own.on and features.face_of(own.on, np.array(own.point), part.placement) for own in location)
     return replace(part, locators=replace(part.locators, faces=faces))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import Tolerance
-from tolcontact.features.face_deviation import FaceDeviation
+from tolcontact.features import FaceDeviation
 from tolcontact.geometry.fault import GeometryFault
 
 CONDITION_LIMIT = 1e8

@@ -10,8 +10,7 @@ from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.features.face_deviation import FaceDeviation
-from tolcontact.features.nominal_features import Features, NominalFeature
+from tolcontact.features import FaceDeviation, Features, NominalFeature
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, side
 from tolcontact.geometry.faces import triangles
@@ -142,7 +141,7 @@ class Nominal:
     @property
     def features(self) -> tuple[NominalFeature, ...]:
         """Those of all parts."""
-        return tuple(self._features.found)
+        return tuple(self._features.features)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
@@ -168,14 +167,18 @@ class Nominal:
 
     def position(self, point: Point) -> np.ndarray:
         """Nominal assembly coordinates (3,) [mm] of a declared point."""
-        own = point.position if point.end is None or point.on is None else self._features.of(point.on).geometry.end(point.end)
+        own = (
+            point.position
+            if point.end is None or point.on is None
+            else self._features.nominal(point.on).geometry.end(point.end)
+        )
         return self.parts[self.part_index(point.part)].placed(np.array(own))
 
     def face_at(self, point: Point) -> FaceDeviation | None:
         """What a declared point moves with beside its part: the face of its feature that it is on, or the middle of two."""
         if point.on is None:
             return None
-        own = self._features.of(point.on)
+        own = self._features.nominal(point.on)
         number = None if point.position is None else own.face_with(np.array(point.position))
         return own.deviation(number, self.parts[own.part].placement)
 
@@ -184,6 +187,6 @@ class Nominal:
         part = self.parts[self.part_index(point.part)]
         if point.on is None or point.position is None:
             return np.zeros(3)
-        surface = self._features.of(point.on).surfaces[0]  # what grows in height has one face
+        surface = self._features.nominal(point.on).surfaces[0]  # what grows in height has one face
         triangle, foot = surface.nearest(np.array([point.position]))
         return np.asarray(part.placement[0] @ surface.normals(triangle, foot)[0])

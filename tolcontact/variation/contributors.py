@@ -11,7 +11,7 @@ from tolcontact.declaration import GeometricTolerance, Tolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
-from tolcontact.features import Layer, NominalFeature
+from tolcontact.features import AxisFeature, FeatureOfSize, Layer, NominalFeature, PlaneFeature
 from tolcontact.variation import zones
 from tolcontact.variation.quantiles import quantile
 
@@ -136,7 +136,7 @@ class Contributors:
 
     def _of_feature(self, own: NominalFeature) -> Iterator[Contributor]:
         """The freedoms of a feature's layers, from the innermost on, and its size."""
-        labels, column = iter(own.labels), own.first
+        labels, column = iter(own.labels), own.first_column
         basis, known = np.zeros((len(own.geometry.names), 0)), np.zeros(0)
         for layer in own.layers:
             count = layer.added.shape[1]
@@ -153,7 +153,7 @@ class Contributors:
             self._check_room(own, layer, rows[..., : len(known)], known, width)
             known = np.concatenate([known, np.full(count, s / tolerance.cp)])
             mean = _mean(own, layer, s)
-            self.zones.append(_zone(own, layer, rows, own.first + np.arange(rows.shape[-1])))
+            self.zones.append(_zone(own, layer, rows, own.first_column + np.arange(rows.shape[-1])))
             if tolerance.rule in JOINT:
                 self.together.append(Together(tolerance.rule, columns, _joint(tolerance.rule, rows, s, width)))
             if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
@@ -168,17 +168,17 @@ class Contributors:
         rule, layers = layer.tolerance.rule, sum(each.added.shape[1] > 0 for each in own.layers)
         if rule in JOINT and (not first or layers > 1):
             self._refuse(
-                own, f'{layer.tolerance.word}: the rule "{rule}" is for features with one tolerance of place or orientation; '
+                own, f'{layer.tolerance.kind}: the rule "{rule}" is for features with one tolerance of place or orientation; '
                 f'choose "{INSIDE}" or "{EXTREMES}"'
             )  # fmt: skip
-        if rule == "polar" and not (own.geometry.is_axis and layer.rows.shape[1] == layer.added.shape[1] == 2):
-            self._refuse(own, f'{layer.tolerance.word}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
+        if rule == "polar" and not (isinstance(own.geometry, AxisFeature) and layer.rows.shape[1] == layer.added.shape[1] == 2):
+            self._refuse(own, f'{layer.tolerance.kind}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
 
     def _check_room(self, own: NominalFeature, layer: Layer, rows: np.ndarray, known: np.ndarray, width: float) -> None:
         share = zones.share_inside(rows, known, width)
         if share < zones.SHARE - ROOM:
             self._refuse(
-                own, f"{layer.tolerance.word} {layer.tolerance.width:g}: the narrower tolerances within it leave "
+                own, f"{layer.tolerance.kind} {layer.tolerance.width:g}: the narrower tolerances within it leave "
                 f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
             )  # fmt: skip
 
@@ -187,7 +187,7 @@ class Contributors:
         if tolerance.bonus != "fills" or not first:
             self._refuse(
                 own,
-                f'{tolerance.word}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
+                f'{tolerance.kind}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
             )
         return 1.0
 
@@ -200,7 +200,7 @@ class Contributors:
 def _mean(own: NominalFeature, layer: Layer, s: float) -> np.ndarray:
     """Means (component,) of the added components: of an uneven profile, and what `cpk` says, along the first."""
     tolerance, mean = layer.tolerance, np.zeros(layer.added.shape[1])
-    if own.geometry.is_plane:
+    if isinstance(own.geometry, PlaneFeature):
         mean += _uneven(layer) * layer.added[0]
     if tolerance.cpk is not None and mean.size:
         mean[0] += 3 * s * (1 - tolerance.cpk / tolerance.cp)
@@ -216,7 +216,7 @@ def _uneven(layer: Layer) -> float:
 def _zone(own: NominalFeature, layer: Layer, rows: np.ndarray, columns: np.ndarray) -> Zone:
     """What a layer allows of the components that it and the narrower ones have."""
     tolerance, middle = layer.tolerance, np.zeros(len(columns))
-    if own.geometry.is_plane:
+    if isinstance(own.geometry, PlaneFeature):
         middle[-layer.added.shape[1] :] = _uneven(layer) * layer.added[0]
     if own.feature.size is None or not tolerance.material or tolerance.bonus == "none":
         return Zone(columns, rows, middle, tolerance.width)
@@ -244,7 +244,8 @@ def bonus(own: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) 
 
 def _counts_from_lower(own: NominalFeature, tolerance: GeometricTolerance) -> bool:
     """Whether a zone grows with what the size is above its lower limit, or below its upper one."""
-    return own.geometry.is_inner == (tolerance.material == "M")
+    is_inner = isinstance(own.geometry, FeatureOfSize) and own.geometry.is_inner
+    return is_inner == (tolerance.material == "M")
 
 
 def _joint(rule: str, rows: np.ndarray, s: float, width: float) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:

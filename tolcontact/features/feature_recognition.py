@@ -1,0 +1,274 @@
+"""Recognition of features: faces become a plane, a pair of planes, a cylinder, a cone, a sphere or a general surface."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import trimesh
+from scipy.spatial import ConvexHull, QhullError
+
+from tolcontact.features.feature_geometry import (
+    ConeFeature,
+    CylinderFeature,
+    FeatureGeometry,
+    GeneralFeature,
+    PlaneFeature,
+    SlabFeature,
+    SphereFeature,
+)
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
+from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.edges import smooth_pieces
+from tolcontact.geometry.fault import GeometryFault
+from tolcontact.geometry.fitting import nearest_surface
+from tolcontact.geometry.surface import Surface
+
+AREA_TOLERANCE = 1e-3  # relative: a turned rectangle must be smaller by this to be preferred to one along the part's axes
+AXIS_TOLERANCE = 1e-6  # largest difference of a direction from the axis of the part after which it is named
+MIN_NOTICED = 1e-3  # of a displacement: the part of it along the normals of a general surface that makes it a freedom
+EXTREME_TRIALS = 4096  # random displacements by which the extremes of a general surface are found
+CONE_PROBES = 32  # places around each end of a cone
+MAX_OPPOSED_ERROR = 1e-3  # rad between two planes that count as parallel
+AXES = np.eye(3)
+
+
+def feature_geometry(faces: Sequence[Surface]) -> FeatureGeometry:
+    """Return the geometry of a feature with one face or two.
+
+    Raises GeometryFault if a face spans several surfaces, or if two faces are not opposed planes.
+    """
+    surfaces = [_analytic_surface(face) for face in faces]
+    if len(faces) == 2:
+        return _slab(faces, surfaces)
+    face, surface = faces[0], surfaces[0]
+    match surface:
+        case Plane():
+            return _plane(face, surface)
+        case Sphere():
+            return _sphere(face, surface)
+        case Cylinder():
+            return _cylinder(face, surface)
+        case Cone():
+            return _cone(face, surface)
+        case _:
+            return _general(face)
+
+
+def _analytic_surface(face: Surface) -> AnalyticSurface | None:
+    """Return the one analytic surface of a face; None for a general one."""
+    if is_flat(face):
+        normal_sum = face.corner_normals.reshape(-1, 3).mean(axis=0)
+        n = normal_sum / np.linalg.norm(normal_sum)
+        stated = [surface for surface in face.surfaces if isinstance(surface, Plane)]
+        if stated:
+            n = stated[0].axis * np.sign(stated[0].axis @ n)
+        height = float((np.asarray(face.mesh.vertices) @ n).mean()) if not stated else float(stated[0].origin @ n)
+        return Plane(height * n, n)
+    numbers = sorted({int(number) for number in face.surface_numbers})
+    pieces = int(smooth_pieces(face.mesh, np.arange(len(face.mesh.faces))).max()) + 1
+    if len(numbers) == 1 and numbers[0] >= 0:
+        return face.surfaces[numbers[0]]
+    if len(numbers) > 1 or pieces > 1:
+        kinds = [face.surfaces[number].kind if number >= 0 else "general" for number in numbers]
+        listing = ", ".join(kinds) if len(numbers) > 1 else f"{pieces} faces with creases between them"
+        raise GeometryFault(f"its face spans more than one surface ({listing}); a feature is one of them, so choose one")
+    return None
+
+
+def _sphere(face: Surface, sphere: Sphere) -> SphereFeature:
+    twists = np.vstack([AXES, np.zeros((3, 3))])
+    return SphereFeature(
+        centre=sphere.origin,
+        names=tuple(f"shift {axis}" for axis in "xyz"),
+        twists=twists,
+        values=twists.T,
+        extremes=(sphere.origin[None], AXES[None]),
+        size=2 * sphere.radius,
+        is_inner=face.pieces[0].is_hollow,
+    )
+
+
+def _plane(face: Surface, plane: Plane) -> PlaneFeature:
+    coordinates = _plane_coordinates(plane.origin, plane.axis, np.asarray(face.mesh.vertices))
+    return PlaneFeature(normal=plane.axis, **coordinates)
+
+
+def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) -> SlabFeature:
+    first_plane, second_plane = surfaces
+    if not (isinstance(first_plane, Plane) and isinstance(second_plane, Plane)):
+        kinds = " and ".join("a general face" if surface is None else f"a {surface.kind}" for surface in surfaces)
+        raise GeometryFault(f"it has two faces, {kinds}; expected two planes that are opposed")
+    if np.linalg.norm(first_plane.axis + second_plane.axis) > MAX_OPPOSED_ERROR:
+        raise GeometryFault("its two planes are not opposed; expected outward normals in opposite directions")
+    n, outlines = first_plane.axis, [np.asarray(face.mesh.vertices) for face in faces]
+    heights = [float(points.mean(axis=0) @ n) for points in outlines]
+    middle = sum(heights) / 2
+    projections = np.vstack([points - (points @ n - middle)[:, None] * n for points in outlines])
+    distance = heights[0] - heights[1]  # positive: material is between the planes
+    return SlabFeature(
+        normal=n,
+        normals=(first_plane.axis, second_plane.axis),
+        size=abs(distance),
+        is_inner=distance < 0,
+        **_plane_coordinates(middle * n, n, projections),
+    )
+
+
+def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> dict[str, Any]:
+    """Return the coordinates of a plane with normal n through `place`, which reaches as far as `points` (point, 3) on it.
+
+    Tilts are measured at the edges of the smallest rectangle around the points.
+    """
+    u, v, names = _directions_across(n)
+    corners = _hull(np.column_stack([points @ u, points @ v]))
+    angle = _rectangle_angle(corners)
+    if angle:
+        u, v = np.cos(angle) * u + np.sin(angle) * v, np.cos(angle) * v - np.sin(angle) * u
+        names, corners = ("u", "v"), _turned(corners, angle)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    half, middle = (high - low) / 2, (high + low) / 2
+    centre = middle[0] * u + middle[1] * v + float(place @ n) * n
+    twists, values = np.zeros((6, 3)), np.zeros((3, 6))
+    twists[:3, 0], twists[3:, 1], twists[3:, 2] = n, np.cross(u, n) / half[0], np.cross(v, n) / half[1]
+    values[0, :3], values[1, 3:], values[2, 3:] = n, np.cross(u, n) * half[0], np.cross(v, n) * half[1]
+    places = centre + (corners - middle) @ np.array([u, v])
+    return {
+        "centre": centre,
+        "names": ("offset", f"tilt {names[0]}", f"tilt {names[1]}"),
+        "twists": twists,
+        "values": values,
+        "extremes": (places, np.tile(n, (len(places), 1, 1))),
+    }
+
+
+def _rectangle_angle(corners: np.ndarray) -> float:
+    """Return the angle [rad] of the smallest rectangle around an outline (corner, 2); 0 if one along the axes is as small."""
+    edges = np.roll(corners, -1, axis=0) - corners
+    angles = np.unique(np.round(np.arctan2(edges[:, 1], edges[:, 0]) % (np.pi / 2), 9))
+    areas = np.array([np.ptp(_turned(corners, angle), axis=0).prod() for angle in (0.0, *angles)])
+    return 0.0 if areas[0] < areas.min() * (1 + AREA_TOLERANCE) else float(angles[areas[1:].argmin()])
+
+
+def _turned(corners: np.ndarray, angle: float) -> np.ndarray:
+    """Return coordinates (corner, 2) along axes that are turned by an angle [rad]."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    return corners @ np.array([[cos, -sin], [sin, cos]])
+
+
+def _cylinder(face: Surface, cylinder: Cylinder) -> CylinderFeature:
+    size, is_inner = 2 * cylinder.radius, face.pieces[0].is_hollow
+    return CylinderFeature(size=size, is_inner=is_inner, **_axis_coordinates(face, cylinder))
+
+
+def _cone(face: Surface, cone: Cone) -> ConeFeature:
+    """Return a cone: an axis that also shifts along itself, and the normals of the wall around both ends."""
+    coordinates = _axis_coordinates(face, cone)
+    axis, (ends, directions) = coordinates["axis"], coordinates["extremes"]
+    along = np.concatenate([axis, np.zeros(3)])
+    coordinates["names"] += ("along",)
+    coordinates["twists"] = np.column_stack([coordinates["twists"], along])
+    coordinates["values"] = np.vstack([coordinates["values"], along])
+    u, v = directions[0]
+    azimuths = np.arange(CONE_PROBES) * 2 * np.pi / CONE_PROBES
+    outward = np.cos(azimuths)[:, None] * u + np.sin(azimuths)[:, None] * v
+    radii = np.abs((ends - cone.origin) @ cone.axis)[:, None, None] * np.tan(cone.angle)
+    places = (ends[:, None] + radii * outward).reshape(-1, 3)
+    normals = np.cos(cone.angle) * np.tile(outward, (2, 1)) - np.sin(cone.angle) * cone.axis
+    return ConeFeature(walls=(places, normals[:, None]), **coordinates)
+
+
+def _axis_coordinates(face: Surface, surface: Cylinder | Cone) -> dict[str, Any]:
+    """Return the axis of a cylinder or cone, as long as its face, with two shifts in its middle and two tilts at its ends."""
+    axis = surface.axis * np.sign(surface.axis[np.abs(surface.axis).argmax()])  # the same, whichever way the file has it
+    u, v, names = _directions_across(axis)
+    along = np.asarray(face.mesh.vertices) @ axis
+    half, middle = float(np.ptp(along)) / 2, float(along.max() + along.min()) / 2
+    centre = surface.origin + (middle - float(surface.origin @ axis)) * axis
+    twists, values = np.zeros((6, 4)), np.zeros((4, 6))
+    for k, e in enumerate((u, v)):
+        twists[:3, k], values[k, :3] = e, e
+        twists[3:, 2 + k], values[2 + k, 3:] = np.cross(axis, e) / half, np.cross(axis, e) * half
+    return {
+        "centre": centre,
+        "names": (f"shift {names[0]}", f"shift {names[1]}", f"tilt {names[0]}", f"tilt {names[1]}"),
+        "twists": twists,
+        "values": values,
+        "extremes": (centre + half * np.array([[-1.0], [1.0]]) * axis, np.array([[u, v]] * 2)),
+        "axis": axis,
+        "half": half,
+    }
+
+
+def _general(face: Surface) -> GeneralFeature:
+    """Return a general surface, whose coordinates are the displacements that move it along its own normals."""
+    mesh = face.mesh
+    points, normals = np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals)
+    centre = np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area_faces.sum())
+    reach = float(np.linalg.norm(points - centre, axis=1).max())
+    moved = np.hstack([normals, np.cross(points - centre, normals) / reach])  # along normals, for (tau, rho reach) of 1
+    freedoms = _noticed_displacements(moved, _simple_displacements(mesh))
+    to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
+    metric = moved.T @ moved
+    values = np.linalg.solve(freedoms.T @ metric @ freedoms, freedoms.T @ metric) @ np.linalg.inv(to_twist)
+    # The extremes are the vertices that move farthest in some combination of freedoms.
+    combinations = np.random.default_rng(0).normal(size=(freedoms.shape[1], EXTREME_TRIALS))
+    extremes = np.unique(np.abs(moved @ freedoms @ combinations).argmax(axis=0))
+    return GeneralFeature(
+        centre=centre,
+        names=tuple(f"freedom {k + 1}" for k in range(freedoms.shape[1])),
+        twists=to_twist @ freedoms,
+        values=values,
+        extremes=(points[extremes], normals[extremes, None]),
+        nearest=nearest_surface(np.asarray(mesh.triangles)),
+    )
+
+
+def _simple_displacements(mesh: trimesh.Trimesh) -> list[np.ndarray]:
+    """Return six displacements (tau, rho): along and across the mean normal, then turns about the directions across and it."""
+    mean_normal = mesh.area_faces @ mesh.face_normals
+    length = np.linalg.norm(mean_normal)
+    n = mean_normal / length if length > 1e-9 * mesh.area else AXES[2]
+    u, v, _ = _directions_across(n)
+    zero = np.zeros(3)
+    return [np.concatenate([e, zero]) for e in (n, u, v)] + [np.concatenate([zero, e]) for e in (u, v, n)]
+
+
+def _noticed_displacements(moved: np.ndarray, displacements: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the displacements (6, freedom) that the surface notices, each independent of those before it.
+
+    moved   (vertex, 6): how far vertices move along their normals for displacements of 1. Two displacements are independent if
+            these distances are orthogonal. Each freedom is scaled so that the largest distance is 1.
+    """
+    freedoms: list[np.ndarray] = []
+    for displacement in displacements:
+        direction = displacement
+        for freedom in freedoms:
+            distances = moved @ freedom
+            direction = direction - (moved @ direction @ distances) / (distances @ distances) * freedom
+        if (largest := np.abs(moved @ direction).max()) > MIN_NOTICED:
+            freedoms.append(direction / largest)
+    return np.column_stack(freedoms)
+
+
+def _directions_across(a: np.ndarray) -> tuple[np.ndarray, np.ndarray, tuple[str, str]]:
+    """Return two unit vectors across `a` (3,) and each other, with their names: axes of the part where they are along those."""
+    smallest = int(np.abs(a).argmin())
+    largest = int(np.abs(a).argmax())
+    if abs(a[largest]) > 1 - AXIS_TOLERANCE:
+        i, j = (k for k in range(3) if k != largest)
+        u = AXES[i] - (AXES[i] @ a) * a
+        u = u / np.linalg.norm(u)
+        v = AXES[j] - (AXES[j] @ a) * a - (AXES[j] @ u) * u
+        return u, v / np.linalg.norm(v), ("xyz"[i], "xyz"[j])
+    u = AXES[smallest] - a[smallest] * a
+    u = u / np.linalg.norm(u)
+    v = np.cross(a, u)
+    return u, v, ("xyz"[smallest] if abs(a[smallest]) < AXIS_TOLERANCE else "u", "v")
+
+
+def _hull(points: np.ndarray) -> np.ndarray:
+    """Return the corners (corner, 2) of the convex hull of points (point, 2)."""
+    try:
+        return points[ConvexHull(points).vertices]
+    except QhullError as error:
+        raise GeometryFault("its face is so narrow that it has no area") from error
