@@ -144,6 +144,17 @@ def test_a_datum_that_locks_nothing_is_named():
     assert "parallelism: the datum system S does not lock any of what is toleranced; add the datum that does" in fault
 
 
+def test_a_datum_that_could_not_be_made_is_named():
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(10, 10, 10), fixed=True)
+    block.feature("foot", block.face("-z"), tc.Size(10, 0.1), datum="A")
+    block.feature("top", block.face("+z"), tc.Profile(0.1, "A"))
+    a.measure("height", block.point(0, 0, 10), along="z")
+    foot, top = tc.check(a)
+    assert "a size is for cylinders" in foot
+    assert 'feature "top"' in top and "profile refers to datum A, which could not be made; mend its feature first" in top
+
+
 def test_datums_that_refer_to_each_other_are_named():
     def circle(p):
         p.feature("one", p.face("+z"), tc.Parallelism(0.1, "D"), datum="C")
