@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.features.feature_geometry import (
@@ -206,7 +205,7 @@ def _general(face: Surface) -> GeneralFeature:
     centre = np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area_faces.sum())
     reach = float(np.linalg.norm(points - centre, axis=1).max())
     moved = np.hstack([normals, np.cross(points - centre, normals) / reach])  # along normals, for (tau, rho reach) of 1
-    freedoms = _noticed_displacements(moved, _simple_displacements(mesh))
+    freedoms = _noticed_displacements(moved, _simple_displacements(face))
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     metric = moved.T @ moved
     values = np.linalg.solve(freedoms.T @ metric @ freedoms, freedoms.T @ metric) @ np.linalg.inv(to_twist)
@@ -223,8 +222,9 @@ def _general(face: Surface) -> GeneralFeature:
     )
 
 
-def _simple_displacements(mesh: trimesh.Trimesh) -> list[np.ndarray]:
+def _simple_displacements(face: Surface) -> list[np.ndarray]:
     """Return six displacements (tau, rho): along and across the mean normal, then turns about the directions across and it."""
+    mesh = face.mesh
     mean_normal = mesh.area_faces @ mesh.face_normals
     length = np.linalg.norm(mean_normal)
     n = mean_normal / length if length > 1e-9 * mesh.area else AXES[2]
