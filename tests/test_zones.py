@@ -17,6 +17,7 @@ FACTORS = {  # t / s for 99.73 % inside; the first ten from VARIATION's table, c
     "orientation, one tilt": (lambda: toleranced.block_with("far", tc.Perpendicularity(1, "A")), 6.000),
     "orientation": (lambda: toleranced.block_with("top", tc.Parallelism(1, "A")), 9.07),
     "location, rectangle": (lambda: toleranced.block_with("top", tc.Profile(1, "A")), 11.77),
+    "location of lines": (lambda: toleranced.block_with("top", tc.LineProfile(1, "A")), 11.77),
     "location, disk": (lambda: toleranced.ring_with("top", tc.Profile(1, "A")), 10.02),
     "axis, tilt": (lambda: toleranced.ring_with("bore", tc.Perpendicularity(1, "A")), 6.88),
     "axis, shift": (lambda: toleranced.ring_with("bore", tc.Position(1, "A|B", rule="translation")), 6.88),

@@ -19,6 +19,7 @@ from .declaration import (
     Force,
     Inside,
     Largest,
+    LineProfile,
     Locator,
     Measure,
     Mesh,
@@ -67,9 +68,9 @@ from .workflow import (
 
 __all__ = [
     "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "ClusterError", "Coaxiality", "ContactPair",
-    "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "Locator",
-    "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity", "Point",
-    "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
+    "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "LineProfile",
+    "Locator", "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity",
+    "Point", "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
     "TotalRunout", "UnitsWarning", "Variable", "__version__", "allocate", "bodies_in", "build", "check", "check_population",
     "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
     "plot", "relocate", "run", "sensitivities", "simulate", "simulate_blocks", "study", "summarize", "tails", "three_two_one",

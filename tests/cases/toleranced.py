@@ -68,6 +68,7 @@ EVERY = {  # of the kinds that move features; all state 99.73 % inside
     "symmetry": lambda frame: block_with("width", tc.Size(50, 0.1), tc.Symmetry(0.1, "A|C"), frame=frame),
     "coaxiality": lambda frame: ring_with("bore", tc.Coaxiality(0.1, "B"), frame=frame),
     "profile": lambda frame: block_with("top", tc.Profile(0.3, "A", outside=0.2), frame=frame),
+    "line profile": lambda frame: block_with("top", tc.LineProfile(0.3, "A"), frame=frame),
     "parallelism": lambda frame: block_with("top", tc.Parallelism(0.1, "A"), frame=frame),
     "perpendicularity to one": lambda frame: block_with("far", tc.Perpendicularity(0.1, "A"), frame=frame),
     "perpendicularity of an axis": lambda frame: ring_with("bore", tc.Perpendicularity(0.1, "A"), frame=frame),

@@ -92,7 +92,7 @@ feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
 | `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
 | `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
 | `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
-| `tc.Profile(0.2, "A", outside=0.15)` | any surface | place and tilt; without datums form alone |
+| `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
 | `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
 | `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
 | `tc.Flatness` | plane | form, which moves nothing yet |
@@ -215,6 +215,7 @@ from tolcontact.declaration.feature_tolerance import (
     Coaxiality,
     Flatness,
     GeometricTolerance,
+    LineProfile,
     Parallelism,
     Perpendicularity,
     Position,
@@ -250,6 +251,7 @@ __all__ = [
     "GeometricTolerance",
     "Inside",
     "Largest",
+    "LineProfile",
     "Locator",
     "Measure",
     "Mesh",

@@ -221,6 +221,15 @@ class Profile(GeometricTolerance):
     kind, options, needs_datums = "profile", ("outside",), False
 
 
+class LineProfile(GeometricTolerance):
+    """Profile of any line of a surface (ISO 1101, 17.7); the zones of all lines are taken as one zone of the surface.
+
+    Without form deviations the two are equal where the datums lock the location of the surface.
+    """
+
+    kind, options, needs_datums = "line profile", ("outside",), False
+
+
 class Parallelism(GeometricTolerance):
     """Parallelism of a plane or an axis to its datums (ISO 1101, 17.9)."""
 

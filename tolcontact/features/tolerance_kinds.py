@@ -197,6 +197,7 @@ ZONES: dict[type[GeometricTolerance], Zones] = {
     tolerances.Coaxiality: dict.fromkeys(ROUND, AxisZone) | {SphereFeature: SurfaceZone},
     tolerances.Symmetry: {SlabFeature: SurfaceZone} | dict.fromkeys(ROUND, FlatAxisZone),
     tolerances.Profile: PROFILE,
+    tolerances.LineProfile: PROFILE,
     tolerances.Parallelism: ORIENTATION,
     tolerances.Perpendicularity: ORIENTATION,
     tolerances.Angularity: ORIENTATION,
