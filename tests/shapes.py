@@ -5,8 +5,8 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.faces import patch
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.shapes import shape
 
 HOUSING = cases.MODELS / "housing.step"

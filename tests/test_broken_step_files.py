@@ -6,7 +6,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import read_files, reader
 
 pytestmark = pytest.mark.slow

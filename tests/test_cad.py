@@ -16,8 +16,8 @@ from tests import cases
 from tests.step_files import assembly, step_block
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import BREP, SURFACES, product, reading
 from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_surfaces import credible, onto

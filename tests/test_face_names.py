@@ -12,7 +12,7 @@ from tests.test_cad import COVER
 from tests.test_json_models import load_model, written
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault
 
 DIRECTIONS = ("-z", "+z", "-y", "+x", "+y", "-x")  # of a block's faces, in their order
 

@@ -6,8 +6,8 @@ import trimesh
 
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.faces import patch
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files.reading import STEP_CHORD
 from tolcontact.geometry.shapes import shape
 

@@ -11,7 +11,7 @@ import trimesh
 import tolcontact as tc
 from tests.shapes import BLOCK, refusal
 from tests.step_files import step_block
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files.reading import MAX_TRIANGLES
 from tolcontact.geometry.shapes import shape
 

@@ -9,8 +9,7 @@ import trimesh
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
 from tolcontact.discretization import discretize
-from tolcontact.errors import UnitsWarning
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault, UnitsWarning
 from tolcontact.geometry.shapes import shape
 
 

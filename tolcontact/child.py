@@ -1,4 +1,4 @@
-"""Work on files of unknown origin in a process of its own: whatever such a file does to a library, it ends there."""
+"""Child processes for files of unknown origin, in which a library may crash, stall or take too much memory."""
 
 import contextlib
 import os
@@ -8,7 +8,7 @@ from pathlib import Path
 
 try:
     import resource
-except ImportError:  # not on Windows, where memory is not limited
+except ImportError:  # not on Windows, where nothing is limited
     resource = None  # type: ignore[assignment]
 
 
@@ -17,20 +17,14 @@ class ChildDiedError(Exception):
 
 
 def run_child(script: Path, *arguments: str, seconds: float) -> str:
-    """Standard output of a Python file, which should begin with `limit_memory`.
+    """Run a Python file, which should begin with `limit_resources`, and return its standard output.
 
-    Raises ChildDiedError if it takes too long, or ends by a signal or an error.
+    Raises ChildDiedError if it takes longer than `seconds`, or ends by a signal or an error.
     """
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path),
-        "PYTHONIOENCODING": "utf-8:surrogateescape",
-        "OPENBLAS_NUM_THREADS": "1",
-    }
     try:
-        ended = subprocess.run(
+        completed = subprocess.run(
             [sys.executable, "-P", os.fspath(script), *arguments],
-            env=environment,
+            env=environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             timeout=seconds,
@@ -38,23 +32,48 @@ def run_child(script: Path, *arguments: str, seconds: float) -> str:
         )
     except subprocess.TimeoutExpired as error:
         raise ChildDiedError(f"reading it took longer than {seconds:.0f} s") from error
-    if ended.returncode:
-        raise ChildDiedError(_how(ended))
-    return ended.stdout.decode("utf-8", "surrogateescape")
+    if completed.returncode:
+        raise ChildDiedError(_reason(completed))
+    return completed.stdout.decode("utf-8", "surrogateescape")
 
 
-def limit_memory(size: int) -> None:
-    """Let this process have `size` bytes of memory at most, and leave no core behind."""
-    if resource is not None:
-        for limit, value in ((resource.RLIMIT_AS, size), (resource.RLIMIT_CORE, 0)):
-            with contextlib.suppress(ValueError):  # a lower limit holds already
-                resource.setrlimit(limit, (value, value))
+def environment() -> dict[str, str]:
+    """Return the environment of a child process, which finds the modules that this process finds."""
+    return {
+        **os.environ,
+        "PYTHONPATH": os.pathsep.join(folder or str(Path.cwd()) for folder in sys.path),
+        "PYTHONIOENCODING": "utf-8:surrogateescape",
+        "OPENBLAS_NUM_THREADS": "1",  # memory set aside for idle threads counts
+    }
 
 
-def _how(ended: subprocess.CompletedProcess) -> str:
-    if ended.returncode < 0:
-        return f"the library that reads it crashed (signal {-ended.returncode})"
-    last = (ended.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
-    if last.startswith("MemoryError"):
+def limit_resources(memory: int, *, file_size: int | None = None, seconds: int | None = None) -> None:
+    """Limit this process to `memory` [byte], files of `file_size` [byte] and processor `seconds`, and let it leave no core."""
+    if resource is None:
+        return
+    limits = {
+        resource.RLIMIT_AS: memory,
+        resource.RLIMIT_FSIZE: file_size,
+        resource.RLIMIT_CPU: seconds,
+        resource.RLIMIT_CORE: 0,
+    }
+    for name, limit in limits.items():
+        if limit is not None:
+            _, hard = resource.getrlimit(name)
+            allowed = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+            with contextlib.suppress(OSError, ValueError):  # some systems lack a limit
+                resource.setrlimit(name, (allowed, allowed))
+
+
+def peak_memory() -> int | None:
+    """Return the largest memory [byte] that this process has used so far; None where the system does not tell."""
+    return None if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+
+
+def _reason(completed: subprocess.CompletedProcess) -> str:
+    if completed.returncode < 0:
+        return f"the library that reads it crashed (signal {-completed.returncode})"
+    message = (completed.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]
+    if message.startswith("MemoryError"):
         return "reading it takes too much memory"
-    return f"the library that reads it failed ({last})"
+    return f"the library that reads it failed ({message})"

@@ -5,6 +5,7 @@ A message states what was expected, what was got (naming the part, locator, pair
 
 import re
 from collections.abc import Sequence
+from typing import Protocol
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
 # surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
@@ -12,8 +13,32 @@ STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u20
 
 
 def shown(text: str) -> str:
-    """A text as it may be printed: characters that would steer a terminal as escapes."""
-    return STEERING.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    """Return a text as it may be printed: characters that would steer a terminal become escapes."""
+    return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+
+
+def clipped(text: str, max_length: int = 400) -> str:
+    """Return the text of a file as a message may quote it: on one line, printable and short."""
+    line = " ".join("".join(letter if letter.isprintable() else " " for letter in text).split())
+    return line if len(line) <= max_length else f"{line[:max_length]}..."
+
+
+class Declared(Protocol):
+    """A declared thing with a name and the line of the script that declares it."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def declared_at(self) -> str: ...
+
+
+def designation(kind: str, thing: Declared) -> str:
+    """Return how a message names a declared thing: its kind, its name and the line of the script."""
+    return f'{kind} "{thing.name}" ({thing.declared_at})'
+
+
+class GeometryFault(Exception):
+    """A sentence on what is wrong with a shape; it is collected with the other faults of a model."""
 
 
 class TolcontactError(Exception):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import read_files
 
 FAR = 1e3  # [mm] at which turned normals are compared

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import tolcontact as tc
-from tolcontact.geometry.fault import GeometryFault
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import read_files
 from tolcontact.geometry.files.product import Product
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
-from tolcontact.child import ChildDiedError, limit_memory, run_child
+from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
 from tolcontact.vocabulary import ArchiveVariable
 
@@ -303,5 +303,5 @@ def _check_declaration(file: netCDF4.Dataset) -> None:
 
 if __name__ == "__main__":
     _file = Path(sys.argv[1])
-    limit_memory(MEMORY + 4 * _file.stat().st_size)
+    limit_resources(MEMORY + 4 * _file.stat().st_size)
     sys.stdout.write(_look(_file))

@@ -14,11 +14,10 @@ from tolcontact.discretization.nominal import ContactPoints, NominalPart
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import ContactWarning, shown
+from tolcontact.errors import ContactWarning, GeometryFault, designation, shown
 from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
-from tolcontact.geometry.fault import GeometryFault, where
 from tolcontact.geometry.overlap import overlap_corners, rim_points
 from tolcontact.geometry.spreading import own_vertices, spread
 from tolcontact.geometry.surface import Surface
@@ -138,7 +137,7 @@ def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndar
     for (seen, error), what in zip(errors.items(), advice, strict=True):
         if error > CHORD * finest:
             warnings.warn(
-                f"{where('contact pair', pair)}: parts may be off by up to {error:.2g} mm {seen}, "
+                f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {seen}, "
                 f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {what}",
                 ContactWarning,
                 stacklevel=6,

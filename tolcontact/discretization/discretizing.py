@@ -16,10 +16,9 @@ from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPar
 from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.three_two_one import lay_out
 from tolcontact.discretization.unit_check import warn_of_units
-from tolcontact.errors import ModelError
+from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features.nominal_features import Features, datum_order
 from tolcontact.geometry.faces import Meshes
-from tolcontact.geometry.fault import GeometryFault, where
 from tolcontact.geometry.files.reading import read_files
 from tolcontact.geometry.shapes import field_surface, shape
 
@@ -36,7 +35,7 @@ def discretize(assembly: Assembly) -> Nominal:
     clear = [part for part in assembly.parts if not any(part.geometry.faults())]
     log.info("reading the shapes of %d parts", len(clear))
     contents = read_files(part.geometry for part in clear)
-    attempts = {part: _attempt(faults, where("part", part), shape, part.geometry, contents) for part in clear}
+    attempts = {part: _attempt(faults, designation("part", part), shape, part.geometry, contents) for part in clear}
     shapes = {part: found for part, found in attempts.items() if found is not None}
     meshes = {part: found.mesh for part, found in shapes.items()}
     parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]
@@ -46,7 +45,7 @@ def discretize(assembly: Assembly) -> Nominal:
         parts = [_on_features(part, features, meshes, faults) for part in parts if part is not None]
     placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
     pairs = [
-        _attempt(faults, where("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
+        _attempt(faults, designation("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
         for pair in assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
@@ -64,7 +63,7 @@ def discretize(assembly: Assembly) -> Nominal:
     if clean and not faults:
         faults.extend(_strange_contributors(assembly, labels))
     faults.extend(
-        f"{where('contact pair', pair)}: its name is reserved for the one-sided locators of a part; rename it"
+        f"{designation('contact pair', pair)}: its name is reserved for the one-sided locators of a part; rename it"
         for pair in assembly.pairs
         if any(pair.name == _supports(part) for part in assembly.parts if has_supports(assembly, part))
     )
@@ -80,7 +79,7 @@ def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults
     for index, part in enumerate(assembly.parts):
         ordered, circular = datum_order(part)
         for feature in ordered:
-            _attempt(faults, f'part "{part.name}": {where("feature", feature)}', features.add, feature, index, meshes)
+            _attempt(faults, f'part "{part.name}": {designation("feature", feature)}', features.add, feature, index, meshes)
         if circular:
             names = ", ".join(f'"{feature.name}"' for feature in circular)
             faults.append(
@@ -96,7 +95,8 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
         return part
     if isinstance(location, ThreeTwoOne):
         found = [
-            _attempt(faults, where("part", part.part), features.face_at, f, meshes, part.placement) for f in location.faces
+            _attempt(faults, designation("part", part.part), features.face_at, f, meshes, part.placement)
+            for f in location.faces
         ]
         faces = tuple(found[k] for k in (0, 0, 0, 1, 1, 2))
     else:
@@ -177,7 +177,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
             if all(mentioned in meshes for mentioned in location.mentioned):
-                locators = _attempt(faults, where("part", part), lay_out, location.scheme, meshes) or ()
+                locators = _attempt(faults, designation("part", part), lay_out, location.scheme, meshes) or ()
         else:
             locators = location.scheme
     common = location.tolerance if location else None
@@ -185,7 +185,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
     if location is not None and location.floating:
         nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
-        _attempt(faults, where("part", part), nominal.check_independent)
+        _attempt(faults, designation("part", part), nominal.check_independent)
     parent = location.on if location else None
     return NominalPart(
         name=part.name,
@@ -223,7 +223,7 @@ def _locators(
 def _immovable(assembly: Assembly) -> list[str]:
     """Pairs that no free part could ever open."""
     return [
-        f"{where('contact pair', pair)}: contact cannot move its sides relative to each other; "
+        f"{designation('contact pair', pair)}: contact cannot move its sides relative to each other; "
         f'declare part "{pair.moving.part.name}" free (fixed=False)'
         for pair in assembly.pairs
         if movers(assembly, pair.moving.part) == movers(assembly, pair.reference.part)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import Tolerance
+from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
-from tolcontact.geometry.fault import GeometryFault
 
 CONDITION_LIMIT = 1e8
 

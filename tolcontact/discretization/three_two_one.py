@@ -3,8 +3,8 @@
 import numpy as np
 
 from tolcontact.declaration import Face, Locator, ThreeTwoOne
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.faces import Meshes, patch
-from tolcontact.geometry.fault import GeometryFault
 
 LABELS = ("A1", "A2", "A3", "B1", "B2", "C1")
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import (
     ConeFeature,
     CylinderFeature,
@@ -18,7 +19,6 @@ from tolcontact.features.feature_geometry import (
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import smooth_pieces
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.fitting import nearest_surface
 from tolcontact.geometry.surface import Surface
 

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tolcontact.declaration import Face, Feature, Part
+from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.tolerance_layers import Datum, Layer, freedom_names, tolerance_layers
 from tolcontact.geometry.faces import Meshes, patch
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.regions import Region, region, share
 from tolcontact.geometry.surface import Surface
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from tolcontact.declaration import feature_tolerance as tolerances
 from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import (
     AxisFeature,
     ConeFeature,
@@ -23,7 +24,6 @@ from tolcontact.features.feature_geometry import (
     SlabFeature,
     SphereFeature,
 )
-from tolcontact.geometry.fault import GeometryFault
 
 MIN_ACROSS = 0.999  # of a direction: the part of it that must lie across an axis
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from tolcontact.declaration import Feature, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
+from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry
 from tolcontact.features.tolerance_kinds import zone_of
-from tolcontact.geometry.fault import GeometryFault
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
 RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: shapes of single precision are no better

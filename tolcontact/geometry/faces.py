@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.vectors import Vector
-from tolcontact.errors import shown
+from tolcontact.errors import GeometryFault, shown
 from tolcontact.geometry.brep_face import FaceInFile, described, numbered
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces

@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Part
 from tolcontact.declaration.selection import FACE_ANGLE
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.brep_face import FaceInFile, described, numbered
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import BREP
 from tolcontact.geometry.shapes import shape
 

@@ -5,8 +5,8 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration import Box, Mesh
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import edges
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 
 FIELD_STATIONS = 12

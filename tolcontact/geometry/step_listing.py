@@ -10,9 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.vectors import Vector
-from tolcontact.errors import STEERING, ModelError, OptionError, shown
+from tolcontact.errors import STEERING, GeometryFault, ModelError, OptionError, shown
 from tolcontact.geometry.brep_face import FaceInFile, described, in_words
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import key_of, read_files
 from tolcontact.geometry.files.bodies import SHOWN
 from tolcontact.geometry.files.product import Product

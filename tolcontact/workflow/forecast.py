@@ -4,14 +4,10 @@ import logging
 import time
 
 from tolcontact.archive import bytes_of_rows, size_in_words
+from tolcontact.child import peak_memory
 from tolcontact.compilation import Program
 from tolcontact.simulation import block_rows, simulate_blocks
 from tolcontact.vocabulary import BLOCK_ROWS
-
-try:
-    import resource
-except ImportError:  # not on Windows, where memory is not known
-    resource = None  # type: ignore[assignment]
 
 TRIAL, ENOUGH = 4, 0.25  # realizations of the first trial, and s of the last: what begins takes milliseconds
 MANY = 1_000_000
@@ -28,11 +24,8 @@ def announce(program: Program, *, samples: int, seed: int, keep: str, threads: i
     if samples >= MANY or seconds > LONG:
         nominal = program.nominal
         points = sum(len(pair.P_m) for pair in nominal.pairs)
-        memory = (
-            ""
-            if resource is None
-            else f", {size_in_words(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)} of memory"
-        )
+        peak = peak_memory()
+        memory = "" if peak is None else f", {size_in_words(peak)} of memory"
         log.warning(
             "%d parts, %d contact pairs, %d contact points: %d realizations will take about %s%s, and %s in an archive",
             len(nominal.parts), len(nominal.pairs), points, samples, duration(seconds), memory,

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tolcontact.errors import clipped
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import edges
-from tolcontact.geometry.fault import clipped
 from tolcontact.geometry.files.step_text import NamedFace, Solid
 
 SHOWN = 12  # bodies that a message lists

@@ -11,9 +11,9 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration.geometry import UNITS
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files.bodies import Body, Place, Triangles, bodies, listed
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText

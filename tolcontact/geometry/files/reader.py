@@ -17,7 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tolcontact.geometry.fault import GeometryFault, clipped
+from tolcontact.child import environment
+from tolcontact.errors import GeometryFault, clipped
 
 # A STEP file of 1 MB takes some 2 s, one of 20 MB 41 s, on one core; machines differ, and other jobs run on them.
 SECONDS, SECONDS_PER_MB = 30.0, 20.0
@@ -69,7 +70,7 @@ def _by_one_process(jobs: Sequence[Job], most: int) -> Iterator[dict[str, np.nda
                     stdout=errors,
                     stderr=errors,
                     # Threads that only wait, and memory set aside for them, would count against its memory.
-                    env={**os.environ, "OPENBLAS_NUM_THREADS": "1", "MALLOC_ARENA_MAX": "4"},
+                    env={**environment(), "MALLOC_ARENA_MAX": "4"},
                 )
             except OSError as error:
                 yield from [GeometryFault(f'"{job.path}": its reader process cannot be started ({error})') for job in jobs]

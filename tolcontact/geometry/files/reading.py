@@ -11,8 +11,8 @@ import trimesh
 
 from tolcontact.declaration import Box, Mesh
 from tolcontact.declaration.geometry import UNITS
+from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.fault import GeometryFault
 from tolcontact.geometry.files import reader, screening
 from tolcontact.geometry.files.product import (
     BREP,

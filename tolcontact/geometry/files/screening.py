@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from tolcontact.declaration.geometry import STEP
-from tolcontact.geometry.fault import GeometryFault, clipped
+from tolcontact.errors import GeometryFault, clipped
 from tolcontact.geometry.files.step_text import StepText, step_text
 
 MESHES = (".stl", ".obj", ".ply", ".glb", ".gltf")

@@ -5,7 +5,6 @@ k it leaves FOLDER/k.npz with what it read, or FOLDER/k.txt with what is wrong. 
 starts quickly.
 """
 
-import contextlib
 import hashlib
 import io
 import json
@@ -18,10 +17,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-try:
-    import resource
-except ImportError:  # POSIX only
-    resource = None  # type: ignore[assignment]
+from tolcontact.child import limit_resources
+
 try:
     import cascadio
 except ImportError:  # an extra: only STEP files need it
@@ -245,26 +242,10 @@ def joined(found: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:
     return {"vertices": np.concatenate(vertices), "faces": np.concatenate(faces), "piece": np.concatenate(piece)}
 
 
-def limit(memory: int, seconds: int) -> None:
-    """Hold this process to some `memory` [byte], and its files, too; and to processor `seconds`, should nobody end it."""
-    if resource is not None:
-        limits = {
-            resource.RLIMIT_AS: memory,
-            resource.RLIMIT_FSIZE: memory,
-            resource.RLIMIT_CPU: seconds,
-            resource.RLIMIT_CORE: 0,
-        }
-        for what, most in limits.items():
-            _, hard = resource.getrlimit(what)
-            own = most if hard == resource.RLIM_INFINITY else min(most, hard)
-            with contextlib.suppress(OSError, ValueError):  # if the system knows no such limit
-                resource.setrlimit(what, (own, own))
-
-
 def work(folder: Path) -> None:
     """Read what the list in `folder` names."""
     jobs = json.loads((folder / "jobs.json").read_text())
-    limit(jobs["memory"], jobs["seconds"])
+    limit_resources(jobs["memory"], file_size=jobs["memory"], seconds=jobs["seconds"])
     (folder / "ready").touch()
     for k, job in enumerate(jobs["files"]):
         path = Path(job["path"])
