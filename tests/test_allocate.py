@@ -92,7 +92,7 @@ def located(part, scheme, labels, widths):
 
 def test_scaled_draws_are_draws_of_other_ranges():
     one, other = (tc.build(pile(*widths)).draws for widths in ((0.6, 0.3), (1.2, 0.15)))
-    names = [each.label for each in one.contributors.every]
+    names = [each.label for each in one.contributors]
     scale = np.array([{"p0.Z": 2.0, "p1.Z": 0.5}.get(name, 1.0) for name in names])
     assert np.array_equal(one.scaled(scale)(seed=3, start=0, stop=50), other(seed=3, start=0, stop=50))
 

@@ -12,7 +12,7 @@ from tests.cases import toleranced
 from tolcontact.discretization import discretize
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
 from tolcontact.variation import Draws
-from tolcontact.variation.uniforms import STREAM
+from tolcontact.variation.plans import STREAM
 
 SAMPLES = 20_000
 

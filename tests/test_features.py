@@ -263,9 +263,7 @@ def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
         a.measure("x", own.axis(1), along="x")
         program = tc.build(a)
         feature = program.nominal.features[-1].geometry
-        found.append(
-            (feature.centre, feature.axis, feature.half, feature.size, [c.spread for c in program.draws.contributors.every])
-        )
+        found.append((feature.centre, feature.axis, feature.half, feature.size, [c.spread for c in program.draws.contributors]))
     for one, other in zip(*found, strict=True):
         assert one == pytest.approx(other, abs=1e-6)
 
@@ -294,7 +292,7 @@ def test_shapes_of_single_precision_have_the_same_freedoms(shift, turn, tmp_path
     part.feature("bore", part.face(tc.Cylinder(radius=5)), tc.Perpendicularity(0.2, "A"), datum="B")
     part.feature("rim", part.face(tc.Cylinder(radius=20)), tc.Position(0.2, "A|B"))
     a.measure("x", part.features[-1].axis(0), along="x")
-    every = Draws(discretize(a)).contributors.every
+    every = Draws(discretize(a)).contributors
     assert [0.2 / each.spread for each in every] == pytest.approx([6.88] * 2 + [7.28 * np.sqrt(2)] * 4, rel=3e-3)
     assert ["tilt" in each.label or "shift" in each.label for each in every] == [True] * 6
 
@@ -305,7 +303,7 @@ def test_a_cone_of_triangles_has_two_tilts_and_a_depth():
     part.feature("base", part.face("-z"), datum="A")
     wall = part.feature("wall", part.face(lambda c, n: n[:, 2] > -0.5), tc.Perpendicularity(0.2, "A"), tc.Profile(0.5, "A"))
     a.measure("top", wall.axis(1), along="z")
-    labels = [each.label for each in Draws(discretize(a)).contributors.every]
+    labels = [each.label for each in Draws(discretize(a)).contributors]
     assert labels == ["cone.wall.tilt x", "cone.wall.tilt y", "cone.wall.along"]
     assert discretize(a).position(wall.axis(1)) == pytest.approx([0, 0, 15], abs=1e-3)
     assert float(tc.check_population(a, samples=4000).share_inside[:, 1].min()) < 0.9973
@@ -320,7 +318,7 @@ def test_the_spread_does_not_depend_on_how_a_shape_is_turned_in_its_part():
         part.feature("under", part.face("-z"), datum="A")
         part.feature("top", part.face("+z"), tc.Profile(0.3, "A"))
         a.measure("x", part.point(0, 0, 0), along="x")
-        assert [0.3 / each.spread for each in Draws(discretize(a)).contributors.every] == pytest.approx([11.77] * 3, rel=1e-3)
+        assert [0.3 / each.spread for each in Draws(discretize(a)).contributors] == pytest.approx([11.77] * 3, rel=1e-3)
 
 
 def test_regions_of_one_face_are_features_of_their_own():

@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
 from tolcontact.variation.draws import draw
-from tolcontact.variation.uniforms import STREAM, uniform
+from tolcontact.variation.plans import STREAM, uniform
 
 SHAPES = {
     "normal": stats.norm(0, 0.5),

@@ -15,7 +15,7 @@ from tests.helpers import SEATED, call
 from tolcontact.simulation import map_blocks
 from tolcontact.statistics import rare_events
 from tolcontact.statistics.rare_events import REPLICATES, tail_probability
-from tolcontact.variation.uniforms import uniform
+from tolcontact.variation.plans import uniform
 
 module = importlib.import_module("tolcontact.analyses.tails")
 
@@ -96,7 +96,7 @@ def test_parts_are_led_to_where_they_do_not_go_together():
     assert score(u) == pytest.approx(0.5 - np.where(every.any(axis=0), every.argmax(axis=0), len(every)))
     assert looks == 3 and 2**looks == len(module.INFLATIONS) + 1
     of_run = program.draws(seed=1, start=0, stop=24)
-    again = program.draws.made_of(lambda label: uniform(1, label, 0, 24), 24)
+    again = program.draws.from_numbers(lambda label: uniform(1, label, 0, 24), 24)
     assert np.array_equal(again, of_run)
 
 

@@ -39,7 +39,7 @@ FACTORS = {  # t / s for 99.73 % inside; the first ten from VARIATION's table, c
 @pytest.mark.parametrize("name", FACTORS)
 def test_spreads_are_those_of_the_table(name):
     model, factor = FACTORS[name]
-    contributors = Draws(discretize(model())).contributors.every
+    contributors = Draws(discretize(model())).contributors
     spreads = [each.spread for each in contributors if each.layer is not None] or [contributors[-1].tolerance.width / 6]
     assert spreads == pytest.approx([1 / factor] * len(spreads), rel=2e-3)
 

@@ -146,7 +146,7 @@ class _Engine:
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
     """Columns of the deviations by who owns them, of those that have ranges."""
     found: dict[str, list[int]] = {}
-    for column, (owner, each) in enumerate(zip(owners(program, by), program.draws.contributors.every, strict=True)):
+    for column, (owner, each) in enumerate(zip(owners(program, by), program.draws.contributors, strict=True)):
         if np.isfinite(each.range) and each.range > 0:
             found.setdefault(owner, []).append(column)
     if not found:
@@ -155,7 +155,7 @@ def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
 
 
 def _ranges(program: Program, groups: Mapping[str, np.ndarray]) -> list[float]:
-    every = program.draws.contributors.every
+    every = program.draws.contributors
     own = [{every[column].range for column in columns} for columns in groups.values()]
     return [ranges.pop() if len(ranges) == 1 else np.nan for ranges in own]
 

@@ -9,9 +9,8 @@ import numpy as np
 from scipy.optimize import linprog
 
 from tolcontact.declaration import Tolerance
-from tolcontact.variation.contributors import Contributor, Zone
+from tolcontact.variation.contributors import TAIL, ComponentZone, Contributor
 from tolcontact.variation.draws import Draws
-from tolcontact.variation.quantiles import TAIL
 
 AROUND = 32  # random directions in which the extreme points of a zone are looked up, beside those along its components
 CUTS = 40  # tangents of a round zone, one after the other
@@ -28,10 +27,10 @@ class Region:
     """
 
     def __init__(self, draws: Draws, *, seed: int) -> None:
-        every = draws.contributors.every
+        every = draws.contributors
         bounds = np.array([_bounds(each) for each in every]).reshape(-1, 2)
         self.lower, self.upper = bounds.T.copy()
-        self._drive = np.eye(len(every)) + draws.driven
+        self._drive = np.eye(len(every)) + draws.drive_matrix
         self._populations = draws.populations
         measured = [column for columns, _ in self._populations for column in columns]
         for columns, values in self._populations:
@@ -125,17 +124,17 @@ class Region:
                         ends.append(end)
         return np.array(rows).reshape(-1, len(self.lower)), np.array(ends)
 
-    def _half(self, zone: Zone, own: np.ndarray) -> np.ndarray:
+    def _half(self, zone: ComponentZone, own: np.ndarray) -> np.ndarray:
         """Half of what width a zone has (n,), with its bonus."""
         if zone.size is None:
             return np.full(len(own), zone.width / 2)
         return np.asarray((zone.width + zone.growth * (own @ self._drive[:, zone.size] - zone.limit)) / 2)
 
-    def _lengths(self, zone: Zone, own: np.ndarray) -> np.ndarray:
+    def _lengths(self, zone: ComponentZone, own: np.ndarray) -> np.ndarray:
         """Rows of a zone (n, point, entry) at own deviations."""
         return np.asarray(np.einsum("pec,nc->npe", zone.rows, own[:, zone.columns] - zone.middle))
 
-    def _enclose(self, zone: Zone) -> None:
+    def _enclose(self, zone: ComponentZone) -> None:
         """Bounds of components, each by itself: as far as any direction of the zone lets them be."""
         widest = zone.width
         if zone.size is not None:

@@ -13,9 +13,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from tolcontact.variation.draws import SURELY, Draws
-from tolcontact.variation.plans import Numbers
-from tolcontact.variation.uniforms import uniform
+from tolcontact.variation.draws import MIN_UNIFORM, Draws
+from tolcontact.variation.plans import Numbers, uniform
 
 OTHER = 1 << 40  # realizations that B begins at: no run comes so far
 
@@ -104,7 +103,7 @@ class ReleasedDraws:
         self._unit = {draws.labels[column]: k for k, columns in enumerate(units.values()) for column in columns}
         self._unit |= {
             rows: self._unit[draws.labels[int(columns[0])]]
-            for rows, (columns, _) in zip(draws.rows_drawn, draws.populations, strict=True)
+            for rows, (columns, _) in zip(draws.population_labels, draws.populations, strict=True)
             if draws.labels[int(columns[0])] in self._unit
         }
 
@@ -131,7 +130,7 @@ class ReleasedDraws:
 
         every = np.empty((count, self.together, len(self._draws.labels)))
         for members in range(self.together):
-            every[:, members] = self._draws.made_of(self._mixed(kept, anew, places, members), count)
+            every[:, members] = self._draws.from_numbers(self._mixed(kept, anew, places, members), count)
         return every.reshape(-1, every.shape[2])[start - first * self.together : stop - first * self.together]
 
     def _mixed(self, kept: Numbers, anew: Numbers, places: np.ndarray, members: int) -> Numbers:
@@ -165,5 +164,5 @@ class ReleasedDraws:
         stays = np.take_along_axis(of_label, order, axis=1) < members
         z = np.empty_like(both[0])
         np.put_along_axis(z, order, (own @ np.where(stays, *e)[..., None])[..., 0], axis=1)
-        numbers = ndtr(np.linalg.solve(factor, z.T)).clip(SURELY, 1 - SURELY)
+        numbers = ndtr(np.linalg.solve(factor, z.T)).clip(MIN_UNIFORM, 1 - MIN_UNIFORM)
         return dict(zip(labels, numbers, strict=True))

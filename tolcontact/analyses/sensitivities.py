@@ -95,7 +95,7 @@ def sensitivities(
             terms.INTERVAL: list(terms.ESTIMATE),
             terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
             "measure_units": (terms.MEASURE, [measure.units for measure in program.nominal.measures]),
-            "contributor_units": (terms.CONTRIBUTOR, [program.draws.contributors.every[k].units for k in columns]),
+            "contributor_units": (terms.CONTRIBUTOR, [program.draws.contributors[k].units for k in columns]),
         },
         attrs={
             "title": f"sensitivities of the measures of {program.nominal.assembly.name}",

@@ -21,7 +21,7 @@ from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 LEAST = 4000  # realizations for an event
 INFLATIONS = 1.3 ** np.arange(7)  # of all deviations, up to 4.8: from which on do parts not go together?
 LOOKS = 3  # that tell which of them is the first, or that none is
-SURELY = 1e-16  # the least distance of a number from 0 and 1
+MIN_UNIFORM = 1e-16  # the least distance of a number from 0 and 1
 
 
 def tails(
@@ -110,7 +110,7 @@ class _Engine:
 
         def numbers(label: str) -> np.ndarray:
             if label in place:
-                return np.asarray(ndtr(u[:, place[label]]).clip(SURELY, 1 - SURELY))
+                return np.asarray(ndtr(u[:, place[label]]).clip(MIN_UNIFORM, 1 - MIN_UNIFORM))
             if "#" in label:
                 raise OptionError(
                     f'"{label.partition(" #")[0]}" is drawn anew until it lies in its zone, which rare events cannot follow; '
@@ -118,7 +118,7 @@ class _Engine:
                 )
             return np.full(len(u), 0.5)
 
-        draws = GivenDraws(self._program.draws.made_of(numbers, len(u)))
+        draws = GivenDraws(self._program.draws.from_numbers(numbers, len(u)))
         found = list(self._blocks(outcomes, self._program, samples=len(u), seed=0, draws=draws))
         measured, status = (np.concatenate(every) for every in zip(*found, strict=True))
         self.statuses += np.bincount(status, minlength=len(self.statuses))

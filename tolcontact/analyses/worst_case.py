@@ -107,7 +107,7 @@ def worst_case(
             terms.PART: [part.name for part in program.nominal.parts],
             terms.PAIR: [pair.name for pair in program.nominal.pairs],
             "measure_units": (terms.MEASURE, [measure.units for measure in program.nominal.measures]),
-            "contributor_units": (terms.CONTRIBUTOR, [each.units for each in program.draws.contributors.every]),
+            "contributor_units": (terms.CONTRIBUTOR, [each.units for each in program.draws.contributors]),
         },
         attrs={
             "title": f"worst cases of the measures of {program.nominal.assembly.name}",

@@ -334,7 +334,7 @@ def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
 
 
 def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
-    nominal, every = program.nominal, program.draws.contributors.every
+    nominal, every = program.nominal, program.draws.contributors
     group.createDimension(terms.CONTRIBUTOR, len(every))
     group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
@@ -343,7 +343,7 @@ def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -
     write(group, terms.CONTRIBUTOR_SOURCE, [each.source for each in every])
     write(group, terms.CONTRIBUTOR_UNITS, [each.units for each in every])
     write(group, terms.TOLERANCE_RANGE, [each.range for each in every])
-    write(group, terms.DISTRIBUTION, [each.said for each in every])
+    write(group, terms.DISTRIBUTION, [each.description for each in every])
     write(group, terms.MEAN_SHIFT, [each.mean_shift for each in every])
     locators = nominal.locators
     write(group, terms.LOCATOR_LABEL, locators.labels)

@@ -133,25 +133,25 @@ class Features:
         regions = tuple(region(face, meshes) for face in feature.faces)
         self._check_disjoint(feature, regions, meshes)
         geometry = feature_geometry(surfaces)
-        first = self.first_column + len(self.labels)
+        start = self.first_column + len(self.labels)
         datums = {
-            datum.feature.datum: Datum(datum.geometry, _padded(datum.coordinates, first))
+            datum.feature.datum: Datum(datum.geometry, _padded(datum.coordinates, start))
             for datum in self.features
             if datum.part == part
         }
-        layers = tolerance_layers(feature, geometry, datums, first)
+        layers = tolerance_layers(feature, geometry, datums, start)
         names = [name for layer in layers for name in freedom_names(geometry, layer.added)]
         if feature.size is not None:
             _check_size(feature, geometry)
             names.append("size")
-        coordinates, column = np.zeros((len(geometry.names), first + len(names))), first
+        coordinates, column = np.zeros((len(geometry.names), start + len(names))), start
         for layer in layers:
             count = layer.added.shape[1]
             coordinates[:, column : column + count] = layer.added
-            coordinates[:, :first] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
+            coordinates[:, :start] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
             column += count
         labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.features.append(NominalFeature(feature, part, geometry, layers, first, labels, coordinates, surfaces, regions))
+        self.features.append(NominalFeature(feature, part, geometry, layers, start, labels, coordinates, surfaces, regions))
 
     def _check_disjoint(self, feature: Feature, regions: Sequence[Region], meshes: Meshes) -> None:
         """Raise GeometryFault if a face that deviates with the feature also deviates with a feature added before."""

@@ -12,7 +12,7 @@ A tolerance range T is the full width of a zone around 0. `tc.Tolerance(range, d
 | "truncated normal" | sigma = T / 6, cut at -T/2 and +T/2 |
 
 A number stands for a normal distribution of that range, and 0 for a locator that does not vary. Any frozen continuous
-distribution of `scipy.stats` may take the place of a name; it defines the spread by itself, so leave the range out.
+distribution of `scipy.stats` may take the place of a name. It defines the spread by itself, so leave the range out.
 
 >>> import tolcontact as tc
 >>> from scipy import stats
@@ -22,56 +22,57 @@ normal, range 0.6 mm
 >>> skewed.width  # six standard deviations [mm]
 0.24
 
-`tc.Tolerance(0.6, shift=0.1)` moves all of it; `cp=1.33, cpk=1.0` say how capable a normal process is, and how near its mean
-comes to a limit.
+`tc.Tolerance(0.6, shift=0.1)` shifts the distribution; `cp=1.33, cpk=1.0` state the capability of a normal process, and how
+near its mean comes to a limit.
 
 ## From a zone to the spread of a feature
 
 A feature has several freedoms: a plane an offset in its middle and two tilts, an axis two shifts in its middle and two tilts,
-a centre three shifts. All are displacements in mm at its extremes, a tilt at the edges or ends, so that they do not depend on
-the origin. `rule` says how they fill the zone of a tolerance:
+a centre three shifts. All are displacements in mm at the feature's extremes, tilts at its edges or ends, so that they do not
+depend on the origin. `rule` says how they fill the zone of a tolerance:
 
 | rule | components |
 |---|---|
 | "99.73 % inside" (default) | normal, independent, with equal spreads, such that 99.73 % of the *features* lie inside |
 | "6 sigma at the extremes" | the same, with six standard deviations at the worst point equal to the width; fewer lie inside |
-| "truncated" | the latter, without the features that lie outside |
+| "truncated" | as "6 sigma at the extremes", without the features that lie outside |
 | "uniform" | uniform in the zone |
-| "translation" | the first, without tilts |
+| "translation" | as "99.73 % inside", without tilts |
 | "polar" | of an axis: uniform angle, normal radius with 6 sigma equal to the width; no tilts |
 
-The first is the only one that says the same for sizes, planes and axes. For a width t the spread of a component is t/6 of a
-size or an offset alone, t/9.07 of a plane's two tilts, t/11.8 of a rectangle's place and tilts, t/6.88 of an axis that only
-shifts, t/7.28 at the ends of one that also tilts. Of nested tolerances the narrower one draws its freedoms, and the wider one
-those that are left, so that 99.73 % of the sum lie inside. The share inside is integrated over directions, not drawn.
+Only the default means the same for sizes, planes and axes. For a width t the spread of a component is t/6 for a size or an
+offset alone, t/9.07 for a plane's two tilts, t/11.8 for a rectangle's place and tilts, t/6.88 for an axis that only shifts, and
+t/7.28 at the ends of an axis that also tilts. Of nested tolerances the narrower one draws the freedoms that it controls, and the
+wider one the remaining freedoms, so that 99.73 % of the sum lie inside. The share inside is integrated over directions, not
+drawn.
 
 >>> block = tc.Assembly("block")
 >>> part = block.part("part", tc.Box(100, 50, 10), fixed=True)
 >>> foot = part.feature("foot", part.face("-z"), datum="A")
 >>> top = part.feature("top", part.face("+z"), tc.Profile(0.3, "A"))
 >>> height = block.measure("corner", top.point(100, 50, 10), along="z")
->>> [(each.label, round(0.3 / each.spread, 2)) for each in tc.build(block).draws.contributors.every]
+>>> [(freedom.label, round(0.3 / freedom.spread, 2)) for freedom in tc.build(block).draws.contributors]
 [('part.top.offset', 11.76), ('part.top.tilt x', 11.76), ('part.top.tilt y', 11.76)]
 
 `tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them back, as a
-coordinate measuring machine would: datum systems fitted to displaced points, zones of least width. It prints the share inside
-of each zone, with its 95 % interval, beside the share that the rule states. Bonuses and nested tolerances may leave more
-inside.
+coordinate measuring machine would: it fits datum systems to displaced points, and finds the narrowest zones. It prints the
+share inside each zone, with its 95 % interval, beside the share that the rule states. With bonuses and nested tolerances the
+share may be larger.
 
 >>> population = tc.check_population(block, samples=2000)
 >>> _, lower, upper = population.share_inside.sel(zone=0).values
 >>> bool(lower < 0.9973 < upper)
 True
 
-What is not covered: form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a
-group (give all their features one `tc.Variable`), and datum shift, which contact does.
+Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a group (give
+all their features one `tc.Variable`), and datum shift, which contact does.
 
 ## Draws depend on the seed and on the realization alone
 
 The deviation of a contributor in realization k depends on the seed, on its label ("part.locator", "part.feature.freedom") and
-on k; of correlated ones on the labels of all. It does not depend on the number of realizations, on blocks, threads, other
-contributors, or the order of declarations. So a longer run begins with the realizations of a shorter one, and two solvers or
-two methods can be compared draw by draw.
+on k; of correlated contributors also on each other's labels. It does not depend on the number of realizations, on blocks,
+threads, other contributors, or the order of declarations. So a longer run begins with the realizations of a shorter one, and
+two solvers or two methods can be compared draw by draw.
 
 >>> model = tc.Assembly("model")
 >>> part = model.part("part", tc.Box(50, 30, 10))
@@ -92,20 +93,20 @@ True
 
 `tc.run(..., plan=...)`, `tolcontact run --plan`, choose where the numbers come from: "monte-carlo" (default), "latin
 hypercube", or "sobol". The latter two draw 256 realizations together, a replicate, that fill the ranges of all contributors
-evenly: what is nearly a sum of contributors has a mean and a spread with less error for the same number. Replicates are
-independent of each other, so from 16 of them on (4096 realizations) intervals follow from how replicates differ; those of
-Ppk by percentiles, of displacement fields and of contact statistics stay those of independent realizations, which are wider.
-A tail is hardly better known by any plan.
+evenly. A measure that is nearly a sum of contributors then has a mean and a spread with less error for the same number of
+realizations. Replicates are independent of each other, so from 16 replicates on (4096 realizations) intervals follow from the
+differences between them. The intervals of Ppk by percentiles, of displacement fields and of contact statistics stay those of
+independent realizations, which are wider. No plan improves a tail much.
 
 >>> plain, even = (tc.summarize(tc.run(model, samples=4096, plan=plan)) for plan in ("monte-carlo", "sobol"))
->>> means = [of.statistic_value.sel(state="raw", statistic="mean", measure="height") for of in (plain, even)]
->>> width, narrow = (float(each.sel(interval="upper") - each.sel(interval="lower")) for each in means)
+>>> means = [run.statistic_value.sel(state="raw", statistic="mean", measure="height") for run in (plain, even)]
+>>> width, narrow = (float(mean.sel(interval="upper") - mean.sel(interval="lower")) for mean in means)
 >>> narrow < 0.1 * width
 True
 
-Each contributor has a stream of random numbers of its own (Philox, keyed by the seed, the label and blocks of 4096
-realizations). Deviations are its quantiles: the same share u gives the same rank in any distribution. A distribution that
-yields non-finite deviations is rejected."""
+Each contributor has its own stream of random numbers (Philox, keyed by the seed, the label and blocks of 4096 realizations).
+Deviations are quantiles of these numbers: the same number u gives the same rank in any distribution. A distribution that yields
+non-finite deviations is rejected."""
 
 from tolcontact.variation.contributors import Contributor
 from tolcontact.variation.draws import Draws, GivenDraws, draw

@@ -1,11 +1,11 @@
-"""Contributors: everything that varies, and how. Each is a column of the deviations."""
+"""Contributors: everything that varies, and its distribution. Each is a column of the deviations."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, SupportsIndex
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from tolcontact.declaration import GeometricTolerance, Tolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
@@ -13,11 +13,20 @@ from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
 from tolcontact.features import AxisFeature, FeatureOfSize, Layer, NominalFeature, PlaneFeature
 from tolcontact.variation import zones
-from tolcontact.variation.quantiles import quantile
 
-ROOM = 1e-3  # what share of features tolerances within another one may leave outside of it, beyond 0.27 %
-JOINT = ("truncated", "uniform", "polar")  # rules by which components are drawn together
+INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
+JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
 LOCATOR, FEATURE, VARIABLE = "locator", "feature", "variable"  # sources
+TAIL = float(ndtr(-3))
+# Quantiles of the named distributions for a zone of width 1.
+QUANTILES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "normal": lambda u: ndtri(u) / 6,
+    "uniform": lambda u: u - 0.5,
+    "triangular": lambda u: np.where(u < 0.5, np.sqrt(u / 2) - 0.5, 0.5 - np.sqrt((1 - u) / 2)),
+    "truncated normal": lambda u: ndtri(TAIL + u * (1 - 2 * TAIL)) / 6,
+}
+
+Uniforms = Callable[[int], np.ndarray]  # numbers (n, component) between 0 and 1, other ones for each number of an attempt
 
 
 class Contributor(NamedTuple):
@@ -25,9 +34,9 @@ class Contributor(NamedTuple):
 
     source     "locator", "feature" or "variable"
     tolerance  of a locator, a size or a variable
-    layer      of a freedom of a feature: what it is controlled by, with
-    spread     [mm] its standard deviation, where it is normal, and
-    mean       [mm]
+    layer      of a freedom of a feature: the tolerance that controls it
+    spread     [mm] standard deviation of a freedom of a feature
+    mean       [mm] of a freedom of a feature
     """
 
     label: str
@@ -40,22 +49,22 @@ class Contributor(NamedTuple):
 
     @property
     def range(self) -> float:
-        """Full width of its zone; NaN if its distribution alone says how it varies."""
+        """The full width of its zone; NaN if a distribution alone states how it varies."""
         if self.layer is not None:
             return float(self.layer.tolerance.width)
         return np.nan if self.tolerance is None or self.tolerance.range is None else float(self.tolerance.range)
 
     @property
     def mean_shift(self) -> float:
-        """Mean of its own distribution; NaN if that has none."""
+        """The mean of its distribution; NaN if the distribution has none."""
         if self.tolerance is None:
             return self.mean
-        own = self.tolerance.distribution
-        return self.tolerance.mean_shift + (0.0 if isinstance(own, str) else float(own.mean()))
+        distribution = self.tolerance.distribution
+        return self.tolerance.mean_shift + (0.0 if isinstance(distribution, str) else float(distribution.mean()))
 
     @property
-    def said(self) -> str:
-        """Its distribution in words: a name, and the rule from the zone to the spread."""
+    def description(self) -> str:
+        """The name of its distribution; of a freedom of a feature the tolerance, and the rule from its zone to the spread."""
         if self.layer is not None:
             return f"{self.layer.tolerance}; {self.layer.tolerance.rule}"
         if self.tolerance is None:
@@ -63,39 +72,45 @@ class Contributor(NamedTuple):
         name = self.tolerance.distribution
         return name if isinstance(name, str) else str(name.dist.name)
 
-    def drawn(self, u: np.ndarray) -> np.ndarray:
-        """Its deviations for numbers between 0 and 1."""
-        if self.tolerance is not None:
-            return quantile(self.tolerance, u)
-        return np.asarray(self.mean + self.spread * ndtri(u))
+    def deviations(self, u: np.ndarray) -> np.ndarray:
+        """Return its deviations for numbers between 0 and 1."""
+        return quantile(self.tolerance, u) if self.tolerance is not None else self.mean + self.spread * ndtri(u)
+
+
+def quantile(tolerance: Tolerance, u: np.ndarray) -> np.ndarray:
+    """Return the deviation [mm] below which a share `u` (0 < u < 1) of parts lies."""
+    if not isinstance(tolerance.distribution, str):
+        deviations = np.asarray(tolerance.distribution.ppf(u), dtype=float)
+    elif (width := float(tolerance.range or 0.0)) == 0:
+        deviations = np.zeros_like(u)
+    else:
+        deviations = width / (tolerance.cp or 1.0) * QUANTILES[tolerance.distribution](u)
+    return deviations + tolerance.mean_shift if tolerance.mean_shift else deviations
 
 
 @dataclass(frozen=True, eq=False)
-class Together:
-    """Components of a feature that are drawn together.
+class JointDraw:
+    """Components of a feature that are drawn together, by a rule.
 
-    rule      by which
     columns   of the deviations
-    draw      made of uniform numbers: attempt -> (n, component), anew for each attempt
+    draw      returns components (n, component) for uniform numbers
     """
 
     rule: str
     columns: np.ndarray
-    draw: Callable[[Callable[[int], np.ndarray]], np.ndarray]
-
-    def rules(self, labels: Sequence[str]) -> Iterator[tuple[str, str]]:
-        """The labels of its columns, with the rule."""
-        return ((labels[column], self.rule) for column in self.columns)
+    draw: Callable[[Uniforms], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
-class Zone:
-    """What a drawing allows: no row of `rows` @ (components - middle) is longer than half of the width, and its bonus.
+class ComponentZone:
+    """A zone of the components of a feature.
+
+    No row of `rows` @ (components - middle) is longer than half of the width, enlarged by the bonus.
 
     columns     of the deviations: the components
     rows        (point, entry, component)
-    middle      (component,) of a zone that is disposed unevenly
-    size        column of the feature's size, if the zone grows with its departure from `limit`, to the side `growth` (1, -1)
+    middle      (component,): not 0 for a zone that is disposed unevenly
+    size        column of the feature's size, if the zone grows as that departs from `limit` in the direction `growth` (1, -1)
     """
 
     columns: np.ndarray
@@ -109,10 +124,10 @@ class Zone:
 
 @dataclass(frozen=True, eq=False)
 class Bonus:
-    """Components that fill the zone which the size of their feature leaves: those of the nominal zone times its growth.
+    """Components that fill the zone enlarged by the size of their feature: those of the nominal zone times its growth.
 
     columns, size   of the deviations: the components, and the size of their feature
-    factor          (n,) of size deviations (n,)
+    factor          (n,) for size deviations (n,)
     """
 
     columns: np.ndarray
@@ -121,156 +136,169 @@ class Bonus:
 
 
 class Contributors:
-    """All contributors of a model, in the order of the columns of deviations."""
+    """All contributors of a model, in the order of the columns of deviations.
+
+    Raises ModelError if the rule of a tolerance cannot be applied to its feature.
+    """
 
     def __init__(self, nominal: Nominal) -> None:
-        self.together: list[Together] = []
+        self.joint_draws: list[JointDraw] = []
         self.bonuses: list[Bonus] = []
-        self.zones: list[Zone] = []
+        self.zones: list[ComponentZone] = []
         locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
-        self.every = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
-        self._nominal = nominal
+        self._contributors = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
+        self._assembly = nominal.assembly
         for feature in nominal.features:
-            self.every += self._of_feature(feature)
-        self.every += [Contributor(each.name, VARIABLE, each.units, each.tolerance) for each in nominal.assembly.variables]
+            self._contributors += self._feature_contributors(feature)
+        variables = nominal.assembly.variables
+        self._contributors += [Contributor(cause.name, VARIABLE, cause.units, cause.tolerance) for cause in variables]
 
-    def _of_feature(self, own: NominalFeature) -> Iterator[Contributor]:
-        """The freedoms of a feature's layers, from the innermost on, and its size."""
-        labels, column = iter(own.labels), own.first_column
-        basis, known = np.zeros((len(own.geometry.names), 0)), np.zeros(0)
-        for layer in own.layers:
+    def __len__(self) -> int:
+        return len(self._contributors)
+
+    def __getitem__(self, column: SupportsIndex) -> Contributor:
+        return self._contributors[column]
+
+    def __iter__(self) -> Iterator[Contributor]:
+        return iter(self._contributors)
+
+    def _feature_contributors(self, feature: NominalFeature) -> Iterator[Contributor]:
+        """Yield the freedoms of a feature's layers, from the innermost on, then its size."""
+        labels, column = iter(feature.labels), feature.first_column
+        basis, spreads = np.zeros((len(feature.geometry.names), 0)), np.zeros(0)
+        for layer in feature.layers:
             count = layer.added.shape[1]
             if not count:
                 continue
             tolerance, columns = layer.tolerance, np.arange(column, column + count)
             basis = np.hstack([basis, layer.added])
-            seen = layer.controlled @ layer.controlled.T @ basis
-            rows = layer.rows @ seen
-            self._check(own, layer, first=not len(known))
-            width = float(tolerance.width) or self._unit(own, tolerance, first=not len(known))
-            spread = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
-            s = spread(rows, known, count, width)
-            self._check_room(own, layer, rows[..., : len(known)], known, width)
-            known = np.concatenate([known, np.full(count, s / tolerance.cp)])
-            mean = _mean(own, layer, s)
-            self.zones.append(_zone(own, layer, rows, own.first_column + np.arange(rows.shape[-1])))
-            if tolerance.rule in JOINT:
-                self.together.append(Together(tolerance.rule, columns, _joint(tolerance.rule, rows, s, width)))
-            if tolerance.material and tolerance.bonus == "fills" and own.size_column is not None:
-                self.bonuses.append(Bonus(columns, own.size_column, _growth(own, tolerance, width)))
+            rows = layer.rows @ (layer.controlled @ layer.controlled.T @ basis)
+            self._check_rule(feature, layer, is_innermost=not len(spreads))
+            width = float(tolerance.width) or self._unit_width(feature, tolerance, is_innermost=not len(spreads))
+            spread_rule = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
+            spread = spread_rule(rows, spreads, count, width)
+            self._check_inner_share(feature, layer, rows[..., : len(spreads)], spreads, width)
+            spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
+            mean = _mean(feature, layer, spread)
+            self.zones.append(_component_zone(feature, layer, rows, feature.first_column + np.arange(rows.shape[-1])))
+            if tolerance.rule in JOINT_RULES:
+                self.joint_draws.append(JointDraw(tolerance.rule, columns, _joint_draw(tolerance.rule, rows, spread, width)))
+            if tolerance.material and tolerance.bonus == "fills" and feature.size_column is not None:
+                self.bonuses.append(Bonus(columns, feature.size_column, _bonus_factor(feature, tolerance, width)))
             for k in range(count):
-                yield Contributor(next(labels), FEATURE, "mm", layer=layer, spread=s / tolerance.cp, mean=float(mean[k]))
+                yield Contributor(next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]))
             column += count
-        if own.feature.size is not None:
-            yield Contributor(next(labels), FEATURE, "mm", own.feature.size.tolerance)
+        if feature.feature.size is not None:
+            yield Contributor(next(labels), FEATURE, "mm", feature.feature.size.tolerance)
 
-    def _check(self, own: NominalFeature, layer: Layer, *, first: bool) -> None:
-        rule, layers = layer.tolerance.rule, sum(each.added.shape[1] > 0 for each in own.layers)
-        if rule in JOINT and (not first or layers > 1):
-            self._refuse(
-                own, f'{layer.tolerance.kind}: the rule "{rule}" is for features with one tolerance of place or orientation; '
-                f'choose "{INSIDE}" or "{EXTREMES}"'
-            )  # fmt: skip
-        if rule == "polar" and not (isinstance(own.geometry, AxisFeature) and layer.rows.shape[1] == layer.added.shape[1] == 2):
-            self._refuse(own, f'{layer.tolerance.kind}: the rule "polar" is for axes in round zones; choose "{INSIDE}"')
+    def _check_rule(self, feature: NominalFeature, layer: Layer, *, is_innermost: bool) -> None:
+        rule, layers = layer.tolerance.rule, sum(layer.added.shape[1] > 0 for layer in feature.layers)
+        if rule in JOINT_RULES and (not is_innermost or layers > 1):
+            raise self._error(
+                feature,
+                f'{layer.tolerance.kind}: the rule "{rule}" is for features with one tolerance of place or orientation; choose '
+                f'"{INSIDE}" or "{EXTREMES}"',
+            )
+        is_axis = isinstance(feature.geometry, AxisFeature)
+        if rule == "polar" and not (is_axis and layer.rows.shape[1] == layer.added.shape[1] == 2):
+            fault = f'{layer.tolerance.kind}: the rule "polar" is for axes in round zones; choose "{INSIDE}"'
+            raise self._error(feature, fault)
 
-    def _check_room(self, own: NominalFeature, layer: Layer, rows: np.ndarray, known: np.ndarray, width: float) -> None:
-        share = zones.share_inside(rows, known, width)
-        if share < zones.SHARE - ROOM:
-            self._refuse(
-                own, f"{layer.tolerance.kind} {layer.tolerance.width:g}: the narrower tolerances within it leave "
-                f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider"
-            )  # fmt: skip
+    def _check_inner_share(
+        self, feature: NominalFeature, layer: Layer, rows: np.ndarray, spreads: np.ndarray, width: float
+    ) -> None:
+        """Raise ModelError if narrower tolerances, with spreads (component,), leave too many features outside of the zone."""
+        share = zones.share_inside(rows, spreads, width)
+        if share < zones.SHARE - INNER_SHARE_TOLERANCE:
+            raise self._error(
+                feature,
+                f"{layer.tolerance.kind} {layer.tolerance.width:g}: the narrower tolerances within it leave "
+                f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider",
+            )
 
-    def _unit(self, own: NominalFeature, tolerance: GeometricTolerance, *, first: bool) -> float:
-        """The width for which a zone is scaled that has none but its bonus: 1 mm."""
-        if tolerance.bonus != "fills" or not first:
-            self._refuse(
-                own,
+    def _unit_width(self, feature: NominalFeature, tolerance: GeometricTolerance, *, is_innermost: bool) -> float:
+        """Return the width [mm] for which spreads are computed if a zone has width 0: its bonus scales them."""
+        if tolerance.bonus != "fills" or not is_innermost:
+            raise self._error(
+                feature,
                 f'{tolerance.kind}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
             )
         return 1.0
 
-    def _refuse(self, own: NominalFeature, fault: str) -> None:
-        feature = own.feature
-        where = f'part "{feature.part.name}": feature "{feature.name}" ({feature.declared_at})'
-        raise ModelError(self._nominal.assembly.name, [f"{where}: {fault}"])
+    def _error(self, feature: NominalFeature, fault: str) -> ModelError:
+        declared = feature.feature
+        place = f'part "{declared.part.name}": feature "{declared.name}" ({declared.declared_at})'
+        return ModelError(self._assembly.name, [f"{place}: {fault}"])
 
 
-def _mean(own: NominalFeature, layer: Layer, s: float) -> np.ndarray:
-    """Means (component,) of the added components: of an uneven profile, and what `cpk` says, along the first."""
+def _mean(feature: NominalFeature, layer: Layer, spread: float) -> np.ndarray:
+    """Return the means (component,) of the added components: of an uneven profile, and what `cpk` requires of the first."""
     tolerance, mean = layer.tolerance, np.zeros(layer.added.shape[1])
-    if isinstance(own.geometry, PlaneFeature):
-        mean += _uneven(layer) * layer.added[0]
+    if isinstance(feature.geometry, PlaneFeature):
+        mean += _uneven_shift(tolerance) * layer.added[0]
     if tolerance.cpk is not None and mean.size:
-        mean[0] += 3 * s * (1 - tolerance.cpk / tolerance.cp)
+        mean[0] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
     return mean
 
 
-def _uneven(layer: Layer) -> float:
-    """How far a zone lies outside of the nominal feature [mm], of an uneven profile."""
-    tolerance = layer.tolerance
+def _uneven_shift(tolerance: GeometricTolerance) -> float:
+    """Return how far [mm] the middle of a zone lies outside of the nominal feature."""
     return 0.0 if tolerance.outside is None else tolerance.outside - tolerance.width / 2
 
 
-def _zone(own: NominalFeature, layer: Layer, rows: np.ndarray, columns: np.ndarray) -> Zone:
-    """What a layer allows of the components that it and the narrower ones have."""
-    tolerance, middle = layer.tolerance, np.zeros(len(columns))
-    if isinstance(own.geometry, PlaneFeature):
-        middle[-layer.added.shape[1] :] = _uneven(layer) * layer.added[0]
-    if own.feature.size is None or not tolerance.material or tolerance.bonus == "none":
-        return Zone(columns, rows, middle, tolerance.width)
-    is_lower = _counts_from_lower(own, tolerance)
-    limit = own.feature.size.lower if is_lower else own.feature.size.upper
-    return Zone(columns, rows, middle, tolerance.width, own.size_column, limit, 1.0 if is_lower else -1.0)
+def _component_zone(feature: NominalFeature, layer: Layer, rows: np.ndarray, columns: np.ndarray) -> ComponentZone:
+    """Return the zone that a layer's tolerance is for the components of this layer and the narrower ones."""
+    tolerance, size, middle = layer.tolerance, feature.feature.size, np.zeros(len(columns))
+    if isinstance(feature.geometry, PlaneFeature):
+        middle[-layer.added.shape[1] :] = _uneven_shift(tolerance) * layer.added[0]
+    if size is None or not tolerance.material or tolerance.bonus == "none":
+        return ComponentZone(columns, rows, middle, tolerance.width)
+    limit, growth = (size.lower, 1.0) if _counts_from_lower(feature, tolerance) else (size.upper, -1.0)
+    return ComponentZone(columns, rows, middle, tolerance.width, feature.size_column, limit, growth)
 
 
-def _growth(own: NominalFeature, tolerance: GeometricTolerance, width: float) -> Callable[[np.ndarray], np.ndarray]:
-    """The zone that a size leaves, beside the `width` that its spread was computed for."""
-
-    def factor(size: np.ndarray) -> np.ndarray:
-        return np.asarray((tolerance.width + bonus(own, tolerance, size)) / width)
-
-    return factor
+def _bonus_factor(feature: NominalFeature, tolerance: GeometricTolerance, width: float) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the growth of a zone as a function of size deviations, relative to the `width` that its spread is computed for."""
+    return lambda size: (tolerance.width + bonus(feature, tolerance, size)) / width
 
 
-def bonus(own: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:
-    """How much a zone grows (n,) [mm] for deviations of the feature's size (n,): its departure from the limit that counts."""
-    limits = own.feature.size
+def bonus(feature: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:
+    """Return the growth (n,) [mm] of a zone for size deviations (n,): their departure from the material limit."""
+    limits = feature.feature.size
     if limits is None or not tolerance.material:
         return np.zeros_like(size)
-    return np.maximum(size - limits.lower if _counts_from_lower(own, tolerance) else limits.upper - size, 0.0)
+    return np.maximum(size - limits.lower if _counts_from_lower(feature, tolerance) else limits.upper - size, 0.0)
 
 
-def _counts_from_lower(own: NominalFeature, tolerance: GeometricTolerance) -> bool:
-    """Whether a zone grows with what the size is above its lower limit, or below its upper one."""
-    is_inner = isinstance(own.geometry, FeatureOfSize) and own.geometry.is_inner
+def _counts_from_lower(feature: NominalFeature, tolerance: GeometricTolerance) -> bool:
+    """Return whether a zone grows as the size exceeds its lower limit; else it grows as the size falls below the upper one."""
+    is_inner = isinstance(feature.geometry, FeatureOfSize) and feature.geometry.is_inner
     return is_inner == (tolerance.material == "M")
 
 
-def _joint(rule: str, rows: np.ndarray, s: float, width: float) -> Callable[[Callable[[int], np.ndarray]], np.ndarray]:
-    """How components (n, component) are drawn together."""
+def _joint_draw(rule: str, rows: np.ndarray, spread: float, width: float) -> Callable[[Uniforms], np.ndarray]:
+    """Return the function that draws components (n, component) together by a rule."""
     if rule == "polar":
-        return lambda uniforms: _polar(uniforms(0), s)
-    far = zones.reach(rows, width)
+        return lambda uniforms: _polar(uniforms(0), spread)
+    bounds = zones.component_bounds(rows, width)
 
     def attempt(u: np.ndarray) -> np.ndarray:
-        return np.asarray(s * ndtri(u) if rule == "truncated" else far * (2 * u - 1))
+        return spread * ndtri(u) if rule == "truncated" else bounds * (2 * u - 1)
 
-    def draw(uniforms: Callable[[int], np.ndarray]) -> np.ndarray:
-        found = attempt(uniforms(0))
-        left = np.flatnonzero(~zones.is_inside(rows, found, width))
+    def draw(uniforms: Uniforms) -> np.ndarray:
+        components = attempt(uniforms(0))
+        outside = np.flatnonzero(~zones.is_inside(rows, components, width))
         number = 0
-        while left.size:
+        while outside.size:
             number += 1
-            found[left] = attempt(uniforms(number)[left])
-            left = left[~zones.is_inside(rows, found[left], width)]
-        return found
+            components[outside] = attempt(uniforms(number)[outside])
+            outside = outside[~zones.is_inside(rows, components[outside], width)]
+        return components
 
     return draw
 
 
-def _polar(u: np.ndarray, s: float) -> np.ndarray:
-    """Two components with a uniform angle and a normal radius."""
-    angle, radius = np.pi * u[:, 1], s * ndtri(u[:, 0])
+def _polar(u: np.ndarray, spread: float) -> np.ndarray:
+    """Return two components with a uniform angle and a normal radius."""
+    angle, radius = np.pi * u[:, 1], spread * ndtri(u[:, 0])
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])

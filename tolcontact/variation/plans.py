@@ -1,4 +1,4 @@
-"""Sampling plans: where the numbers between 0 and 1 come from that deviations are quantiles of.
+"""Sampling plans: the numbers between 0 and 1 of which deviations are quantiles.
 
     monte-carlo       independent of each other
     latin hypercube   256 realizations together fill 256 classes of every contributor, once each (McKay, Beckman, Conover, 1979)
@@ -11,37 +11,55 @@ realization k depend on the seed, the labels and k alone.
 """
 
 import functools
+import hashlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.stats import qmc
 
-from tolcontact.variation.uniforms import BITS, generator, uniform
 from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, REPLICATE, SOBOL
+
+STREAM = 4096  # numbers of a label that are drawn as one stream
+BITS = 52
 
 Numbers = Callable[[str], np.ndarray]  # numbers (realization,) strictly between 0 and 1 of a label
 
 
+def uniform(seed: int, label: str, start: int, stop: int) -> np.ndarray:
+    """Return numbers strictly between 0 and 1 of a label for realizations `start` to `stop`."""
+    streams = range(start // STREAM, -(-stop // STREAM))
+    integers = np.concatenate([generator(seed, label, stream).integers(0, 1 << BITS, STREAM) for stream in streams])
+    offset = start - streams.start * STREAM
+    return (integers[offset : offset + stop - start] + 0.5) * 2.0**-BITS
+
+
+def generator(seed: int, label: str, stream: int) -> np.random.Generator:
+    """Return the random generator of a seed, a label, and the number of a stream (-1 or above)."""
+    key = int.from_bytes(hashlib.blake2b(label.encode(), digest_size=8).digest(), "little")
+    spawn_key = (key, stream) if stream >= 0 else (key,)
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(seed, spawn_key=spawn_key)))
+
+
 class Plan:
-    """The numbers of some labels, by the name of a plan. Labels beside these have independent numbers in every plan."""
+    """The numbers of some labels by the name of a plan. All other labels have independent numbers."""
 
     def __init__(self, name: str, labels: Sequence[str]) -> None:
         self.name = name
-        self._column = {label: k for k, label in enumerate(sorted(labels))}  # not the order of declarations
+        self._column = {label: k for k, label in enumerate(sorted(labels))}  # the order of declarations does not matter
 
     def numbers(self, seed: int, start: int, stop: int) -> Numbers:
-        """Those of realizations `start` to `stop`."""
+        """Return the numbers of realizations `start` to `stop`."""
         if self.name == MONTE_CARLO or not self._column:
             return lambda label: uniform(seed, label, start, stop)
         replicates = range(start // REPLICATE, -(-stop // REPLICATE))
-        rows = np.concatenate([_POINTS[self.name](seed, replicate, len(self._column)) for replicate in replicates])
-        own = rows[start - replicates.start * REPLICATE :][: stop - start]
-        return lambda label: own[:, self._column[label]] if label in self._column else uniform(seed, label, start, stop)
+        points = np.concatenate([_POINTS[self.name](seed, replicate, len(self._column)) for replicate in replicates])
+        rows = points[start - replicates.start * REPLICATE :][: stop - start]
+        return lambda label: rows[:, self._column[label]] if label in self._column else uniform(seed, label, start, stop)
 
 
 def _latin(seed: int, replicate: int, count: int) -> np.ndarray:
     rng = generator(seed, LATIN_HYPERCUBE, replicate)
-    return np.asarray(qmc.LatinHypercube(count, rng=rng).random(REPLICATE)).clip(2.0**-BITS, 1 - 2.0**-BITS)
+    return qmc.LatinHypercube(count, rng=rng).random(REPLICATE).clip(2.0**-BITS, 1 - 2.0**-BITS)
 
 
 def _sobol(seed: int, replicate: int, count: int) -> np.ndarray:
@@ -51,9 +69,9 @@ def _sobol(seed: int, replicate: int, count: int) -> np.ndarray:
 
 @functools.lru_cache(maxsize=8)
 def _net(seed: int, count: int) -> np.ndarray:
-    """Points (REPLICATE, count) as whole numbers of BITS bits."""
+    """Return the points (REPLICATE, count) of a Sobol' sequence as whole numbers of BITS bits."""
     points = qmc.Sobol(count, scramble=True, bits=BITS, rng=generator(seed, SOBOL, -1)).random(REPLICATE)
-    return np.asarray((points * 2.0**BITS).astype(np.int64))
+    return (points * 2.0**BITS).astype(np.int64)
 
 
 _POINTS = {LATIN_HYPERCUBE: _latin, SOBOL: _sobol}

@@ -216,7 +216,7 @@ def _simulate(
     chosen_rows = writer.chosen(seed)
     if chosen_rows.size:
         kept = writer.poses(chosen_rows)
-        deviations = program.draws.of(chosen_rows, seed=seed)
+        deviations = program.draws.rows(chosen_rows, seed=seed)
         poses = simulated_poses(program, deviations) if kept is None else kept
         writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
 
