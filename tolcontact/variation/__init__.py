@@ -42,7 +42,7 @@ depend on the origin. `rule` says how they fill the zone of a tolerance:
 
 Only the default means the same for sizes, planes and axes. For a width t the spread of a component is t/6 for a size or an
 offset alone, t/9.07 for a plane's two tilts, t/11.8 for a rectangle's place and tilts, t/6.88 for an axis that only shifts, and
-t/7.28 at the ends of an axis that also tilts. Of nested tolerances the narrower one draws the freedoms that it controls, and the
+t/7.28 at the ends of an axis that also tilts. Of nested tolerances the narrower one draws the freedoms that it controls, the
 wider one the remaining freedoms, so that 99.73 % of the sum lie inside. The share inside is integrated over directions, not
 drawn.
 
@@ -64,8 +64,8 @@ share may be larger.
 >>> bool(lower < 0.9973 < upper)
 True
 
-Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a group (give
-all their features one `tc.Variable`), and datum shift, which contact does.
+Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a group
+(give all their features one `tc.Variable`), and datum shift, which contact does.
 
 ## Draws depend on the seed and on the realization alone
 
