@@ -12,18 +12,26 @@ from scipy.sparse import csr_array
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import CREASE, on_rim, rim
 
-OVER = 1e-6  # of a face's size: what stands no farther beside its rim is over it
-TURN = 0.3  # rad: what the normals of a triangle and of the surface that it stands for differ by at most, and
-BULGE = 0.05  # of a face's size: how far it may be off that
-FLAT = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
+RIM_TOLERANCE = 1e-6  # of a face's size: a point over a face stands no farther beside its rim
+MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface for which it stands
+MAX_BULGE = 0.05  # of a face's size: between a triangle and the analytic surface for which it stands
+FLAT_ANGLE = 1e-6  # rad: faces whose normals turn by less, from end to end, are planes
+
+
+class Standing(NamedTuple):
+    """The rows, triangles or points, that stand for an analytic surface; `side` is 1, or -1 if the triangles are hollow."""
+
+    surface: AnalyticSurface
+    rows: np.ndarray
+    side: float
 
 
 class Surface:
-    """A triangle surface, ready to be asked for its nearest points as often as need be.
+    """The triangles of a face, with a search tree for nearest points.
 
-    corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated.
-                     Without them they follow from the facets around.
-    surfaces         analytic surfaces; where a triangle stands for one of them, feet and normals are those of the surface
+    corner_normals   (face, 3, 3): outward unit normals at the corners of each triangle, between which they are interpolated;
+                     by default they follow from the neighbouring facets
+    surfaces         analytic surfaces; where a triangle stands for one of them, feet and normals are those of that surface
     surface_numbers  (face,): the number of the surface for which each triangle stands, -1 for none
     """
 
@@ -37,61 +45,61 @@ class Surface:
         self.mesh = mesh
         self.surfaces = tuple(surfaces)
         self.surface_numbers = np.full(len(mesh.faces), -1) if surface_numbers is None else surface_numbers
-        self._given = corner_normals
+        self._stated_normals = corner_normals
         self._vertices = np.ascontiguousarray(mesh.vertices, dtype=np.float64)
         self._faces = np.ascontiguousarray(mesh.faces, dtype=np.int64)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is sent to other processes: a search tree is grown again there."""
+        """Return the state for other processes, which build their own search tree."""
         return {name: value for name, value in self.__dict__.items() if name != "_tree"}
 
     @cached_property
     def corner_normals(self) -> np.ndarray:
         """Outward unit normals at the corners of each triangle (face, 3, 3)."""
-        normals = np.array(_corner_normals(self.mesh) if self._given is None else self._given)
-        for surface, own, outside in self._known:
-            corners = np.asarray(self.mesh.triangles)[own].reshape(-1, 3)
-            normals[own] = _normals_of(surface, outside, corners, normals[own].reshape(-1, 3)).reshape(-1, 3, 3)
+        normals = np.array(_corner_normals(self.mesh) if self._stated_normals is None else self._stated_normals)
+        for surface, rows, side in self._standings:
+            corners = np.asarray(self.mesh.triangles)[rows].reshape(-1, 3)
+            normals[rows] = _normals_of(surface, side, corners, normals[rows].reshape(-1, 3)).reshape(-1, 3, 3)
         return normals
 
     @cached_property
-    def _known(self) -> list[tuple[AnalyticSurface, np.ndarray, float]]:
-        """The surfaces, the triangles that stand for each, and 1, or -1 if the triangles are hollow."""
+    def _standings(self) -> list[Standing]:
+        """The triangles that stand for each analytic surface."""
         centres, facets = np.asarray(self.mesh.triangles_center), np.asarray(self.mesh.face_normals)
-        found = []
+        standings = []
         for number, surface in enumerate(self.surfaces):
-            own = np.flatnonzero(self.surface_numbers == number)
-            if own.size:
-                _, slope = surface.distance(centres[own])
-                found.append((surface, own, 1.0 if (slope * facets[own]).sum() > 0 else -1.0))
-        return found
+            rows = np.flatnonzero(self.surface_numbers == number)
+            if rows.size:
+                _, slope = surface.distance(centres[rows])
+                standings.append(Standing(surface, rows, 1.0 if (slope * facets[rows]).sum() > 0 else -1.0))
+        return standings
 
     @property
     def pieces(self) -> "list[Piece]":
-        """What lies on each of its surfaces."""
-        return [Piece(surface, outside < 0, self.part(own)) for surface, own, outside in self._known]
+        """The parts of the face that lie on its analytic surfaces."""
+        return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._standings]
 
     @property
     def unknown(self) -> "Surface":
-        """The triangles that stand for no surface."""
+        """The triangles that stand for no analytic surface."""
         return self.part(np.flatnonzero(self.surface_numbers < 0))
 
     def part(self, faces: np.ndarray) -> "Surface":
-        """Some of its triangles."""
+        """Return the surface of some of the triangles (face,)."""
         used, renumbered = np.unique(self._faces[faces], return_inverse=True)
         mesh = trimesh.Trimesh(self._vertices[used], renumbered.reshape(-1, 3), process=False)
         return Surface(mesh, self.corner_normals[faces], self.surfaces, self.surface_numbers[faces])
 
     @cached_property
     def curvature(self) -> float:
-        """How fast its normals turn, usually [1/mm]: of half its area by more, of half by less. 0 of a flat face."""
+        """The median by area of how fast the normals turn [1/mm]; 0 for a flat face."""
         corners, normals = np.asarray(self.mesh.triangles), self.corner_normals
-        along, turn = (np.linalg.norm(np.roll(each, -1, axis=1) - each, axis=2) for each in (corners, normals))
-        fastest = (turn / np.maximum(along, 1e-300)).max(axis=1)
-        order = np.argsort(fastest)
+        length, turn = (np.linalg.norm(np.roll(values, -1, axis=1) - values, axis=2) for values in (corners, normals))
+        rate = (turn / np.maximum(length, 1e-300)).max(axis=1)
+        order = np.argsort(rate)
         middle = np.searchsorted(np.cumsum(self.mesh.area_faces[order]), self.mesh.area / 2)
-        usual = float(fastest[order[min(middle, len(order) - 1)]])
-        return usual if usual * self.mesh.scale > FLAT else 0.0
+        median = float(rate[order[min(middle, len(order) - 1)]])
+        return median if median * self.mesh.scale > FLAT_ANGLE else 0.0
 
     @cached_property
     def _tree(self) -> igl.AABB:
@@ -101,47 +109,47 @@ class Surface:
 
     @cached_property
     def _rim_edges(self) -> np.ndarray:
-        """Which edges (face, edge) are on the rim."""
+        """Mask (face, edge) of the edges on the rim."""
         return on_rim(self._faces)
 
     @cached_property
     def _rim_corners(self) -> np.ndarray:
-        """Which corners (face, corner) are on the rim."""
+        """Mask (face, corner) of the corners on the rim."""
         return np.isin(self._faces, rim(self._faces))
 
     def nearest(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The triangle (point,) and the place on it (point, 3) [mm] that is nearest to each of `points` (point, 3) [mm]."""
+        """Return the triangle (point,) and the place on it (point, 3) [mm] nearest to each of `points` (point, 3) [mm]."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         _, triangle, nearest = self._tree.squared_distance(self._vertices, self._faces, points)
         return triangle, nearest
 
     def normals(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Outward unit normals (point, 3) at `points` (point, 3) [mm] on the given triangles (point,)."""
+        """Return outward unit normals (point, 3) at `points` (point, 3) [mm] on the triangles `triangle` (point,)."""
         barycentric = self._barycentric(triangle, points)
         normals = (barycentric[..., None] * self.corner_normals[triangle]).sum(axis=1)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        for surface, some, outside in self._stand_for(triangle):
-            normals[some] = _normals_of(surface, outside, points[some], normals[some])
-        return np.asarray(normals)
+        for surface, rows, side in self._standing_points(triangle):
+            normals[rows] = _normals_of(surface, side, points[rows], normals[rows])
+        return normals
 
-    def _stand_for(self, triangle: np.ndarray) -> list[tuple[AnalyticSurface, np.ndarray, float]]:
-        """Analytic surfaces, which of some triangles (point,) stand for each, and 1 or -1, as in `_known`."""
+    def _standing_points(self, triangle: np.ndarray) -> list[Standing]:
+        """Return the points on `triangle` (point,) that stand for each analytic surface."""
         if not self.surfaces:
             return []
         numbers = self.surface_numbers[triangle]
         return [
-            (surface, np.flatnonzero(numbers == self.surface_numbers[own[0]]), outside) for surface, own, outside in self._known
+            standing._replace(rows=np.flatnonzero(numbers == self.surface_numbers[standing.rows[0]]))
+            for standing in self._standings
         ]
 
     def placed(self, R: np.ndarray, t: np.ndarray) -> "Surface":
-        """The surface turned by R (3, 3), then moved by t (3,) [mm]."""
-        moved = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
-        return Surface(
-            moved, self.corner_normals @ R.T, [surface.placed(R, t) for surface in self.surfaces], self.surface_numbers
-        )
+        """Return the surface turned by R (3, 3), then moved by t (3,) [mm]."""
+        mesh = trimesh.Trimesh(np.asarray(self.mesh.vertices) @ R.T + t, self.mesh.faces, process=False)
+        surfaces = [surface.placed(R, t) for surface in self.surfaces]
+        return Surface(mesh, self.corner_normals @ R.T, surfaces, self.surface_numbers)
 
     def _barycentric(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
-        return np.asarray(trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points))
+        return trimesh.triangles.points_to_barycentric(self.mesh.triangles[triangle], points)
 
     def project(self, points: np.ndarray, *, margin: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Project `points` (point, 3) [mm] onto the surface.
@@ -153,43 +161,43 @@ class Surface:
         """
         triangle, nearest = self.nearest(points)
         sideways, at_rim = self._sideways(points, triangle, nearest)
-        over = ~at_rim | (sideways <= max(margin, OVER * self.mesh.scale))
+        is_over = ~at_rim | (sideways <= max(margin, RIM_TOLERANCE * self.mesh.scale))
         feet = np.array(nearest)
-        for surface, some, _ in self._stand_for(triangle):
-            below, own = surface.project(nearest[some]), surface.project(points[some])
-            apart = np.linalg.norm(own - nearest[some], axis=1)
-            height = np.linalg.norm(points[some] - nearest[some], axis=1)
-            # Near its axis, and beyond, a surface has feet elsewhere.
-            is_here = ~at_rim[some] & (apart <= TURN * height + BULGE * self.mesh.scale)
-            feet[some] = np.where(is_here[:, None], own, below)
-        return feet, self.normals(triangle, feet), over
+        for surface, rows, _ in self._standing_points(triangle):
+            nearby, direct = surface.project(nearest[rows]), surface.project(points[rows])
+            shift = np.linalg.norm(direct - nearest[rows], axis=1)
+            height = np.linalg.norm(points[rows] - nearest[rows], axis=1)
+            # For points near its axis, and beyond, a surface has feet elsewhere.
+            is_direct = ~at_rim[rows] & (shift <= MAX_TURN * height + MAX_BULGE * self.mesh.scale)
+            feet[rows] = np.where(is_direct[:, None], direct, nearby)
+        return feet, self.normals(triangle, feet), is_over
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How far `points` (point, 3) [mm] lie behind the surface (point,) [mm]; 0 in front of it, and beside it."""
+        """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the surface; 0 in front of it and beside it."""
         triangle, nearest = self.nearest(points)
         offset = nearest - points
         height = -(offset * np.asarray(self.mesh.face_normals)[triangle]).sum(axis=1)
-        depth = np.linalg.norm(offset, axis=1)
-        for surface, some, outside in self._stand_for(triangle):
-            height[some] = outside * surface.distance(points[some])[0]
-            depth[some] = np.abs(height[some])
+        distance = np.linalg.norm(offset, axis=1)
+        for surface, rows, side in self._standing_points(triangle):
+            height[rows] = side * surface.distance(points[rows])[0]
+            distance[rows] = np.abs(height[rows])
         behind = np.flatnonzero(height < 0)
         sideways, at_rim = self._sideways(points[behind], triangle[behind], nearest[behind])
-        over = ~at_rim | (sideways <= OVER * self.mesh.scale)
-        found = np.zeros(len(points))
-        found[behind[over]] = depth[behind[over]]
-        return found
+        is_over = ~at_rim | (sideways <= RIM_TOLERANCE * self.mesh.scale)
+        depth = np.zeros(len(points))
+        depth[behind[is_over]] = distance[behind[is_over]]
+        return depth
 
     def overhang(self, points: np.ndarray) -> np.ndarray:
-        """How far `points` (point, 3) [mm] stand beside the surface (point,) [mm]: 0 over it."""
+        """Return the distance (point,) [mm] by which `points` (point, 3) [mm] stand beside the rim; 0 over the surface."""
         sideways, at_rim = self._sideways(points, *self.nearest(points))
         return np.where(at_rim, sideways, 0.0)
 
     def _sideways(self, points: np.ndarray, triangle: np.ndarray, nearest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far points stand beside their nearest ones, across normals there (point,) [mm]; whether those are on the rim."""
+        """Return distances (point,) [mm] from the nearest places across normals, and a mask of the places on the rim."""
         normal = np.array(np.asarray(self.mesh.face_normals)[triangle])
-        for surface, some, _ in self._stand_for(triangle):
-            normal[some] = surface.distance(nearest[some])[1]
+        for surface, rows, _ in self._standing_points(triangle):
+            normal[rows] = surface.distance(nearest[rows])[1]
         offset = points - nearest
         sideways = np.linalg.norm(offset - (offset * normal).sum(axis=1, keepdims=True) * normal, axis=1)
         coordinates = self._barycentric(triangle, nearest)
@@ -201,33 +209,34 @@ class Surface:
 
 
 class Piece(NamedTuple):
-    """What of a face lies on one surface; hollow if the material is around it."""
+    """The part of a face that lies on an analytic surface; it is hollow if the material is around it."""
 
     surface: AnalyticSurface
     is_hollow: bool
     face: Surface
 
 
-def _normals_of(surface: AnalyticSurface, outside: float, points: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
-    """Outward normals (point, 3) of a surface; those given (point, 3) where it has none: in the apex of a cone, on an axis."""
+def _normals_of(surface: AnalyticSurface, side: float, points: np.ndarray, fallback: np.ndarray) -> np.ndarray:
+    """Return outward normals (point, 3) of an analytic surface, or `fallback` (point, 3) at its apex and on its axis."""
     _, slope = surface.distance(points)
-    has_one = np.linalg.norm(slope, axis=1) > 0.5
-    return np.where(has_one[:, None], outside * slope, otherwise)
+    is_unit = np.linalg.norm(slope, axis=1) > 0.5
+    return np.where(is_unit[:, None], side * slope, fallback)
 
 
 def _corner_normals(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Normals at the corners of each triangle (face, 3, 3): those of the facets around, but for what lies across a crease.
+    """Return normals at the corners of each triangle (face, 3, 3): the mean of the facets around, on this side of creases.
 
-    Weighted by the facets' angles there, so that they do not depend on the triangulation. A flat face keeps its own, exactly.
+    Facets are weighted by their angles there, so that normals do not depend on the triangulation. A flat face keeps its
+    normal to the last bit.
     """
     facet, corner = np.asarray(mesh.face_normals), np.asarray(mesh.faces).ravel()
     of_vertex = csr_array((np.ones(len(corner)), (np.arange(len(corner)), corner)), shape=(len(corner), len(mesh.vertices)))
-    here, there = (of_vertex @ of_vertex.T).nonzero()
-    cosine = (facet[here // 3] * facet[there // 3]).sum(axis=1)
-    here, there, flat = here[cosine > CREASE], there[cosine > CREASE], cosine[cosine > CREASE] > 1 - 1e-14
-    weight = np.asarray(mesh.face_angles).ravel()[there]
-    turn = np.where(flat[:, None], 0, facet[there // 3] - facet[here // 3]) * weight[:, None]
-    total = np.bincount(here, weight, len(corner))
+    row, column = (of_vertex @ of_vertex.T).nonzero()  # corners in one vertex
+    cosine = (facet[row // 3] * facet[column // 3]).sum(axis=1)
+    row, column, is_flat = row[cosine > CREASE], column[cosine > CREASE], cosine[cosine > CREASE] > 1 - 1e-14
+    weight = np.asarray(mesh.face_angles).ravel()[column]
+    turn = np.where(is_flat[:, None], 0, facet[column // 3] - facet[row // 3]) * weight[:, None]
+    total = np.bincount(row, weight, len(corner))
     mean = facet.repeat(3, axis=0)
-    mean += np.stack([np.bincount(here, turn[:, k], len(corner)) for k in range(3)], axis=1) / total[:, None]
-    return np.asarray(mean / np.linalg.norm(mean, axis=1, keepdims=True)).reshape(-1, 3, 3)
+    mean += np.stack([np.bincount(row, turn[:, k], len(corner)) for k in range(3)], axis=1) / total[:, None]
+    return (mean / np.linalg.norm(mean, axis=1, keepdims=True)).reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""Which triangles of a face stand for surfaces that are known exactly: a file states them, or they are fitted to vertices."""
+"""The analytic surfaces for which triangles stand: a file states them, or they are fitted to vertices."""
 
 from collections.abc import Sequence
 
@@ -11,67 +11,72 @@ from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.fitting import fit_surface
 
-ALIKE = 10  # times as far as they were fitted may faces be off each other's surface that are taken for one
-SAME = 1e-9  # of a part's size: faces that are no farther off each other's surface are parts of one
+RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
+POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 
 
-def analytic_surfaces(mesh: trimesh.Trimesh, chosen: np.ndarray) -> tuple[list[AnalyticSurface], np.ndarray]:
-    """Surfaces, and for each of the `chosen` triangles (face,) of a mesh the number of the one that it stands for; -1 if none.
+def analytic_surfaces(mesh: trimesh.Trimesh, triangles: np.ndarray) -> tuple[list[AnalyticSurface], np.ndarray]:
+    """Return the analytic surfaces of some triangles (face,) of a mesh, and the number of the surface of each, -1 for none.
 
-    Of a STEP file they are those of its B-rep faces; what it does not state, and smooth pieces of other meshes, are fitted.
-    Planes are not fitted: flat triangles are exact.
+    A STEP file states the surfaces of its B-rep faces. Where it does not, and for smooth pieces of other meshes, they are
+    fitted. Planes are not: flat triangles are exact.
     """
     surfaces: list[AnalyticSurface] = []
-    surface_numbers = np.full(len(chosen), -1)
+    numbers = np.full(len(triangles), -1)
     brep = mesh.face_attributes.get(BREP)
-    group = smooth_pieces(mesh, chosen) if brep is None else np.asarray(brep).ravel()[chosen]
-    for number in np.unique(group):
-        own = np.flatnonzero(group == number)
-        surface = (None if brep is None else mesh.metadata[SURFACES][number]) or _fitted(mesh, chosen[own])
+    group = smooth_pieces(mesh, triangles) if brep is None else np.asarray(brep).ravel()[triangles]
+    for label in np.unique(group):
+        rows = np.flatnonzero(group == label)
+        surface = (None if brep is None else mesh.metadata[SURFACES][label]) or _round_fit(mesh, triangles[rows])
         if surface is None:
             continue
-        for k, known in enumerate(surfaces):  # round faces come in halves
-            one = _one(mesh, known, surface, chosen[surface_numbers == k], chosen[own])
-            if one is not None:
-                surfaces[k], surface_numbers[own] = one, k
+        for number, earlier in enumerate(surfaces):  # round faces come in halves
+            union = _union(mesh, earlier, surface, triangles[numbers == number], triangles[rows])
+            if union is not None:
+                surfaces[number], numbers[rows] = union, number
                 break
         else:
-            surface_numbers[own] = len(surfaces)
+            numbers[rows] = len(surfaces)
             surfaces.append(surface)
-    return surfaces, surface_numbers
+    return surfaces, numbers
 
 
-def _one(
-    mesh: trimesh.Trimesh, known: AnalyticSurface, surface: AnalyticSurface, faces: np.ndarray, own: np.ndarray
+def _union(
+    mesh: trimesh.Trimesh,
+    earlier: AnalyticSurface,
+    surface: AnalyticSurface,
+    earlier_faces: np.ndarray,
+    faces: np.ndarray,
 ) -> AnalyticSurface | None:
-    """The surface that two faces are parts of, the triangles (face,) of each; None if they are not parts of one."""
+    """Return the common surface of two groups of triangles (face,), None if they are not parts of one surface."""
     if (
-        known.kind != surface.kind
-        or known.is_fitted != surface.is_fitted
-        or _looks_out(mesh, known, faces) != _looks_out(mesh, known, own)
+        earlier.kind != surface.kind
+        or earlier.is_fitted != surface.is_fitted
+        or _is_outside(mesh, earlier, earlier_faces) != _is_outside(mesh, earlier, faces)
     ):
         return None
-    off = np.abs(known.distance(np.asarray(mesh.vertices)[np.unique(mesh.faces[own])])[0]).max()
-    if off > ALIKE * (known.residual + surface.residual) + SAME * mesh.scale:
+    vertices = np.asarray(mesh.vertices)[np.unique(mesh.faces[faces])]
+    distance = np.abs(earlier.distance(vertices)[0]).max()
+    if distance > RESIDUAL_FACTOR * (earlier.residual + surface.residual) + POSITION_TOLERANCE * mesh.scale:
         return None
-    return _fitted(mesh, np.concatenate([faces, own])) if known.is_fitted else known
+    return _round_fit(mesh, np.concatenate([earlier_faces, faces])) if earlier.is_fitted else earlier
 
 
-def _looks_out(mesh: trimesh.Trimesh, surface: AnalyticSurface, own: np.ndarray) -> bool:
-    """Whether the outside of some triangles (face,) is that of the surface."""
-    _, slope = surface.distance(np.asarray(mesh.triangles_center)[own])
-    return bool((slope * np.asarray(mesh.face_normals)[own]).sum() > 0)
+def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, faces: np.ndarray) -> bool:
+    """Return whether the outside of some triangles (face,) is the outside of the surface."""
+    _, slope = surface.distance(np.asarray(mesh.triangles_center)[faces])
+    return bool((slope * np.asarray(mesh.face_normals)[faces]).sum() > 0)
 
 
-def _fitted(mesh: trimesh.Trimesh, own: np.ndarray) -> AnalyticSurface | None:
-    surface = fit_surface(np.asarray(mesh.triangles)[own], FIT)
-    return None if surface is None or isinstance(surface, Plane) else surface
+def _round_fit(mesh: trimesh.Trimesh, faces: np.ndarray) -> AnalyticSurface | None:
+    surface = fit_surface(np.asarray(mesh.triangles)[faces], FIT)
+    return None if isinstance(surface, Plane) else surface
 
 
 def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[AnalyticSurface | None], Sequence[str]] | None:
-    """Of a mesh from a STEP file the B-rep face of each triangle (face,), from 0, their surfaces, and names if there are any.
+    """Return the B-rep face of each triangle (face,), from 0, their surfaces and their names; None if there are no B-rep faces.
 
-    None of other meshes.
+    The names are empty if the file names no face.
     """
     brep = mesh.face_attributes.get(BREP)
     return None if brep is None else (np.asarray(brep).ravel(), mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES])
@@ -80,7 +85,7 @@ def known_surfaces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, list[AnalyticSurf
 def with_known_surfaces(
     vertices: np.ndarray, faces: np.ndarray, brep: np.ndarray, surfaces: list[AnalyticSurface | None], names: Sequence[str]
 ) -> trimesh.Trimesh:
-    """A mesh that knows them again."""
+    """Return a mesh with B-rep faces, from what `known_surfaces` returned."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     mesh.face_attributes[BREP] = brep
     mesh.metadata[SURFACES], mesh.metadata[FACE_NAMES] = surfaces, names
