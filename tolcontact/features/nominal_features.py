@@ -10,8 +10,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.tolerance_layers import Datum, Layer, freedom_names, tolerance_layers
-from tolcontact.geometry.faces import Meshes, patch
-from tolcontact.geometry.regions import Region, region, share
+from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.surface import Surface
 
 Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
@@ -63,7 +62,7 @@ class NominalFeature:
     labels       "part.feature.freedom" of its contributors
     coordinates  (coordinate, column): of the feature, for deviations of 1 of its own columns and all columns before
     surfaces     its faces, in the part's own frame
-    regions      its faces on the part's mesh
+    areas        its faces on the part's mesh
     """
 
     feature: Feature
@@ -74,7 +73,7 @@ class NominalFeature:
     labels: tuple[str, ...]
     coordinates: np.ndarray
     surfaces: tuple[Surface, ...]
-    regions: tuple[Region, ...]
+    areas: tuple[FaceArea, ...]
 
     @property
     def label(self) -> str:
@@ -130,8 +129,8 @@ class Features:
     def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
         """Add a feature whose datums have been added before. Raises GeometryFault."""
         surfaces = tuple(patch(face, meshes) for face in feature.faces)
-        regions = tuple(region(face, meshes) for face in feature.faces)
-        self._check_disjoint(feature, regions, meshes)
+        areas = tuple(face_area(face, meshes) for face in feature.faces)
+        self._check_disjoint(feature, areas, meshes)
         geometry = feature_geometry(surfaces)
         start = self.first_column + len(self.labels)
         datums = {
@@ -151,15 +150,15 @@ class Features:
             coordinates[:, :start] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
             column += count
         labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.features.append(NominalFeature(feature, part, geometry, layers, start, labels, coordinates, surfaces, regions))
+        self.features.append(NominalFeature(feature, part, geometry, layers, start, labels, coordinates, surfaces, areas))
 
-    def _check_disjoint(self, feature: Feature, regions: Sequence[Region], meshes: Meshes) -> None:
+    def _check_disjoint(self, feature: Feature, areas: Sequence[FaceArea], meshes: Meshes) -> None:
         """Raise GeometryFault if a face that deviates with the feature also deviates with a feature added before."""
         mesh = meshes[feature.part]
         for earlier in (earlier for earlier in self.features if earlier.feature.part is feature.part):
-            for face, moves in zip(regions, _moving_faces(feature), strict=True):
-                for earlier_face, earlier_moves in zip(earlier.regions, _moving_faces(earlier.feature), strict=True):
-                    if moves and earlier_moves and share(face, earlier_face, mesh) > MIN_SHARE:
+            for face, moves in zip(areas, _moving_faces(feature), strict=True):
+                for earlier_face, earlier_moves in zip(earlier.areas, _moving_faces(earlier.feature), strict=True):
+                    if moves and earlier_moves and face.share(earlier_face, mesh) > MIN_SHARE:
                         raise GeometryFault(
                             f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
                             "tolerances of a face to one feature"
@@ -171,10 +170,10 @@ class Features:
         Raises GeometryFault if a part of it belongs to a feature, and the rest does not.
         """
         candidates = [feature for feature in self.features if feature.feature.part is face.part and feature.labels]
-        face_region = region(face, meshes) if candidates else None
+        area = face_area(face, meshes) if candidates else None
         for feature in candidates:
-            for number, feature_region in enumerate(feature.regions):
-                common = share(face_region, feature_region, meshes[face.part]) if face_region else 0.0
+            for number, feature_area in enumerate(feature.areas):
+                common = area.share(feature_area, meshes[face.part]) if area else 0.0
                 if common > 1 - MIN_SHARE and _moving_faces(feature.feature)[number]:
                     return self._used(feature, number, placement)
                 if MIN_SHARE < common <= 1 - MIN_SHARE:

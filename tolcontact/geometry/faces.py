@@ -1,7 +1,8 @@
-"""Faces: the triangles of a part that meet all of a face's criteria, as a surface of their own. Part's own frame, mm."""
+"""Faces: the triangles of a part that meet all criteria of a face, as a surface. Part's own frame, mm."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
@@ -18,63 +19,97 @@ from tolcontact.geometry.surface_recognition import analytic_surfaces
 
 NEAR_STATIONS = 100
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
-FLAT = 2e-4  # angle [rad] between neighbouring triangles of one flat face: what single precision leaves of it
-SAME_SIZE = 1e-6  # of a radius: those that differ by less are one size
-SHOWN = 12  # faces that a message lists
-LOOKS_AT = -0.5  # cosine between the outward normals of two surfaces that face each other
+FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
+RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
+MAX_LISTED = 12  # faces in a message
+OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face each other
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
 
 
-def patch(face: Face, meshes: Meshes) -> Surface:
-    """The surface that a face names. `meshes` holds each part's surface in that part's own frame.
+class FaceArea(NamedTuple):
+    """The area [mm^2] of a face: of its triangles (triangle,) in its part's mesh, as far as they lie in all boxes."""
 
-    Raises GeometryFault if there is none, or if its outside is undefined.
+    triangles: np.ndarray
+    boxes: tuple[Inside, ...]
+    area: float
+
+    def share(self, other: "FaceArea", mesh: trimesh.Trimesh) -> float:
+        """Return the share of this area that another face of the same part, which has the `mesh`, covers too."""
+        common = np.intersect1d(self.triangles, other.triangles)
+        if not common.size:
+            return 0.0
+        if len(common) == len(self.triangles) and not other.boxes:
+            return 1.0
+        return _area(mesh, common, (*self.boxes, *other.boxes)) / self.area
+
+
+def face_area(face: Face, meshes: Meshes) -> FaceArea:
+    """Return the area of a face. Raises GeometryFault if it has no triangles."""
+    boxes = tuple(selection for selection in face.selections if isinstance(selection, Inside))
+    indices = triangles(face, meshes)
+    return FaceArea(indices, boxes, _area(meshes[face.part], indices, boxes))
+
+
+def _area(mesh: trimesh.Trimesh, indices: np.ndarray, boxes: Sequence[Inside]) -> float:
+    if not boxes:
+        return float(np.asarray(mesh.area_faces)[indices].sum())
+    vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)[indices]
+    for box in boxes:
+        if len(faces):
+            vertices, faces = _sliced(vertices, faces, box, CUT_MARGIN * mesh.scale)
+    return float(trimesh.triangles.area(vertices[faces]).sum()) if len(faces) else 0.0
+
+
+def patch(face: Face, meshes: Meshes) -> Surface:
+    """Return the surface of a face. `meshes` holds the mesh of each part in that part's own frame.
+
+    Raises GeometryFault if the face is empty, or if its outside is undefined.
     """
     mesh = meshes[face.part]
-    chosen = triangles(face, meshes)
-    used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
-    surfaces, surface_numbers = analytic_surfaces(mesh, chosen)
-    own = Surface(trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False), None, surfaces, surface_numbers)
+    indices = triangles(face, meshes)
+    used, faces = np.unique(mesh.faces[indices], return_inverse=True)
+    surfaces, surface_numbers = analytic_surfaces(mesh, indices)
+    face_mesh = trimesh.Trimesh(mesh.vertices[used], faces.reshape(-1, 3), process=False)
+    surface = Surface(face_mesh, None, surfaces, surface_numbers)
     for selection in face.selections:
         if isinstance(selection, Inside):
-            own = _cut(own, selection, CUT_MARGIN * mesh.scale)
-            if len(own.mesh.faces) == 0:
+            surface = _cut(surface, selection, CUT_MARGIN * mesh.scale)
+            if len(surface.mesh.faces) == 0:
                 raise GeometryFault(f"face {face}: nothing of it lies in that box; the part spans {_span(mesh)}")
-    sheets = _double(own.mesh)
-    if sheets:
+    if sheets := _opposite_pairs(surface.mesh):
         raise GeometryFault(
             f"face {face}: {sheets} pairs of coincident triangles point opposite ways, so the outside is undefined; "
             "remove one of the two sheets, or choose a direction"
         )
-    return own
+    return surface
 
 
 def triangles(face: Face, meshes: Meshes) -> np.ndarray:
-    """Indices (triangle,) of the triangles that meet all criteria but the boxes, which may cut them.
+    """Return the indices (triangle,) of the triangles that meet all criteria but boxes, which may cut them.
 
     Raises GeometryFault if there are none.
     """
     mesh = meshes[face.part]
-    chosen = np.asarray(mesh.area_faces) > 0
+    mask = np.asarray(mesh.area_faces) > 0
     for selection in face.selections:
         match selection:
             case Facing():
-                chosen = chosen & (mesh.face_normals @ np.array(selection.axis) > np.cos(selection.angle))
+                mask = mask & (mesh.face_normals @ np.array(selection.axis) > np.cos(selection.angle))
             case Triangles():
-                chosen = chosen & _by_index(face, mesh, selection)
+                mask = mask & _by_index(face, mesh, selection)
             case Picked():
-                chosen = chosen & _by_function(face, mesh, selection)
+                mask = mask & _by_function(face, mesh, selection)
             case Brep():
-                chosen = chosen & _by_brep(face, mesh, selection)
+                mask = mask & _by_brep(face, mesh, selection)
             case Cylinder() | Largest():
-                chosen = chosen & _by_kind(face, mesh, selection)
+                mask = mask & _by_kind(face, mesh, selection)
             case Near():
-                chosen = chosen & _by_nearness(face, meshes, selection)
-    if not chosen.any():
+                mask = mask & _by_nearness(face, meshes, selection)
+    if not mask.any():
         raise GeometryFault(f"face {face} has no triangles; choose another direction or selection")
-    return np.flatnonzero(chosen)
+    return np.flatnonzero(mask)
 
 
 def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.ndarray:
@@ -86,47 +121,41 @@ def _by_index(face: Face, mesh: trimesh.Trimesh, selection: Triangles) -> np.nda
 
 def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.ndarray:
     try:
-        chosen = np.asarray(selection.function(mesh.triangles_center, mesh.face_normals))
+        mask = np.asarray(selection.function(mesh.triangles_center, mesh.face_normals))
     except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
         raise GeometryFault(f"face {face}: its function failed with {type(error).__name__}: {error}") from error
-    if chosen.shape != (len(mesh.faces),) or chosen.dtype != bool:
+    if mask.shape != (len(mesh.faces),) or mask.dtype != bool:
         raise GeometryFault(
-            f"face {face}: its function returned an array of shape {chosen.shape} and type {chosen.dtype}; "
+            f"face {face}: its function returned an array of shape {mask.shape} and type {mask.dtype}; "
             f"expected one True or False per triangle, shape ({len(mesh.faces)},)"
         )
-    return np.asarray(chosen)
-
-
-def _breps(face: Face, mesh: trimesh.Trimesh) -> np.ndarray:
-    """The B-rep face of each triangle, from 0."""
-    brep = mesh.face_attributes.get(BREP)
-    if brep is None:
-        raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
-    return np.asarray(brep).ravel()
+    return mask
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
     number_of, _ = numbered(mesh)
-    known = described(mesh)
+    faces = described(mesh)
     if isinstance(selection, Cylinder):
-        radius, inner = selection.radius, selection.inner
-        found = [
-            each
-            for each in known
-            if each.kind == "cylinder" and each.radius is not None and inner in (None, each.is_inner)
-            and (radius is None or abs(each.radius - radius) <= SAME_SIZE * radius + each.residual)
-        ]  # fmt: skip
+        hits = [candidate for candidate in faces if _is_cylinder(candidate, selection)]
     else:
-        found = [each for each in known if each.kind == selection.kind and _is_along(each, selection.axis)]
-        found = sorted(found, key=lambda each: each.area)[-1:]
-    if not found:
-        kinds = "; ".join(f"{each}" for each in known[:SHOWN]) + ("; ..." if len(known) > SHOWN else "")
-        raise GeometryFault(f"face {face}: the part has no such face; its {len(known)} faces are: {kinds}")
-    return np.isin(number_of, [each.number - 1 for each in found])
+        hits = [candidate for candidate in faces if candidate.kind == selection.kind and _is_along(candidate, selection.axis)]
+        hits = sorted(hits, key=lambda hit: hit.area)[-1:]
+    if not hits:
+        listed = "; ".join(f"{candidate}" for candidate in faces[:MAX_LISTED]) + ("; ..." if len(faces) > MAX_LISTED else "")
+        raise GeometryFault(f"face {face}: the part has no such face; its {len(faces)} faces are: {listed}")
+    return np.isin(number_of, [hit.number - 1 for hit in hits])
+
+
+def _is_cylinder(face: FaceInFile, selection: Cylinder) -> bool:
+    """Return whether a face is a cylinder with the radius and on the side that a selection requires."""
+    if face.kind != "cylinder" or face.radius is None or selection.inner not in (None, face.is_inner):
+        return False
+    radius = selection.radius
+    return radius is None or abs(face.radius - radius) <= RADIUS_TOLERANCE * radius + face.residual
 
 
 def _is_along(face: FaceInFile, direction: Vector | None) -> bool:
-    """Whether a face looks in a direction, or has its axis along it, whichever way; any does, if there is none."""
+    """Return whether a plane looks in a direction, or an axis lies along it either way; True if no direction is required."""
     if direction is None or face.direction is None:
         return direction is None
     cosine = float(np.dot(face.direction, direction))
@@ -134,51 +163,60 @@ def _is_along(face: FaceInFile, direction: Vector | None) -> bool:
 
 
 def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
-    brep = _breps(face, mesh)
+    if BREP not in mesh.face_attributes:
+        raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
+    brep = np.asarray(mesh.face_attributes[BREP]).ravel()
     if selection.name is not None:
-        names = mesh.metadata[FACE_NAMES]
-        if selection.name not in names:
-            known = ", ".join(f'"{shown(name)}"' for name in [name for name in dict.fromkeys(names) if name][:SHOWN])
-            has = f"its faces are called {known}" if known else "its file gives no face of it a name"
-            more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > SHOWN else ""
-            raise GeometryFault(f"face {face}: the part has no such face; {has}{more}")
-        return np.isin(brep, np.flatnonzero(np.array(names) == selection.name))
-    if selection.at is None:
-        count = len(mesh.metadata[SURFACES])
-        if selection.number is None or not 1 <= selection.number <= count:
-            raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
-        return np.asarray(brep == selection.number - 1)
-    point = np.tile(selection.at, (len(brep), 1))
+        return _by_name(face, brep, mesh.metadata[FACE_NAMES], selection.name)
+    if selection.at is not None:
+        return _by_point(face, mesh, brep, selection.at)
+    count = len(mesh.metadata[SURFACES])
+    if selection.number is None or not 1 <= selection.number <= count:
+        raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
+    return np.asarray(brep == selection.number - 1)
+
+
+def _by_name(face: Face, brep: np.ndarray, names: Sequence[str], name: str) -> np.ndarray:
+    if name not in names:
+        listed = ", ".join(f'"{shown(entry)}"' for entry in [entry for entry in dict.fromkeys(names) if entry][:MAX_LISTED])
+        content = f"its faces are called {listed}" if listed else "its file gives no face of it a name"
+        more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > MAX_LISTED else ""
+        raise GeometryFault(f"face {face}: the part has no such face; {content}{more}")
+    return np.isin(brep, np.flatnonzero(np.array(names) == name))
+
+
+def _by_point(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, place: Vector) -> np.ndarray:
+    point = np.tile(place, (len(brep), 1))
     distance = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, point) - point, axis=1)
     if distance.min() > BREP_REACH * mesh.scale:
         raise GeometryFault(
             f"face {face}: the point is {distance.min():.4g} mm away from the part, which spans {_span(mesh)}; "
             "give a point on the face"
         )
-    chosen = np.unique(brep[distance < distance.min() + CUT_MARGIN * mesh.scale])
-    if len(chosen) > 1:
-        raise GeometryFault(f"face {face}: the point lies where {len(chosen)} faces meet; give a point inside one of them")
-    return np.asarray(brep == chosen[0])
+    hits = np.unique(brep[distance < distance.min() + CUT_MARGIN * mesh.scale])
+    if len(hits) > 1:
+        raise GeometryFault(f"face {face}: the point lies where {len(hits)} faces meet; give a point inside one of them")
+    return np.asarray(brep == hits[0])
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
-    own, other = (_in_place(part, meshes[part]) for part in (face.part, selection.part))
-    chosen = np.zeros(len(own.faces), dtype=bool)
-    # Seen from both sides, since either part may be small beside the other.
-    for seen, by in ((own, other), (other, own)):
-        step = max(selection.within, seen.scale / NEAR_STATIONS)
+    mesh, neighbour = (_in_place(part, meshes[part]) for part in (face.part, selection.part))
+    mask = np.zeros(len(mesh.faces), dtype=bool)
+    # Both are sampled, since either part may be small beside the other.
+    for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
+        step = max(selection.within, sampled.scale / NEAR_STATIONS)
         vertices, faces, origin = trimesh.remesh.subdivide_to_size(
-            seen.vertices, seen.faces, max_edge=step, max_iter=30, return_index=True
+            sampled.vertices, sampled.faces, max_edge=step, max_iter=30, return_index=True
         )
         fine = trimesh.Trimesh(vertices, faces, process=False)
-        hit, nearest = Surface(by).nearest(fine.triangles_center)
-        looks_at = (fine.face_normals * np.asarray(by.face_normals)[hit]).sum(axis=1) < LOOKS_AT
-        near = looks_at & (np.linalg.norm(fine.triangles_center - nearest, axis=1) <= selection.within)
-        chosen[(origin if seen is own else hit)[near]] = True
-    # A flat face is one thing, however it is cut into triangles.
-    flat = np.asarray(own.face_adjacency)[np.asarray(own.face_adjacency_angles) < FLAT]
-    face_of = trimesh.graph.connected_component_labels(flat, node_count=len(own.faces))
-    return np.asarray(np.isin(face_of, face_of[chosen]))
+        hit, nearest = Surface(target).nearest(fine.triangles_center)
+        is_opposing = (fine.face_normals * np.asarray(target.face_normals)[hit]).sum(axis=1) < OPPOSING_COSINE
+        is_near = is_opposing & (np.linalg.norm(fine.triangles_center - nearest, axis=1) <= selection.within)
+        mask[(origin if sampled is mesh else hit)[is_near]] = True
+    # A flat face is chosen as a whole, however it is cut into triangles.
+    flat = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT_ANGLE]
+    face_of = trimesh.graph.connected_component_labels(flat, node_count=len(mesh.faces))
+    return np.isin(face_of, face_of[mask])
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
@@ -186,8 +224,8 @@ def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.asarray(mesh.vertices) @ R.T + np.array(part.at), mesh.faces, process=False)
 
 
-def _cut(own: Surface, box: Inside, margin: float) -> Surface:
-    vertices, faces = sliced(np.asarray(own.mesh.vertices), np.asarray(own.mesh.faces), box, margin)
+def _cut(surface: Surface, box: Inside, margin: float) -> Surface:
+    vertices, faces = _sliced(np.asarray(surface.mesh.vertices), np.asarray(surface.mesh.faces), box, margin)
     cut = trimesh.Trimesh(vertices, faces, process=False)
     cut.merge_vertices()
     cut.update_faces(cut.area_faces > 0)
@@ -195,13 +233,13 @@ def _cut(own: Surface, box: Inside, margin: float) -> Surface:
     if len(cut.faces) == 0:
         return Surface(cut, np.zeros((0, 3, 3)))
     # A cut does not change the face: the normals are still those of the whole, also where its triangles end now.
-    origin, _ = own.nearest(cut.triangles_center)
-    normals = np.stack([own.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
-    return Surface(cut, normals, own.surfaces, own.surface_numbers[origin])
+    origin, _ = surface.nearest(cut.triangles_center)
+    normals = np.stack([surface.normals(origin, cut.triangles[:, k]) for k in range(3)], axis=1)
+    return Surface(cut, normals, surface.surfaces, surface.surface_numbers[origin])
 
 
-def sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) -> tuple[np.ndarray, np.ndarray]:
-    """What of triangles, vertices (vertex, 3) [mm] and faces (face, 3), lies in a box that is larger by `margin` [mm]."""
+def _sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the part of triangles, vertices (vertex, 3) [mm] and faces (face, 3), in a box larger by `margin` [mm]."""
     for corner, inward in ((box.lower, 1.0), (box.upper, -1.0)):
         for axis in np.eye(3):
             origin = np.array(corner) - inward * margin * axis
@@ -209,11 +247,11 @@ def sliced(vertices: np.ndarray, faces: np.ndarray, box: Inside, margin: float) 
     return vertices, faces
 
 
-def _double(own: trimesh.Trimesh) -> int:
-    """How many pairs of triangles have the same corners and opposite normals."""
-    _, alike = trimesh.grouping.unique_rows(np.sort(own.faces, axis=1))
-    times = np.bincount(alike)
-    total = np.stack([np.bincount(alike, component) for component in np.asarray(own.face_normals).T], axis=1)
+def _opposite_pairs(mesh: trimesh.Trimesh) -> int:
+    """Return the number of pairs of triangles with the same corners and opposite normals."""
+    _, label = trimesh.grouping.unique_rows(np.sort(mesh.faces, axis=1))
+    times = np.bincount(label)
+    total = np.stack([np.bincount(label, component) for component in np.asarray(mesh.face_normals).T], axis=1)
     return int(((times > 1) & (np.linalg.norm(total, axis=1) < times - 0.5)).sum())
 
 
