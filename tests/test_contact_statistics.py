@@ -7,7 +7,8 @@ import tolcontact as tc
 from tests import cases
 from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
 from tolcontact.report import write_page
-from tolcontact.statistics import contact, touching
+from tolcontact.simulation.touching import MAX_REALIZATIONS, TOUCHING_GAP
+from tolcontact.statistics import touching
 
 
 def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
@@ -15,13 +16,13 @@ def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():
     _, lower, upper = results.tolcontact.summary().carried.sel(pair="seat").values
     assert lower < 0.5 < upper and upper - lower < 0.04
     found = results.tolcontact.touching()
-    share = (results["status"].values[: contact.AT_MOST] == tc.Status.RESOLVED).mean()
-    assert found.attrs["realizations"] == contact.AT_MOST and (found["pair"] == "seat").all()
+    share = (results["status"].values[:MAX_REALIZATIONS] == tc.Status.RESOLVED).mean()
+    assert found.attrs["realizations"] == MAX_REALIZATIONS and (found["pair"] == "seat").all()
     assert np.abs(found["touching"].sel(interval="estimate") - share).max() < 1e-12
     archived = results["contact"]  # for whoever reads an archive without tolcontact
     assert np.array_equal(archived["touching"], found["touching"].sel(interval="estimate"))
     assert np.array_equal(archived["touching_interval"], found["touching"].sel(interval=["lower", "upper"]))
-    assert int(archived["touching_realizations"]) == contact.AT_MOST and archived["touching"].dims == ("point",)
+    assert int(archived["touching_realizations"]) == MAX_REALIZATIONS and archived["touching"].dims == ("point",)
 
 
 def test_figures_are_those_of_the_rows():
@@ -46,7 +47,7 @@ def test_points_touch_where_the_least_gap_is_closed(name):
     results = tc.run(cases.MODELS / f"{name}.py", samples=40, seed=3, solver="daqp", surfaces=0)
     found, held = touching(results), results["searched"].values == 0
     assert found.attrs["realizations"] == held.sum()
-    closed = (results["gap_min"].values[held, 1] < contact.TOUCHES).mean(axis=0)
+    closed = (results["gap_min"].values[held, 1] < TOUCHING_GAP).mean(axis=0)
     for pair, share in zip(results["pair"].values, closed, strict=True):
         own = found["touching"].sel(interval="estimate").values[found["pair"].values == pair]
         known = own[np.isfinite(own)]

@@ -25,7 +25,7 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=path, keep=keep, resume=True).close()
     whole = tmp_path / "whole.nc"
     tc.run(cases.stack(), samples=40_000, seed=3, solver="daqp", out=whole, keep=keep).close()
-    for group in (None, "sample", "field/middle"):
+    for group in (None, "sample", "contact", "field/middle"):
         assert contents(path, group).identical(contents(whole, group)), group
 
 

@@ -7,9 +7,9 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SEATED
-from tolcontact import recomputed
 from tolcontact.errors import OptionError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+from tolcontact.testing.referee import ArchivedPair
 from tolcontact.vocabulary import Status
 
 
@@ -134,7 +134,7 @@ def test_what_is_no_run_is_refused(results):
 def test_normals_have_their_length_whatever_the_poses_do(results):
     """Archived poses of parts that others rest on are rotations; gaps are those of the paper's (5) also where they are not."""
     results["rotation"].values[:, :, 0] *= 1.25
-    gaps = recomputed.ArchivedPair(results, 0).gaps(results.to_dataset(), slice(0, 5))
+    gaps = ArchivedPair(results, 0).gaps(results.to_dataset(), slice(0, 5))
     contact = results["contact"].to_dataset()
     contact = contact.isel(point=contact["pair_of_point"].values == 0)
     R, t = results["rotation"].values[:5], results["translation"].values[:5]

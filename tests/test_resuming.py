@@ -20,7 +20,7 @@ def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path
     for samples in (300, 5000, 5000, 9000):
         tc.run(cases.stack(), samples=samples, seed=3, solver=solver, out=paths[0], resume=True, keep=keep).close()
     tc.run(cases.stack(), samples=9000, seed=3, solver=solver, out=paths[1], keep=keep).close()
-    for group in (None, "sample", "field/bottom", "field/middle", "field/upper"):
+    for group in (None, "sample", "contact", "field/bottom", "field/middle", "field/upper"):
         grown, whole = (contents(path, group) for path in paths)
         assert grown.identical(whole), group
     assert xr.load_dataset(paths[0]).attrs["history"].count("resumed after 4096") == 2

@@ -58,7 +58,7 @@ APART = {
 ORDER = (
     "version", "errors", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method", "poses",
     "compiled", "declaration", "geometry", "features", "discretization", "variation", "mechanics", "compilation", "contact",
-    "simulation", "recomputed", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__",
+    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__",
     "__main__",
 )  # fmt: skip
 

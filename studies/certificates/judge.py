@@ -12,13 +12,13 @@ import igl
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
+from tolcontact.recomputed import ArchivedPoint
 
 import tolcontact as tc
 from studies.certificates.scenes import scene
 from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.geometry.curvature import chord_height
-from tolcontact.recomputed import ArchivedPoint
 from tolcontact.simulation import Block, simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 

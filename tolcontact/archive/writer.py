@@ -18,6 +18,7 @@ import netCDF4
 import numpy as np
 from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
+from tolcontact import poses
 from tolcontact import vocabulary as terms
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.disk_space import check_room, lay_out_rows
@@ -171,6 +172,16 @@ class ArchiveWriter:
         """Corrected poses (row, part, 12) of some rows; None if they are not kept."""
         with opened_locked(self._path, "r") as file:
             return archived_poses(file, rows)
+
+    def first_poses(self, end: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the numbers (row,) of the first rows, before `end`, that are not `searched`, and their corrected poses.
+
+        poses   (row, part, 12), which the archive has to keep
+        """
+        with opened_locked(self._path, "r") as file:
+            rows = np.flatnonzero(file[terms.SEARCHED.name][:end] == 0)
+            R, t = (file[variable.name][:end, terms.CORRECTED][rows] for variable in (terms.ROTATION, terms.TRANSLATION))
+        return rows, poses.pose(R, t)
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
         """What the check of some rows found, (row, pair) [mm]."""

@@ -74,7 +74,7 @@ def contact_rows(
         points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
             reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
-            of_points, by_entries, second, closing = round_gaps(pair.round)(
+            of_points, by_entries, second, closing, _ = round_gaps(pair.round)(
                 before.vector(), heights(pair, setting.deviations), reactions
             )
             slopes.append(by_entries @ by_z)

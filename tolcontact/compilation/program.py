@@ -47,7 +47,7 @@ class Program(Pictured):
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
     gaps         one per pair: its gaps at X_RM, if they are affine in it; None of round faces, which have
-    round_gaps   X_RM, deviations -> gaps (realization, point) by number of the pair
+    round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by number of the pair
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     tapes        the users' own expressions by measure name
@@ -132,8 +132,8 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
 
 def _gaps_only(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
-    gaps, *_ = round_gaps(points)(X_RM, heights(pair, deviations), ca.SX.zeros(len(points)))
-    return ca.Function("round_gaps", [X_RM, deviations], [gaps], ["X_RM", "deviations"], ["gaps"])
+    gaps, *_, distances = round_gaps(points)(X_RM, heights(pair, deviations), ca.SX.zeros(len(points)))
+    return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
 
 
 def _ready(group: Group, program: ContactProgram) -> ContactGroup:

@@ -36,9 +36,8 @@ class Points(NamedTuple):
 
 
 @inlined
-def _coefficients(points, X, deviations, of):  # type: ignore[no-untyped-def]
+def _coefficients(basis, columns, X, deviations, of):  # type: ignore[no-untyped-def]
     """Coefficients of the gaps by the coordinates, [[X_RM, 1] @ basis, deviations[columns]], into of (r + k,)."""
-    basis, columns = points.basis, points.columns
     entries, size = basis.shape[0] - 1, basis.shape[1]
     for c in range(size):
         of[c] = basis[entries, c]
@@ -112,7 +111,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     middle_here, reach_here = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _coefficients(points, relative[k], deviations[k], of)
+        _coefficients(points.basis, points.columns, relative[k], deviations[k], of)
         _bounds(points.branch_boxes, 0, middle.size, of, middle, reach)
         number = 0
         for branch in range(middle.size):
@@ -186,7 +185,7 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
     middle, reach = np.empty(branches.size - 1), np.empty(branches.size - 1)
     scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
-        _coefficients(points, relative[k], deviations[k], of)
+        _coefficients(points.basis, points.columns, relative[k], deviations[k], of)
         _bounds(points.branch_boxes, 0, middle.size, of, middle, reach)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
@@ -203,3 +202,16 @@ def deepest(points, clusters, relative, deviations, may_carry, below, numbers, g
                     points, branches[branch], branches[branch + 1], of, may_carry[k], lowest, where, scratch
                 )
             numbers[k, cluster], gaps_there[k, cluster] = where, lowest
+
+
+@compiled
+def count_below(basis, columns, coordinates, relative, deviations, limit, counts):  # type: ignore[no-untyped-def]
+    """Add to counts (point,) the number of realizations in which the gap of a point is below `limit`; see GapMap."""
+    of, gaps = np.empty(coordinates.shape[0]), np.empty(LEAF)
+    for k in range(relative.shape[0]):
+        _coefficients(basis, columns, relative[k], deviations[k], of)
+        for first in range(0, coordinates.shape[1], LEAF):
+            count = min(LEAF, coordinates.shape[1] - first)
+            _gaps(coordinates, first, count, of, gaps)
+            for j in range(count):
+                counts[first + j] += gaps[j] < limit

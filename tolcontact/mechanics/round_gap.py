@@ -27,21 +27,23 @@ Terms = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # of a point: gap, slope, second deri
 def round_gaps(points: RoundPoints) -> ca.Function:
     """Function of X_RM (12), heights (2) by which the moving and the reference face have grown, and reactions (point); results:
 
-    gaps     (point) [mm]
+    gaps     (point) [mm]; where two tangents all but agree, both are those of the nearer one
     slopes   (point, 12): their derivatives by X_RM
     bow      (12, 12): the sum of reactions times their second derivatives, but for
     wrap     (12, 12): the sum of reactions times how hollow walls close in around what slides along them; positive
                        semidefinite, and to be subtracted from `bow`
+    distances  (point) [mm]: the gap of each point itself
     """
     X, grown, reactions = (
         ca.SX.sym(name, size) for name, size in (("X_RM", ENTRIES), ("heights", 2), ("reactions", len(points)))
     )
-    gaps, slopes = [], []
+    gaps, slopes, distances = [], [], []
     nearest: tuple[RoundPoint, Terms] | None = None  # the last tangent that turns along a hollow wall
     bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
     for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
         of_body, of_wall = (grown[0], grown[1]) if point.on_moving else (grown[1], grown[0])
         found = (_of_tangents if _has_tangents(point) else _of_ball)(point, X, of_body, of_wall)
+        distances.append(found[0])
         if point.is_hollow:
             nearest = (point, found)
         elif nearest is not None and _touches(point, nearest[0]):
@@ -52,6 +54,7 @@ def round_gaps(points: RoundPoints) -> ca.Function:
         bow += reaction * bend
         wrap += reaction * closing
     outputs = {"gaps": ca.vertcat(*gaps), "slopes": ca.vertcat(*slopes), "bow": bow, "wrap": wrap}
+    outputs["distances"] = ca.vertcat(*distances)
     inputs = {"X_RM": X, "heights": grown, "reactions": reactions}
     return ca.Function("round_gaps", [*inputs.values()], [*outputs.values()], [*inputs], [*outputs])
 

@@ -8,7 +8,7 @@ import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
@@ -30,6 +30,15 @@ class Sampler(Protocol):
     """What gives deviations (realization, contributor) of realizations `start` to `stop`, as Draws do."""
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
+
+
+@runtime_checkable
+class BoundToProgram(Protocol):
+    """A function of blocks that needs their program, too, and gets it where they are simulated."""
+
+    def bound_to(self, program: Program) -> Callable[[Block], Any]:
+        """Return the function of a block."""
+        ...
 
 
 def simulate_blocks(
@@ -64,7 +73,12 @@ def map_blocks(
     threads: int | None = None,
     draws: Sampler | None = None,
 ) -> Iterator[T]:
-    """What `function` makes of each block of `simulate_blocks`, in the thread that simulated it; in order."""
+    """What `function` makes of each block of `simulate_blocks`, in the thread that simulated it; in order.
+
+    A function that needs the program as well has `bound_to` (see BoundToProgram).
+    """
+    if isinstance(function, BoundToProgram):
+        function = function.bound_to(program)
     threads, block = threads or processors(), block or block_rows(program)
     firsts = range(start, samples, block)
     originals = [ContactResolver(program, group) for group in program.groups]

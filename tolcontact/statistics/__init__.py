@@ -47,8 +47,8 @@ True
 
 Of contact it holds the share of realizations in which each pair carries, the mean and percentiles of its reaction (in the units
 of the objective: N only where it is the locators' stiffness or forces), and which pairs carry together. How points share a
-reaction is not unique where faces lie flat on each other; which points touch is. `results.tolcontact.touching()` looks at them
-in the first 2048 realizations, and archives have that in the group `contact`, point by point.
+reaction is not unique where faces lie flat on each other; which points touch is. A run counts that in its first 2048
+realizations; the archive has it in the group `contact`, point by point, and `results.tolcontact.touching()` returns it.
 
 >>> round(float(summary.carried.sel(pair="interface", interval="estimate")), 2)
 0.9
@@ -75,12 +75,12 @@ each point.
 """
 
 from tolcontact.statistics.archived_analysis import kept_analysis
-from tolcontact.statistics.contact import touching
+from tolcontact.statistics.contact import TouchingShares, touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
 from tolcontact.statistics.run_comparison import compare_runs
 from tolcontact.statistics.summary import Summary, estimate_of, limits, summarize
 
 __all__ = [
-    "BlockSums", "DisplacementFields", "Summary", "compare_runs", "estimate_of", "kept_analysis", "limits", "summarize",
-    "touching",
+    "BlockSums", "DisplacementFields", "Summary", "TouchingShares", "compare_runs", "estimate_of", "kept_analysis", "limits",
+    "summarize", "touching",
 ]  # fmt: skip

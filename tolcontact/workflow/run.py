@@ -2,27 +2,26 @@
 
 import tempfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, opened, stored, taken
-from tolcontact.archive.stored_block import StoredBlock
+from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, opened, taken
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
-from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
-from tolcontact.statistics import BlockSums, DisplacementFields, Summary, touching
+from tolcontact.statistics import Summary
 from tolcontact.statistics import summarize as statistics_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.forecast import announce
+from tolcontact.workflow.run_sums import RunSums
 from tolcontact.workflow.until import Target
 
 DEFAULT_SOLVER = "qpoases"
@@ -148,13 +147,12 @@ def run(
         blocks = mapping(client)
         asked, goes_on = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
         while True:
-            of_fields = DisplacementFields(program.nominal, asked.fields)
+            sums = RunSums(program, asked)
             with (
-                ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, of_fields.sizes)
+                ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, sums.sizes)
             ) as writer:
                 announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep, threads=threads_of(client))
-                _simulate(program, writer, of_fields, seed, blocks, progress)
-                _look_at_points(path, writer)
+                _simulate(program, writer, sums, seed, blocks, progress)
             more = target.next(path, program) if target else None
             if more is None:
                 return
@@ -174,44 +172,30 @@ def run(
     return opened(path)
 
 
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """What is made of a block where it was simulated: rows as they are stored, and sums for fields."""
-
-    kept: tuple[str, ...]
-    fields: DisplacementFields
-
-    def __call__(self, block: Block) -> tuple[StoredBlock, BlockSums]:
-        return stored(block, self.kept), self.fields.sums(block.poses, block.start)
-
-
 def _simulate(
-    program: Program, writer: ArchiveWriter, fields: DisplacementFields, seed: int, blocks: MapBlocks, progress: Progress | None
+    program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: Progress | None
 ) -> None:
-    fields.go_on_from(writer.take_up())
-
-    prepared = _Prepared(tuple(variable.name for variable in writer.kept), fields)
+    sums.start_from(writer)
     is_summed = bool(writer.rows)
     try:
-        for rows, sums in blocks(prepared, program, samples=writer.samples, seed=seed, start=writer.rows):
+        for rows, block_sums in blocks(sums.of_blocks, program, samples=writer.samples, seed=seed, start=writer.rows):
             is_summed = False
-            fields.merge(sums)
+            sums.merge(block_sums)
             writer.append(rows)
             is_summed = True
             if writer.is_checkpoint_due:
-                writer.write_checkpoint(fields.numbers)
-                writer.write_fields(fields.fields())
+                writer.write_checkpoint(sums.numbers)
+                sums.write_to(writer)
             if progress:
                 progress(writer.rows)
-        writer.write_fields(fields.fields())
+        sums.write_to(writer)
     except KeyboardInterrupt:
         if is_summed and writer.is_between_blocks:
-            writer.write_checkpoint(fields.numbers)
-        elif not is_summed and (sums_there := writer.take_up()):
-            fields.go_on_from(sums_there)  # it came at whatever instant: only the sums of the last checkpoint are sure
-            is_summed = True
+            writer.write_checkpoint(sums.numbers)
+        elif not is_summed:  # it came at whatever instant: only the sums of the last checkpoint are sure
+            is_summed = sums.start_from(writer)
         if is_summed:
-            writer.write_fields(fields.fields())
+            sums.write_to(writer)
         raise
     chosen_rows = writer.chosen(seed)
     if chosen_rows.size:
@@ -219,14 +203,6 @@ def _simulate(
         deviations = program.draws.rows(chosen_rows, seed=seed)
         poses = simulated_poses(program, deviations) if kept is None else kept
         writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
-
-
-def _look_at_points(path: Path, writer: ArchiveWriter) -> None:
-    """Note how often each contact point touches."""
-    with opened(path) as results:
-        found = touching(results)
-    shares = found["touching"].values
-    writer.write_touching(shares[:, 0], shares[:, 1:], found.attrs["realizations"])
 
 
 def summarize(results: xr.DataTree | str | Path) -> Summary:

@@ -1,0 +1,180 @@
+"""Asserts for tests of your own models: all realizations are resolved, archived gaps are true, two runs are the same.
+
+`results` is what `tc.run` or `tc.open_archive` returns, or the path of an archive.
+
+    import tolcontact as tc
+    from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
+
+    def test_my_assembly():
+        results = tc.run("models/ra1.py", samples=200, seed=1)
+        assert_resolved(results)
+        assert_gaps_recompute(results)
+        assert_same_run(results, "expected.nc")
+"""
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.archive import open_archive
+from tolcontact.errors import OptionError
+from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
+
+Results = xr.DataTree | str | Path
+NAMED_REALIZATIONS = 5  # by a message
+MAX_GAPS = 500_000  # that are computed together
+
+
+def assert_resolved(results: Results) -> None:
+    """Assert that every realization has a certificate: its status is `untouched` or `resolved`.
+
+    Raises AssertionError with the number of all other realizations, by status, and the first of each status.
+    """
+    with _opened(results) as tree:
+        status, numbers = _rows(tree)[terms.STATUS.name].values, _numbers(tree)
+    unresolved = ~np.isin(status, terms.CERTIFIED)
+    if unresolved.any():
+        by_status = [f"{_meaning(code)} {_listed(numbers[status == code])}" for code in np.unique(status[unresolved])]
+        raise AssertionError(f"{unresolved.sum()} of {status.size} realizations are not resolved: {', '.join(by_status)}")
+
+
+def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) -> None:
+    """Assert that the archived points, poses and deviations give the least gaps `gap_min` (realization, state, pair) [mm].
+
+    A referee computes the gaps again from the archive alone: n'(x_m - x_r), with x = R p + t, p a nominal contact point of the
+    moving or the reference part, n the nominal normal turned with the reference part; less the deviation of the one-sided
+    locator that a point stands for. The gap of a ball or a shaft beside a wall is their distance, from their sizes and places.
+    Faces of features are displaced in their parts first, and then moved outwards by their heights. The two results may differ
+    by `within` [mm].
+
+    Unfinished realizations are skipped, and so are realizations whose `searched` is 1: their contact points were projected
+    again, and are not archived. (Archives of format 1 do not say which; all their realizations are compared.)
+
+    Raises AssertionError with the largest difference and its place; also if the archive does not hold the poses (or, for
+    one-sided locators, the deviations).
+    """
+    with _opened(results) as tree:
+        rows, numbers = _rows(tree), _numbers(tree)
+        archived, comparable = rows[terms.GAP_MIN.name], _comparable(rows)
+        largest, place = 0.0, ""
+        for number, name in enumerate(archived[terms.PAIR].values):
+            pair = ArchivedPair(tree, number)
+            count = max(1, MAX_GAPS // len(pair.normal))
+            for start in range(0, len(comparable), count):
+                piece = slice(start, start + count)
+                errors = np.abs(_least_gaps(pair, rows, piece) - archived[piece, :, number].values)[comparable[piece]]
+                errors[np.isnan(errors)] = np.inf
+                if errors.max(initial=0.0) > largest:
+                    largest = float(errors.max())
+                    row, state = np.argwhere(errors == largest)[0]
+                    place = (
+                        f'realization {numbers[piece][comparable[piece]][row]}, {terms.STATES[state]}, contact pair "{name}"'
+                    )
+    if largest > within:
+        raise AssertionError(
+            f'"{terms.GAP_MIN.name}" is not the smallest gap of the archived contact points: it differs by {largest:.3g} mm in '
+            f"{place}; {within:.3g} mm are allowed"
+        )
+
+
+def assert_same_run(a: Results, b: Results, *, variables: Sequence[str] | None = None) -> None:
+    """Assert that two runs have the same values in every realization, to the last bit (NaN equals NaN).
+
+    The labels are compared, and all variables of realizations, or the named ones: "measured", "gap_min", ... Attributes,
+    history, solver and displacement fields are not compared.
+
+    Raises AssertionError with the number of variables that differ, and the first realization of the first of them.
+    """
+    names = [variable.name for variable in terms.BY_REALIZATION]
+    if unknown := [name for name in variables or () if name not in names]:
+        raise OptionError(f"no realization has {', '.join(map(repr, unknown))}; expected some of: {', '.join(names)}")
+    with _opened(a) as expected, _opened(b) as actual:
+        for dim in (terms.PART, terms.PAIR, terms.MEASURE):
+            labels = [[str(label) for label in tree.coords[dim].values] for tree in (expected, actual)]
+            if labels[0] != labels[1]:
+                raise AssertionError(f"the labels of {dim} differ: {labels[0]} and {labels[1]}")
+        sizes = [tree.sizes[terms.REALIZATION] for tree in (expected, actual)]
+        if sizes[0] != sizes[1]:
+            raise AssertionError(f"the runs have {sizes[0]} and {sizes[1]} realizations")
+        rows = _rows(expected), _rows(actual)
+        texts = [_difference(name, *rows, _numbers(expected)) for name in names if variables is None or name in variables]
+    differences = [text for text in texts if text]
+    if differences:
+        count = "1 variable" if len(differences) == 1 else f"{len(differences)} variables"
+        raise AssertionError(f"the runs differ in {count}; first in {differences[0]}")
+
+
+@contextlib.contextmanager
+def _opened(results: Results) -> Iterator[xr.DataTree]:
+    """Open results as a tree; close them afterwards if they are given by the name of a file."""
+    if isinstance(results, str | Path):
+        with open_archive(results) as tree:
+            yield tree
+    elif isinstance(results, xr.DataTree):
+        yield results
+    else:
+        raise OptionError(
+            f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
+        )
+
+
+def _rows(tree: xr.DataTree) -> Rows:
+    """Return the variables of realizations that are kept."""
+    groups = [tree.to_dataset(), *(tree.children[name].to_dataset() for name in ("sample",) if name in tree.children)]
+    return {str(name): values for group in groups for name, values in group.data_vars.items()}
+
+
+def _numbers(tree: xr.DataTree) -> np.ndarray:
+    """Return the numbers (realization,) of the realizations."""
+    return np.asarray(tree.to_dataset()[terms.REALIZATION].values)
+
+
+def _meaning(status: int) -> str:
+    meanings = dict(enumerate(terms.STATUS_MEANINGS)) | {terms.UNFINISHED: "unfinished"}
+    return meanings.get(int(status), f"status {status}")
+
+
+def _listed(numbers: np.ndarray) -> str:
+    """Return the number of some realizations, and the first of them."""
+    named = ", ".join(map(str, numbers[:NAMED_REALIZATIONS]))
+    return f"{len(numbers)} (realization {named}{', ...' if len(numbers) > NAMED_REALIZATIONS else ''})"
+
+
+def _comparable(rows: Rows) -> np.ndarray:
+    """Return whether the archive holds the contact points that `gap_min` refers to, (realization,)."""
+    comparable = rows[terms.STATUS.name].values != terms.UNFINISHED
+    if terms.SEARCHED.name in rows:
+        comparable &= rows[terms.SEARCHED.name].values != 1
+    return comparable
+
+
+def _least_gaps(pair: ArchivedPair, rows: Rows, piece: slice) -> np.ndarray:
+    """Return the least gaps (realization, state) [mm] of a piece of the realizations."""
+    try:
+        return pair.gaps(rows, piece).min(axis=-1)
+    except NotKeptError as error:
+        raise AssertionError(
+            f'gaps cannot be computed again without {error}, which was not kept: tc.run(..., keep="all")'
+        ) from error
+
+
+def _difference(name: str, expected: Rows, actual: Rows, numbers: np.ndarray) -> str:
+    """Return a text that tells where two runs differ in a variable; an empty one if they do not."""
+    if name not in expected or name not in actual:
+        return "" if (name in expected) == (name in actual) else f'"{name}", which only one of them keeps'
+    x, y = expected[name].values, actual[name].values
+    if x.shape != y.shape:
+        return f'"{name}", whose shapes are {x.shape} and {y.shape}'
+    differs = (x != y) & ~(np.isnan(x) & np.isnan(y))
+    if not differs.any():
+        return ""
+    row, *places = map(int, np.argwhere(differs)[0])
+    dims, labels = expected[name].dims[1:], expected[name].coords
+    place = [f"{dim} {labels[dim].values[k] if dim in labels else k}" for dim, k in zip(dims, places, strict=True)]
+    count = differs.reshape(len(differs), -1).any(axis=1).sum()
+    where = ", ".join([f"realization {numbers[row]}", *place])
+    return f'"{name}", {where}: {x[row, *places]:.17g} and {y[row, *places]:.17g} ({count} of {len(x)} realizations differ)'

@@ -1,0 +1,238 @@
+"""The referee: gaps computed from an archive alone, in another way than by the simulation.
+
+No run uses it: equations of gaps stand in `mechanics/`, and this is what the assert compares them with. The distance of a ball
+from a wall is the distance of its centre, less its radius. A shaft inside a wall is as far from the wall as its end is from the
+nearest of the wall's tangent planes: the referee tries all directions, and narrows the nearest one down.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy.spatial.transform import Rotation
+
+from tolcontact import vocabulary as terms
+
+DIRECTIONS = 72  # that are tried at first
+NARROWINGS = 60
+GOLDEN = (np.sqrt(5) - 1) / 2
+Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
+
+
+class NotKeptError(LookupError):
+    """An error of an archive that does not keep a variable which gaps are computed from."""
+
+
+def archived_points(contact: Mapping[str, np.ndarray], points: np.ndarray) -> "list[ArchivedPoint]":
+    """Return those of the contact points with numbers `points` (point,) that belong to round faces.
+
+    contact   variables of the archive's group of that name, by name
+    """
+    if terms.POINT_OF_ROUND.name not in contact:
+        return []
+    places = np.flatnonzero(np.isin(contact[terms.POINT_OF_ROUND.name], points))
+    wall, body = (
+        {name: contact[variable.name][places] for name, variable in variables.items()}
+        for variables in (terms.OF_WALL, terms.OF_ROUND)
+    )
+    return [
+        ArchivedPoint(*({name: values[k] for name, values in side.items()} for side in (wall, body)))
+        for k in range(len(places))
+    ]
+
+
+class ArchivedPoint(NamedTuple):
+    """A ball, or the end of a shaft, and a wall; their values by the names of the vocabulary."""
+
+    wall: Mapping[str, Any]
+    body: Mapping[str, Any]
+
+    def gaps(self, R: np.ndarray, t: np.ndarray, of_moving: Any = 0.0, of_reference: Any = 0.0) -> np.ndarray:
+        """Return gaps (...) [mm] with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference part's frame.
+
+        The moving face has grown by `of_moving` (...), the reference face by `of_reference` (...) [mm].
+        """
+        of_body, of_wall = (of_moving, of_reference) if self.body["on_moving"] else (of_reference, of_moving)
+        grown = ArchivedPoint(self.wall, {**self.body, "radius": self.body["radius"] + of_body})
+        return grown._gaps_as_large(R, t) - of_wall
+
+    def _gaps_as_large(self, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Return gaps (...) [mm] at these poses, of faces that have not grown."""
+        if not self.body["on_moving"]:
+            R = R.swapaxes(-1, -2)
+            t = -np.einsum("...ij,...j->...i", R, t)
+        centre, axis = R @ self.body["centre"] + t, R @ self.body["axis"]
+        if terms.SURFACE_KINDS[self.wall["kind"]] == "plane":
+            return self._beside(-self.wall["axis"], centre, axis)
+        if self.body["axis"].any():
+            return self._nearest(lambda e: self.wall["radius"] + self._beside(e, centre, axis), centre.shape[:-1])
+        offset = centre - self.wall["origin"]
+        gap = self._inside(offset) if self.body["is_hollow"] else self._distance(offset)
+        return gap - self.body["radius"]
+
+    def _beside(self, e: np.ndarray, centre: np.ndarray, axis: np.ndarray) -> np.ndarray:
+        """Return the distance from the plane through the wall's point with normal e (..., 3), which points into the wall."""
+        tilt = (e * axis).sum(axis=-1)
+        stretch = np.sqrt(1 - tilt**2)
+        if self.body["cut"].any():
+            slope = axis @ self.body["cut"]
+            centre = centre + ((self.body["centre"] - centre) @ self.body["cut"] / slope)[..., None] * axis
+            stretch = np.sqrt(1 + (tilt / slope) ** 2)
+        return -(e * (centre - self.wall["origin"])).sum(axis=-1) - self.body["radius"] * stretch
+
+    def _nearest(self, gap: Callable[[np.ndarray], np.ndarray], shape: tuple[int, ...]) -> np.ndarray:
+        """Return the least gap (...) of all directions that the wall has."""
+        x, opening = self.body["towards"], self.body["opening"]
+        y = np.cross(self.wall["axis"], x)
+
+        def at(azimuth: np.ndarray) -> np.ndarray:
+            azimuth = azimuth.clip(-opening, opening)[..., None] if opening < np.pi else azimuth[..., None]
+            return gap(np.cos(azimuth) * x + np.sin(azimuth) * y)
+
+        azimuths = np.linspace(-opening, opening, DIRECTIONS + 1)
+        width = azimuths[1] - azimuths[0]
+        best = azimuths[np.argmin([at(np.full(shape, azimuth)) for azimuth in azimuths], axis=0)]
+        low, high = best - width, best + width
+        for _ in range(NARROWINGS):
+            inner, outer = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+            is_inner = at(inner) < at(outer)
+            low, high = np.where(is_inner, low, inner), np.where(is_inner, outer, high)
+        return at((low + high) / 2)
+
+    def _inside(self, offset: np.ndarray) -> np.ndarray:
+        """Return the distance (...) [mm], `offset` (..., 3) from the wall's point, to the nearest tangent of a hollow wall."""
+        if terms.SURFACE_KINDS[self.wall["kind"]] == "sphere":
+            along = offset @ self.body["towards"]
+            across = np.linalg.norm(offset - along[..., None] * self.body["towards"], axis=-1)
+            beyond = np.maximum(np.arctan2(across, along) - self.body["opening"], 0)
+            return self.wall["radius"] - np.hypot(across, along) * np.cos(beyond)
+        along, angle = offset @ self.wall["axis"], self.wall["angle"]
+        base = self.wall["radius"] + along * np.sin(angle)
+        return self._nearest(lambda e: base - np.cos(angle) * (e * offset).sum(axis=-1), offset.shape[:-1])
+
+    def _distance(self, offset: np.ndarray) -> np.ndarray:
+        """Return the distance (...) [mm], `offset` (..., 3) from the wall's point, to its surface; positive outside."""
+        kind, wall = terms.SURFACE_KINDS[self.wall["kind"]], self.wall
+        if kind == "sphere":
+            return np.linalg.norm(offset, axis=-1) - wall["radius"]
+        along = offset @ wall["axis"]
+        across = np.linalg.norm(offset - along[..., None] * wall["axis"], axis=-1)
+        if kind == "cylinder":
+            return across - wall["radius"]
+        if kind == "cone":
+            return across * np.cos(wall["angle"]) - along * np.sin(wall["angle"])
+        return np.hypot(across - wall["radius"], along) - wall["minor"]
+
+
+class ArchivedFaces:
+    """The faces of features, from the groups `contact` and `sample` of an archive, variables by name."""
+
+    def __init__(self, contact: Mapping[str, np.ndarray], sample: Mapping[str, np.ndarray]) -> None:
+        self._contact, self._sample = contact, sample
+
+    def displacement(self, face: int, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return tau (realization, 3) [mm] and rho (realization, 3) [rad] for deviations (realization, contributor)."""
+        twist = deviations @ self._contact[terms.FACE_TWIST.name][face].T
+        return twist[:, :3], twist[:, 3:]
+
+    def height(self, face: int, deviations: np.ndarray) -> np.ndarray:
+        """Return by how much a face has grown outwards (realization,) [mm]; 0 for face -1."""
+        if face < 0:
+            return np.zeros(len(deviations))
+        return deviations @ self._contact[terms.FACE_HEIGHT.name][face]
+
+    def placed(self, face: int, deviations: np.ndarray, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return R and t of a face of a part at R (realization, state, 3, 3), t (realization, state, 3) [mm]."""
+        if face < 0:
+            return R, t
+        tau, rho = self.displacement(face, deviations)
+        turned, centre = Rotation.from_rotvec(rho).as_matrix(), self._contact[terms.FACE_CENTRE.name][face]
+        moved = tau + centre - turned @ centre
+        return R @ turned[:, None], np.einsum("...ij,...j->...i", R, moved[:, None]) + t
+
+    def pushes(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Return how far locators move their parts (realization, locator) [mm]."""
+        pushes = deviations[:, locators].copy()
+        for place, locator in enumerate(locators):
+            face = int(self._sample[terms.FACE_OF_LOCATOR.name][locator]) if terms.FACE_OF_LOCATOR.name in self._sample else -1
+            if face >= 0:
+                tau, rho = self.displacement(face, deviations)
+                arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
+                inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
+                pushes[:, place] += self.height(face, deviations) - (tau + np.cross(rho, arm)) @ inward
+        return pushes
+
+
+class ArchivedPair:
+    """The nominal contact points of a pair, and where the archived poses put them."""
+
+    def __init__(self, tree: xr.DataTree, pair: int) -> None:
+        contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
+        is_own = contact[terms.PAIR_OF_POINT.name] == pair
+        points = (terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL)
+        self.moving_point, self.reference_point, self.normal = (contact[variable.name][is_own] for variable in points)
+        self.moving_part, self.reference_part = (
+            int(contact[variable.name][pair]) for variable in (terms.MOVING_PART, terms.REFERENCE_PART)
+        )
+        self.locators = contact[terms.LOCATOR_OF_POINT.name][is_own]
+        self.round = archived_points(contact, np.flatnonzero(is_own))
+        sample = {str(name): values.values for name, values in tree.children["sample"].to_dataset().data_vars.items()}
+        self.faces = ArchivedFaces(contact, sample)
+        self.moving_face, self.reference_face = (
+            int(contact[variable.name][pair]) if variable.name in contact else -1
+            for variable in (terms.FACE_OF_MOVING, terms.FACE_OF_REFERENCE)
+        )
+        self.facing = contact[terms.FACING.name][is_own] if terms.FACING.name in contact else None
+
+    @property
+    def _needs_deviations(self) -> bool:
+        """Whether deviations matter beside poses: of supports, and of faces that deviate."""
+        return bool((self.locators >= 0).any()) or max(self.moving_face, self.reference_face) >= 0
+
+    def gaps(self, rows: Rows, piece: slice) -> np.ndarray:
+        """Return the gaps (realization, state, point) [mm] of a piece of the realizations.
+
+        Raises NotKeptError, with the name of a variable that they need and the archive does not have.
+        """
+        moving, reference = (_pose(rows, piece, part) for part in (self.moving_part, self.reference_part))
+        deviations = _needed(rows, terms.DEVIATION.name, piece) if self._needs_deviations else np.zeros((1, 0))
+        R_m, t_m = self.faces.placed(self.moving_face, deviations, *moving)
+        R_r, t_r = self.faces.placed(self.reference_face, deviations, *reference)
+        of_moving, of_reference = (self.faces.height(face, deviations) for face in (self.moving_face, self.reference_face))
+        if self.round:
+            turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
+            offset = np.einsum("...ij,...j->...i", turn, t_m - t_r)
+            grown = (of_moving[:, None], of_reference[:, None])
+            return np.stack([point.gaps(turn @ R_m, offset, *grown) for point in self.round], axis=-1)
+        # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
+        back, n = R_r.swapaxes(-1, -2), self.normal
+        offset = np.einsum("...ij,...j->...i", np.broadcast_to(back, R_m.shape), t_m - t_r)
+        from_moving = _products(back @ R_m, n, self.moving_point) + offset @ n.T
+        from_reference, length = (_products(back @ R_r, n, vectors) for vectors in (self.reference_point, n))
+        gaps = (from_moving - from_reference) / np.sqrt(length)
+        if self.facing is not None:
+            gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
+        supports = self.locators >= 0
+        if supports.any():
+            gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]
+        return gaps
+
+
+def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return a . matrix b (..., point) of matrices (..., 3, 3) and vectors (point, 3)."""
+    entries = a[:, :, None] * b[:, None, :]
+    return matrix.reshape(*matrix.shape[:-2], 9) @ entries.reshape(-1, 9).T
+
+
+def _pose(rows: Rows, piece: slice, part: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return R (realization, state, 3, 3) and t (realization, state, 3) [mm]; the identity for the ground, part -1."""
+    if part < 0:
+        return np.eye(3)[None, None], np.zeros((1, 1, 3))
+    return _needed(rows, terms.ROTATION.name, piece)[:, :, part], _needed(rows, terms.TRANSLATION.name, piece)[:, :, part]
+
+
+def _needed(rows: Rows, name: str, piece: slice) -> np.ndarray:
+    if name not in rows:
+        raise NotKeptError(f'"{name}"')
+    return np.asarray(rows[name][piece].values)
