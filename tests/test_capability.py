@@ -11,7 +11,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call, simulate
 from tolcontact.simulation import simulate_blocks
-from tolcontact.statistics import capability, moments
+from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.sample import Sample
 
 PERCENTS = (0.00135, 0.5, 0.99865)
@@ -42,7 +42,7 @@ def truth(distribution, lower, upper):
 
 def estimates(values, lower, upper):
     x = Sample.of(values)
-    shares = [capability.below(x, lower), capability.above(x, upper), capability.outside(x, lower, upper)]
+    shares = [capability.share_below(x, lower), capability.share_above(x, upper), capability.share_outside(x, lower, upper)]
     found = [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
     return dict(zip(("below", "above", "outside", "Pp", "Ppk", "Pp as normal", "Ppk as normal"), found, strict=True))
 
@@ -87,7 +87,7 @@ def test_intervals_cover_the_truth_where_contact_cuts_a_distribution_off():
 def test_places_of_percentiles_are_those_of_order_statistics():
     """The bounds of one percentile alone are those that the binomial distribution says."""
     n = 5000
-    for ranks, p in zip(capability._ranks(n), PERCENTS, strict=True):
+    for ranks, p in zip(capability.percentile_ranks(n), PERCENTS, strict=True):
         low, high = np.quantile(ranks, [0.025, 0.975])
         assert stats.binom.ppf([0.025, 0.975], n, p) == pytest.approx([low - 0.5, high - 0.5], abs=1.0)
 
@@ -107,7 +107,7 @@ def test_constant_measures_have_shares_and_no_capability():
 )
 def test_skewness_and_kurtosis_are_those_of_the_distribution(distribution, skew, kurt):
     x = Sample.of(distribution.ppf(np.random.default_rng(2).random(400_000)))
-    for (value, low, high), expected in ((moments.skewness(x), skew), (moments.kurtosis(x), kurt)):
+    for (value, low, high), expected in ((intervals.skewness(x), skew), (intervals.kurtosis(x), kurt)):
         assert abs(value - expected) < 2 * (high - low)
         assert low < value < high and high - low < 0.6
 
@@ -218,5 +218,5 @@ def test_summaries_are_printed_as_json_and_csv(tmp_path):
 
 def test_what_is_just_on_a_limit_is_inside():
     x = Sample(lambda: [np.array([-1.0, 0.0, 1.0, 1.0])])
-    assert capability.below(x, -1.0).value == 0 and capability.below(x, 0.0).value == 0.25
-    assert capability.above(x, 1.0).value == 0 and capability.above(x, 0.0).value == 0.5
+    assert capability.share_below(x, -1.0).value == 0 and capability.share_below(x, 0.0).value == 0.25
+    assert capability.share_above(x, 1.0).value == 0 and capability.share_above(x, 0.0).value == 0.5

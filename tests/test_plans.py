@@ -9,7 +9,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tolcontact.statistics import intervals
-from tolcontact.statistics.moments import skewness
+from tolcontact.statistics.intervals import skewness
 from tolcontact.statistics.sample import Sample
 from tolcontact.variation.plans import Plan
 from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, PLANS, REPLICATE, SOBOL
@@ -71,7 +71,7 @@ def test_intervals_of_replicates_cover(name):
         found = {
             "mean": intervals.mean(x),
             "6 sigma": intervals.standard_deviation(x, times=6),
-            "share": intervals.share(x.map(lambda piece: piece > 1)),
+            "share": intervals.proportion(x.map(lambda piece: piece > 1)),
             "95 %": intervals.percentile(x, 95),
             "skewness": skewness(x),
         }
@@ -89,7 +89,7 @@ def test_few_replicates_have_the_intervals_of_independent_realizations():
     assert intervals.mean(Sample(lambda: [x], REPLICATE)) == intervals.mean(x)
     assert intervals.mean(Sample(lambda: [x], 1)) == intervals.mean(x)
     nothing = Sample(lambda: [np.zeros(20 * REPLICATE, dtype=bool)], REPLICATE)
-    assert intervals.share(nothing) == intervals.share_of(0, 20 * REPLICATE)
+    assert intervals.proportion(nothing) == intervals.proportion_of(0, 20 * REPLICATE)
 
 
 @pytest.mark.slow
@@ -174,8 +174,8 @@ def test_the_command_has_plans_and_targets(tmp_path):
 def test_replicates_that_hit_alike_have_the_interval_of_independent_realizations():
     """Their spread is nothing, which is no reason to be sure: 4096 coins that come up in turns."""
     coins = np.tile([True, False], 2048)
-    hits = Sample(lambda: [coins], together=256)
+    hits = Sample(lambda: [coins], replicate=256)
     assert hits.map(lambda piece: piece.astype(float)).widening == 0
-    own = intervals.share(hits)
+    own = intervals.proportion(hits)
     expected = stats.binomtest(2048, 4096).proportion_ci(0.95, method="exact")
     assert (own.value, own.lower, own.upper) == pytest.approx((0.5, expected.low, expected.high), abs=1e-9)

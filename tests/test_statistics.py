@@ -10,7 +10,7 @@ from tolcontact import poses as pose
 from tolcontact import vocabulary as terms
 from tolcontact.declaration import movers
 from tolcontact.discretization import discretize
-from tolcontact.statistics import DisplacementFields, intervals, sample
+from tolcontact.statistics import DisplacementFields, intervals
 from tolcontact.statistics.sample import Sample
 
 SAMPLES, REPEATS = 1000, 1000
@@ -27,7 +27,7 @@ TRUTH = {
     "variance": (lambda x, g: intervals.variance(x), 0.340845),
     "6 sigma": (lambda x, g: intervals.standard_deviation(x, times=6), 6 * np.sqrt(0.340845)),
     "95 %": (lambda x, g: intervals.percentile(x, 95), stats.norm.ppf(0.95)),
-    "share": (lambda x, g: intervals.share(x > 1), stats.norm.sf(1)),
+    "share": (lambda x, g: intervals.proportion(x > 1), stats.norm.sf(1)),
     "variance ratio": (lambda x, g: intervals.variance_ratio(x, g), 0.340845),
     "shift": (lambda x, g: intervals.mean(x - g), 0.398942),
 }
@@ -46,13 +46,12 @@ def test_intervals_cover_the_truth_in_95_of_100(name):
 
 
 @pytest.mark.parametrize("ties", [False, True])
-def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ties, monkeypatch):
-    monkeypatch.setattr(sample, "AT_ONCE", 100)
+def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ties):
     rng = np.random.default_rng(4)
     x, y = rng.standard_t(2, size=(2, 5003)) * np.exp(rng.normal(size=(2, 5003)) * 5)
     if ties:
         x = np.where(rng.random(5003) < 0.6, rng.choice([0.0, -1.0, 1e-300, 7.5], 5003), x)
-    pieces = [Sample(lambda values=values: iter(np.array_split(values, 7))) for values in (x, y)]
+    pieces = [Sample(lambda values=values: iter(np.array_split(values, 7)), max_sorted=100) for values in (x, y)]
     ranks = [0, 1, 17, 2500, 2501, 5001, 5002]
     assert (pieces[0].ordered(ranks) == np.sort(x)[ranks]).all()
     for percent in (0.135, 5, 50, 99.865):
@@ -61,7 +60,7 @@ def test_a_sample_that_is_read_in_pieces_gives_the_same_as_one_that_is_sorted(ti
         assert set(bounds) <= {-np.inf, np.inf, *x}
     assert intervals.variance_ratio(*pieces) == pytest.approx(intervals.variance_ratio(x, y), rel=1e-12)
     assert intervals.mean(pieces[0] - pieces[1]) == pytest.approx(intervals.mean(x - y), rel=1e-12)
-    assert np.isnan(Sample(lambda: iter([x, np.array([np.nan])])).ordered(ranks)).all()
+    assert np.isnan(Sample(lambda: iter([x, np.array([np.nan])]), max_sorted=100).ordered(ranks)).all()
 
 
 def test_a_percentile_beyond_the_sample_has_no_bound():
@@ -162,4 +161,4 @@ def test_intervals_are_those_of_scipys_distributions():
         for k in {0, 1, n // 3, n}:
             hits = np.arange(n) < k
             bounds = stats.binomtest(k, n).proportion_ci(0.95, method="exact")
-            assert intervals.share(hits) == pytest.approx((k / n, bounds.low, bounds.high))
+            assert intervals.proportion(hits) == pytest.approx((k / n, bounds.low, bounds.high))

@@ -84,7 +84,7 @@ def opposed_faces(samples: int) -> None:
     for method, points in ((initial, "active at first"), (tc.Method(), "all"), (EXACT, "all")):
         for solver in ("qpoases", "daqp"):
             run, _ = simulate(model("channel"), samples, method=method, solver=solver)
-            infeasible = intervals.share(run["status"] == Status.NOT_CONVERGED)
+            infeasible = intervals.proportion(run["status"] == Status.NOT_CONVERGED)
             resolved = (run["status"] == Status.RESOLVED).mean()
             print(
                 f"| {method.resolution} | {points} | {solver} | {100 * infeasible[0]:.1f} % "

@@ -20,7 +20,7 @@ from tolcontact.method import Method
 from tolcontact.simulation import outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics import intervals, two_samples
-from tolcontact.statistics.capability import outside
+from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
 from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, check_counts, chosen, declared
@@ -188,7 +188,7 @@ class _Engine:
     def estimate(self, measured: np.ndarray) -> Estimate:
         """Of values (n,): 6 sigma, or the share outside, with its interval."""
         sample = Sample.of(measured)
-        return intervals.standard_deviation(sample, times=6) if self._is_spread else outside(sample, *self._limits)
+        return intervals.standard_deviation(sample, times=6) if self._is_spread else share_outside(sample, *self._limits)
 
     def change(self, before: np.ndarray, after: np.ndarray) -> Estimate:
         """From values (n,) to others of the same draws."""

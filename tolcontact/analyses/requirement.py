@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.statistics.capability import by_percentiles, outside
+from tolcontact.statistics.capability import by_percentiles, share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
 from tolcontact.vocabulary import PPK, PPM
@@ -65,4 +65,8 @@ class Requirement:
     def estimate(self, x: np.ndarray) -> Estimate:
         """The share, or the capability, of values (n,), with its 95 % interval."""
         sample = Sample.of(x)
-        return outside(sample, self.lower, self.upper) if self.of == PPM else by_percentiles(sample, self.lower, self.upper)[1]
+        return (
+            share_outside(sample, self.lower, self.upper)
+            if self.of == PPM
+            else by_percentiles(sample, self.lower, self.upper)[1]
+        )

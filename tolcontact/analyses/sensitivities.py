@@ -17,7 +17,7 @@ from tolcontact.errors import OptionError
 from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics import intervals
-from tolcontact.statistics.intervals import NOTHING, Estimate
+from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.workflow.run import Choice, Model, check_counts, program_of
 
 STEP = 0.01  # of a contributor's standard deviation
@@ -81,7 +81,7 @@ def sensitivities(
         "sensitivity": np.stack([_means(slopes[:, :, state]) for state in range(len(terms.STATES))], axis=1),
         "spread": slopes.std(axis=0, ddof=1).transpose(2, 1, 0),
         "by_contact": np.stack(by_contact, axis=1),
-        "changing": [intervals.share(column) for column in changes.T],
+        "changing": [intervals.proportion(column) for column in changes.T],
         "step": STEP * deviation[columns],
         "by_status": statuses,
     }
@@ -163,6 +163,6 @@ def _means(slopes: np.ndarray) -> np.ndarray:
 
     def of(x: np.ndarray) -> Estimate:
         known = x[np.isfinite(x)]
-        return intervals.mean(known) if len(known) > 1 else NOTHING
+        return intervals.mean(known) if len(known) > 1 else UNDEFINED
 
     return np.array([[of(column) for column in measure] for measure in slopes.transpose(2, 1, 0)])

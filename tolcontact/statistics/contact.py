@@ -17,7 +17,7 @@ def carried(rows: xr.Dataset) -> np.ndarray:
     """Return the share of realizations in which each pair carries, (pair, interval)."""
     counts = np.sum([(piece[terms.CARRYING.name].values > 0).sum(axis=0) for piece in pieces(rows)], axis=0)
     total = rows.sizes[terms.REALIZATION]
-    return np.array([intervals.share_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
+    return np.array([intervals.proportion_of(int(k), total) for k in counts]).reshape(-1, len(terms.ESTIMATE))
 
 
 def reactions(rows: xr.Dataset) -> np.ndarray:
@@ -62,7 +62,7 @@ class TouchingShares:
         if not self._realizations:
             return np.full(len(self._counts), np.nan), np.full((len(self._counts), len(terms.BOUNDS)), np.nan), 0
         counts, place = np.unique(self._counts, return_inverse=True)
-        estimates = np.array([intervals.share_of(int(count), self._realizations) for count in counts])
+        estimates = np.array([intervals.proportion_of(int(count), self._realizations) for count in counts])
         estimates = estimates.reshape(-1, len(terms.ESTIMATE))[place]
         return estimates[:, 0], estimates[:, 1:], self._realizations
 

@@ -181,7 +181,7 @@ class _Surface:
         magnitude, estimate = np.full(len(self), np.nan), np.full((3, len(self)), np.nan)
         if n > 1:
             second, fourth = (np.maximum(moment, 0) / n for moment in (sums.moments[0], sums.moments[2]))
-            magnitude, estimate = sums.magnitude, np.array(intervals.of_moments(n, second, fourth))
+            magnitude, estimate = sums.magnitude, np.array(intervals.variance_from_moments(n, second, fourth))
         of_magnitude, lower, upper = 6 * np.sqrt(estimate)
         mean = np.column_stack([self._v @ sums.mean.T, magnitude])
         return mean, np.column_stack([6 * sigma, of_magnitude]), np.column_stack([lower, upper])

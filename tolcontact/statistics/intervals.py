@@ -5,7 +5,7 @@ normal distribution: contact cuts distributions off.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,11 +28,11 @@ class Estimate(NamedTuple):
     upper: float
 
 
-NOTHING = Estimate(math.nan, math.nan, math.nan)
+UNDEFINED = Estimate(math.nan, math.nan, math.nan)
 
 
 def mean(x: np.ndarray | Sample) -> Estimate:
-    """Mean, Student's t interval."""
+    """Return the mean with Student's t interval."""
     x = Sample.of(x)
     deviation = np.sqrt(_unbiased(x))
     half = float(student(x.count - 1) * deviation / np.sqrt(x.count)) * x.widening
@@ -40,23 +40,50 @@ def mean(x: np.ndarray | Sample) -> Estimate:
 
 
 def student(freedom: float) -> float:
-    """How many standard errors a 95 % interval reaches to either side: Student's t."""
+    """Return the half width of a 95 % interval in standard errors: Student's t for `freedom` degrees of freedom."""
     return float(special.stdtrit(freedom, _UPPER))
 
 
-def by_influence(estimate: float, squares: float, count: int) -> Estimate:
-    """An estimate whose influence function, what each of `count` realizations adds to it times `count`, has a sum of `squares`.
+def from_influence(estimate: float, squares: float, count: int) -> Estimate:
+    """Return an estimate whose influence function over `count` realizations has the sum of squares `squares`.
 
-    See Serfling, Approximation Theorems of Mathematical Statistics (1980), chapter 6.
+    The influence of a realization is its contribution to the estimate times `count`. See Serfling, Approximation Theorems of
+    Mathematical Statistics (1980), chapter 6.
     """
     half = student(count - 1) * math.sqrt(squares / count / (count - 1))
     return Estimate(float(estimate), float(estimate - half), float(estimate + half))
 
 
-def variance(x: np.ndarray | Sample) -> Estimate:
-    """Variance; Bonett's interval (2006), on the log scale with the standard error that the fourth moment gives."""
+def from_standardized_influence(x: Sample, estimate: float, influence: Callable[[np.ndarray], np.ndarray]) -> Estimate:
+    """Return an estimate whose influence function is given as a function of the standardized values."""
+    scale = np.sqrt(x.moments[0])
+    influences = x.map(lambda piece: influence((piece - x.mean) / scale))
+    squares = sum(float((piece**2).sum()) for piece in influences.pieces())
+    return from_influence(estimate, squares * influences.widening**2, x.count)
+
+
+def skewness(x: np.ndarray | Sample) -> Estimate:
+    """Return the third central moment over the cube of the standard deviation; 0 for a symmetric distribution."""
     x = Sample.of(x)
-    estimate, lower, upper = (float(value) for value in of_moments(x.count, *x.moments))
+    if is_constant(x):
+        return UNDEFINED
+    skew, _ = x.standardized_moments
+    return from_standardized_influence(x, skew, lambda z: z**3 - 3 * z - skew - 1.5 * skew * (z**2 - 1))
+
+
+def kurtosis(x: np.ndarray | Sample) -> Estimate:
+    """Return the fourth central moment over the square of the variance; 3 for a normal distribution."""
+    x = Sample.of(x)
+    if is_constant(x):
+        return UNDEFINED
+    skew, kurt = x.standardized_moments
+    return from_standardized_influence(x, kurt, lambda z: z**4 - kurt - 4 * skew * z - 2 * kurt * (z**2 - 1))
+
+
+def variance(x: np.ndarray | Sample) -> Estimate:
+    """Return the variance with Bonett's interval (2006): on the log scale, standard error from the fourth moment."""
+    x = Sample.of(x)
+    estimate, lower, upper = (float(value) for value in variance_from_moments(x.count, *x.moments))
     widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
     if widening == 1.0 or not estimate > 0:
         return Estimate(estimate, lower, upper)
@@ -64,77 +91,79 @@ def variance(x: np.ndarray | Sample) -> Estimate:
 
 
 def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimate:
-    """`times` the standard deviation: 6 gives 6 sigma. Interval from that of the variance."""
+    """Return `times` the standard deviation (6 gives 6 sigma), with the interval of the variance."""
     return root(variance(x), times=times)
 
 
 def root(variance: Estimate, *, times: float = 1.0) -> Estimate:
-    """`times` the root of a variance."""
+    """Return `times` the root of a variance."""
     estimate, lower, upper = np.sqrt(variance)
     return Estimate(float(times * estimate), float(times * lower), float(times * upper))
 
 
 def percentiles(x: np.ndarray | Sample, percents: Sequence[float]) -> list[Estimate]:
-    """Percentiles; the intervals run between order statistics (binomial, distribution-free).
+    """Return percentiles, whose intervals run between order statistics (binomial, distribution-free).
 
     A bound is infinite if the sample is too small to have one.
     """
     x = Sample.of(x)
-    ranks = [_ranks(x.count, percent / 100) for percent in percents]
-    values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
-    widenings = [_below(x, own).widening for own in values[:, 2]]
+    ranks = [_quantile_ranks(x.count, percent / 100) for percent in percents]
+    values = _values_at(x, ranks)
+    widenings = [x.map(lambda piece, v=value: (piece <= v).astype(float)).widening for value in values[:, 2]]  # type: ignore[misc]
     if any(widening != 1.0 for widening in widenings):
-        ranks = [_spread(group, widening) for group, widening in zip(ranks, widenings, strict=True)]
-        values = x.ordered([min(max(rank, 0), x.count - 1) for group in ranks for rank in group[:4]]).reshape(-1, 4)
-    found = []
-    for (below, above, _, _, share), (low, high, one, next_) in zip(ranks, values, strict=True):
-        lower, upper = low if below >= 0 else -np.inf, high if above < x.count else np.inf
-        # What lies between two order statistics may be beyond a bound, in small samples.
-        found.append(Estimate(float(np.clip(one + (next_ - one) * share, lower, upper)), float(lower), float(upper)))
-    return found
+        ranks = [quantile.widened(widening) for quantile, widening in zip(ranks, widenings, strict=True)]
+        values = _values_at(x, ranks)
+    estimates = []
+    for quantile, (low, high, floor, ceiling) in zip(ranks, values, strict=True):
+        lower = low if quantile.lower >= 0 else -np.inf
+        upper = high if quantile.upper < x.count else np.inf
+        # In small samples the interpolated value may lie beyond a bound.
+        value = np.clip(floor + (ceiling - floor) * quantile.fraction, lower, upper)
+        estimates.append(Estimate(float(value), float(lower), float(upper)))
+    return estimates
 
 
 def percentile(x: np.ndarray | Sample, percent: float) -> Estimate:
-    """One of `percentiles`."""
+    """Return one of `percentiles`."""
     return percentiles(x, [percent])[0]
 
 
-def share(hits: np.ndarray | Sample) -> Estimate:
-    """Share of True in a sample of booleans, exact (Clopper-Pearson) interval."""
+def proportion(hits: np.ndarray | Sample) -> Estimate:
+    """Return the share of True in a sample of booleans with the exact (Clopper-Pearson) interval."""
     hits = Sample.of(hits)
     widening = hits.map(lambda piece: piece.astype(float)).widening
     k, n = sum(int(piece.sum()) for piece in hits.pieces()), hits.count
-    return share_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else share_of(k, n)
+    return proportion_of(k / widening**2, n / widening**2) if 0 < k < n and widening > 0 else proportion_of(k, n)
 
 
-def share_of(k: float, n: float) -> Estimate:
-    """`share` of `k` hits among `n`."""
+def proportion_of(k: float, n: float) -> Estimate:
+    """Return the share of `k` hits among `n` trials with the exact (Clopper-Pearson) interval."""
     lower = special.betaincinv(k, n - k + 1, _LOWER) if k > 0 else 0.0
     upper = special.betaincinv(k + 1, n - k, _UPPER) if k < n else 1.0
     return Estimate(k / n, float(lower), float(upper))
 
 
 def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> Estimate:
-    """Variance of `after` over variance of `before`, from the same realizations (paired, on the log scale)."""
+    """Return the variance of `after` over that of `before`, from the same realizations (paired, on the log scale)."""
     after, before = Sample.of(after), Sample.of(before)
-    ours, theirs = after.moments[0], before.moments[0]
+    variance_after, variance_before = after.moments[0], before.moments[0]
     if is_constant(after) or is_constant(before):
-        return NOTHING
-    # What each realization adds to the logarithm of the ratio; the sum of all is zero.
-    pairs = zip(after.pieces(), before.pieces(), strict=True)
-    influence2 = sum((((a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs) ** 2).sum() for a, b in pairs)
+        return UNDEFINED
+    # The influence of each realization on the logarithm of the ratio; their sum is zero.
+    influence = Sample(lambda: (
+        (a - after.mean) ** 2 / variance_after - (b - before.mean) ** 2 / variance_before
+        for a, b in zip(after.pieces(), before.pieces(), strict=True)
+    ), after.replicate)  # fmt: skip
+    squares = sum((piece**2).sum() for piece in influence.pieces())
     # The correction for small samples is Bonett's for one variance.
     n = after.count
-    together = Sample(lambda: (
-        (a - after.mean) ** 2 / ours - (b - before.mean) ** 2 / theirs
-        for a, b in zip(after.pieces(), before.pieces(), strict=True)
-    ), after.together)  # fmt: skip
-    factor = np.exp(together.widening * _Z * n / (n - _Z) * np.sqrt((influence2 / n + 3 / n) / (n - 1)))
-    return Estimate(ours / theirs, float(ours / theirs / factor), float(ours / theirs * factor))
+    factor = np.exp(influence.widening * _Z * n / (n - _Z) * np.sqrt((squares / n + 3 / n) / (n - 1)))
+    ratio = variance_after / variance_before
+    return Estimate(ratio, float(ratio / factor), float(ratio * factor))
 
 
-def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`variance` of samples of which only the second and fourth central moment are known, of any shape."""
+def variance_from_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return `variance` from the second and the fourth central moment of samples, arrays of any shape."""
     second, fourth = np.asarray(second), np.asarray(fourth)
     with np.errstate(invalid="ignore", divide="ignore"):
         kurtosis = np.where(second > 0, fourth / second**2, 1.0)
@@ -146,7 +175,7 @@ def of_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.nda
 
 
 def is_constant(x: Sample) -> bool:
-    """Whether what spread there is may be rounding."""
+    """Return whether the spread of a sample may be mere rounding."""
     return not x.moments[0] > (8 * np.finfo(float).eps * x.mean) ** 2
 
 
@@ -154,33 +183,38 @@ def _unbiased(x: Sample) -> float:
     return x.moments[0] * x.count / (x.count - 1)
 
 
-def _ranks(n: int, p: float) -> tuple[int, int, int, int, float]:
-    """Ranks, from 0, of the interval's bounds for the quantile `p`, and of the values that it lies between; and how far."""
-    lower, upper = _binomial_quantile(_LOWER, n, p) - 1, _binomial_quantile(_UPPER, n, p)
+class _QuantileRanks(NamedTuple):
+    """Ranks, counted from 0: the bounds of a quantile's interval, and the two values that the quantile lies between."""
+
+    lower: int
+    upper: int
+    floor: int
+    ceiling: int
+    fraction: float  # place of the quantile between the two values
+
+    def widened(self, widening: float) -> "_QuantileRanks":
+        """Return the ranks with the bounds moved away from the quantile by the factor `widening`."""
+        place = self.floor + self.fraction
+        return self._replace(
+            lower=int(np.floor(place - widening * (place - self.lower))),
+            upper=int(np.ceil(place + widening * (self.upper - place))),
+        )
+
+
+def _quantile_ranks(n: int, p: float) -> _QuantileRanks:
+    """Return the ranks for the quantile `p` of `n` values."""
     place = (n - 1) * p
-    one = int(np.floor(place))
-    return lower, upper, one, min(one + 1, n - 1), place - one
+    floor = int(np.floor(place))
+    bounds = _binomial_quantile(_LOWER, n, p) - 1, _binomial_quantile(_UPPER, n, p)
+    return _QuantileRanks(*bounds, floor, min(floor + 1, n - 1), place - floor)
 
 
-def _below(x: Sample, value: float) -> Sample:
-    """1 for each number that is not above a value, 0 for the others."""
-    return x.map(lambda piece: (piece <= value).astype(float))
-
-
-def _spread(ranks: tuple[int, int, int, int, float], widening: float) -> tuple[int, int, int, int, float]:
-    """Ranks with the interval's bounds nearer, or farther."""
-    lower, upper, one, next_, share = ranks
-    place = one + share
-    return (
-        int(np.floor(place - widening * (place - lower))),
-        int(np.ceil(place + widening * (upper - place))),
-        one,
-        next_,
-        share,
-    )
+def _values_at(x: Sample, ranks: Sequence[_QuantileRanks]) -> np.ndarray:
+    """Return the values (quantile, 4) at ranks, with ranks beyond the sample replaced by its extremes."""
+    return x.ordered([min(max(rank, 0), x.count - 1) for quantile in ranks for rank in quantile[:4]]).reshape(-1, 4)
 
 
 def _binomial_quantile(q: float, n: int, p: float) -> int:
-    """The least number of hits among n, each of probability p, that is not exceeded with probability `q`."""
+    """Return the least number of hits among n trials of probability p that is not exceeded with probability `q`."""
     k = max(int(np.ceil(special.bdtrik(q, n, p))), 0)
     return k - 1 if k > 0 and special.bdtr(k - 1, n, p) >= q else k

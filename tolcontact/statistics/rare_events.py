@@ -37,11 +37,11 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     probability, levels = _descent(score, dimensions, max(int(PILOT * samples / FORESEEN), LEAST), rng)
     left = int((1 - PILOT) * samples)
     if levels == 0 or probability == 0:
-        return intervals.share(score(rng.standard_normal((left, dimensions))) > 0)
+        return intervals.proportion(score(rng.standard_normal((left, dimensions))) > 0)
     count = max(left // REPLICATES // (1 + levels), LEAST)
     every = np.array([_descent(score, dimensions, count, rng)[0] for _ in range(REPLICATES)])
     if not every.any():
-        return intervals.share_of(0, REPLICATES * count)
+        return intervals.proportion_of(0, REPLICATES * count)
     # Estimates are skewed to the right: the interval of their mean is that of its logarithm.
     mean, error = every.mean(), every.std(ddof=1) / np.sqrt(REPLICATES)
     reach = np.exp(intervals.student(REPLICATES - 1) * error / mean)

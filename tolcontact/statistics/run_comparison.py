@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals, two_samples
-from tolcontact.statistics.intervals import NOTHING, Estimate
+from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
 from tolcontact.statistics.summary import summarize
 
@@ -151,12 +151,12 @@ class _Change:
     def _of(self, measure: str, state: str) -> list[Estimate]:
         after, before = self._samples(measure, state)
         if not (np.isfinite(after.mean) and np.isfinite(before.mean)):
-            return [NOTHING] * len(terms.CHANGES_OF_RUNS)
+            return [UNDEFINED] * len(terms.CHANGES_OF_RUNS)
         hits = [_outside(x, of.sel(measure=measure)) for x, of in zip((after, before), self.summaries, strict=True)]
         return [
             two_samples.shift(after, before, paired=self.paired),
             intervals.root(two_samples.variance_ratio(after, before, paired=self.paired)),
-            NOTHING if hits[0] is None or hits[1] is None else two_samples.share_shift(hits[0], hits[1], paired=self.paired),
+            UNDEFINED if hits[0] is None or hits[1] is None else two_samples.share_shift(hits[0], hits[1], paired=self.paired),
         ]
 
     def _furthest(self, measure: str, state: str) -> float:

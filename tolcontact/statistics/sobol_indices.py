@@ -21,7 +21,7 @@ Each is a ratio of means over independent base realizations, so its interval is 
 
 import numpy as np
 
-from tolcontact.statistics.intervals import NOTHING, Estimate, by_influence
+from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influence
 
 CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
 
@@ -32,7 +32,7 @@ def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
     A, B, mixed = f[:, 0] - middle, f[:, 1] - middle, f[:, 2:] - middle
     v = (A**2 + B**2) / 2
     if not np.isfinite(f).all() or not v.mean() > CONSTANT * middle**2:
-        return [NOTHING] * mixed.shape[1], [NOTHING] * mixed.shape[1]
+        return [UNDEFINED] * mixed.shape[1], [UNDEFINED] * mixed.shape[1]
     first, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
     return [ratio(u, v) for u in first.T], [ratio(u, v) for u in total.T]
 
@@ -41,7 +41,7 @@ def shapley_effects(f: np.ndarray, places: np.ndarray) -> list[Estimate]:
     """Of each group, of values f (n, 1 + group) with ever more groups of A, the last one A; places (n, group) in its order."""
     left = (f[:, -1:] - f) ** 2
     if not np.isfinite(f).all() or not left[:, 0].mean() > CONSTANT * f.mean() ** 2:
-        return [NOTHING] * places.shape[1]
+        return [UNDEFINED] * places.shape[1]
     freed = np.take_along_axis(left[:, :-1] - left[:, 1:], places, axis=1)
     return [ratio(u, left[:, 0]) for u in freed.T]
 
@@ -51,7 +51,7 @@ def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
     middle, off = f.mean(), f - linear
     f = f - middle
     if not np.isfinite(f).all() or not (f**2).mean() > CONSTANT * middle**2:
-        return NOTHING
+        return UNDEFINED
     return ratio((off - off.mean()) ** 2, f**2)
 
 
@@ -59,4 +59,4 @@ def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
     """Mean of u over mean of v, of the same realizations, with the interval of its influence function."""
     below = v.mean()
     estimate = u.mean() / below
-    return by_influence(estimate, (((u - estimate * v) / below) ** 2).sum(), len(u))
+    return from_influence(estimate, (((u - estimate * v) / below) ** 2).sum(), len(u))

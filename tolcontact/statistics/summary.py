@@ -11,7 +11,6 @@ from tolcontact.readable import FORMATTERS, HTML
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import capability, contact, intervals
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.moments import kurtosis, skewness
 from tolcontact.statistics.sample import Sample, measured_sample
 
 LEAST = 2
@@ -65,11 +64,11 @@ def summarize(results: xr.DataTree) -> Summary:
         {
             "statistic_value": ((terms.MEASURE, terms.STATE, terms.STATISTIC, terms.INTERVAL), values),
             "change": ((terms.MEASURE, terms.CHANGE_OF, terms.INTERVAL), changes),
-            "touched": ((terms.INTERVAL,), np.array(intervals.share_of(total - by_status[terms.Status.UNTOUCHED], total))),
+            "touched": ((terms.INTERVAL,), np.array(intervals.proportion_of(total - by_status[terms.Status.UNTOUCHED], total))),
             "by_status": ((terms.STATUS_MEANING,), by_status),
             "not_assemblable": (
                 (terms.INTERVAL,),
-                np.array(intervals.share_of(by_status[terms.Status.NOT_ASSEMBLABLE], total)),
+                np.array(intervals.proportion_of(by_status[terms.Status.NOT_ASSEMBLABLE], total)),
             ),
             "conflicts": ((terms.PAIR,), np.sum([in_conflict(piece).sum(axis=0) for piece in pieces(rows)], axis=0)),
             "carried": ((terms.PAIR, terms.INTERVAL), contact.carried(rows)),
@@ -80,7 +79,7 @@ def summarize(results: xr.DataTree) -> Summary:
             ),
             "together": (
                 (terms.COMBINATION, terms.INTERVAL),
-                np.array([intervals.share_of(n, total) for _, n in together]).reshape(-1, len(terms.ESTIMATE)),
+                np.array([intervals.proportion_of(n, total) for _, n in together]).reshape(-1, len(terms.ESTIMATE)),
             ),
             "iterations": ((terms.OF_ITERATIONS,), _iterations(rows)),
             "penetration": ((terms.STATE,), _penetration(rows), {"units": "mm"}),
@@ -209,7 +208,7 @@ def _begun_for(results: xr.DataTree, done: int) -> int:
 def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
     variance = intervals.variance(x)
     spreads = [intervals.root(variance), intervals.root(variance, times=6), variance]
-    shape = [skewness(x), kurtosis(x)]
+    shape = [intervals.skewness(x), intervals.kurtosis(x)]
     return [
         intervals.mean(x),
         *spreads,
@@ -222,8 +221,8 @@ def _of_sample(x: Sample, rows: xr.Dataset, measure: int) -> list[Estimate]:
 def _within(x: Sample, lower: float, upper: float) -> list[Estimate]:
     """How a sample stays within limits; nothing if it is not of numbers."""
     if not np.isfinite(x.mean):
-        return [intervals.NOTHING] * len((*terms.SHARES, *terms.CAPABILITY))
-    shares = [capability.below(x, lower), capability.above(x, upper), capability.outside(x, lower, upper)]
+        return [intervals.UNDEFINED] * len((*terms.SHARES, *terms.CAPABILITY))
+    shares = [capability.share_below(x, lower), capability.share_above(x, upper), capability.share_outside(x, lower, upper)]
     return [*shares, *capability.by_percentiles(x, lower, upper), *capability.as_normal(x, lower, upper)]
 
 

@@ -5,7 +5,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.discretization import discretize
-from tolcontact.statistics.intervals import share_of
+from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
 from tolcontact.variation.measured_population import measured_population
 from tolcontact.workflow.run import Model, check_counts, declared
@@ -27,7 +27,9 @@ def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> x
         terms.ZONE_FEATURE: [zone.feature for zone in zones],
         terms.ZONE_TOLERANCE: [zone.tolerance for zone in zones],
         terms.STATED_SHARE: [zone.stated for zone in zones],
-        terms.SHARE_INSIDE: np.array([share_of(zone.inside, zone.drawn) for zone in zones]).reshape(-1, len(terms.ESTIMATE)),
+        terms.SHARE_INSIDE: np.array([proportion_of(zone.inside, zone.drawn) for zone in zones]).reshape(
+            -1, len(terms.ESTIMATE)
+        ),
         terms.NEEDED_WIDTH: [zone.needed for zone in zones],
     }
     found = xr.Dataset(
