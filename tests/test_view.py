@@ -11,7 +11,7 @@ from tests import cases
 from tests.helpers import call
 from tests.test_report import browser, data_of, needs_browser, open_page, picture  # noqa: F401 (fixtures)
 from tolcontact.discretization import discretize
-from tolcontact.geometry import seen
+from tolcontact.geometry import preview
 from tolcontact.geometry.faces import patch, triangles
 from tolcontact.geometry.shapes import shape
 from tolcontact.report import write_view
@@ -40,9 +40,9 @@ def _wedge():
 @pytest.mark.parametrize("name", GEOMETRIES)
 def test_words_choose_the_face_that_they_are_of(name):
     part = tc.Assembly("a").part("part", GEOMETRIES[name](), at=(3, -4, 5), rotation=(0.1, 0.2, -0.3))
-    found = seen(part)
-    assert len(found.words) == len(found.described) >= 4
-    for face, words in zip(found.described, found.words, strict=True):
+    found = preview(part)
+    assert len(found.snippets) == len(found.descriptions) >= 4
+    for face, words in zip(found.descriptions, found.snippets, strict=True):
         own = np.flatnonzero(found.face_of == face.number - 1)
         if "tc.Inside" in words:  # boxes cut: what they leave has the same area
             mesh = shape(part.geometry).mesh
@@ -55,8 +55,8 @@ def test_words_choose_the_face_that_they_are_of(name):
 def test_words_of_step_files_and_boxes_choose_nothing_else():
     for geometry in (GEOMETRIES["STEP"](), tc.Box(10, 20, 30)):
         part = tc.Assembly("a").part("part", geometry)
-        found = seen(part)
-        for face, words in zip(found.described, found.words, strict=True):
+        found = preview(part)
+        for face, words in zip(found.descriptions, found.snippets, strict=True):
             assert chosen(part, words).tolist() == np.flatnonzero(found.face_of == face.number - 1).tolist()
 
 

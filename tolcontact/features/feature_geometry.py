@@ -11,7 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
-from tolcontact.geometry.brep_face import FIT
+from tolcontact.geometry.brep_face import FIT_TOLERANCE
 
 Probes = tuple[np.ndarray, np.ndarray]  # places (point, 3) [mm] and unit vectors (point, entry, 3) along which to measure there
 
@@ -192,7 +192,9 @@ class GeneralFeature(FeatureGeometry):
     def in_words(self) -> str:
         if self.nearest is None:
             return "a general surface"
-        deviation = f"the nearest {self.nearest.kind} is off by up to {self.nearest.residual:.2g} mm, more than {FIT:g}"
+        deviation = (
+            f"the nearest {self.nearest.kind} is off by up to {self.nearest.residual:.2g} mm, more than {FIT_TOLERANCE:g}"
+        )
         return f"a general surface ({deviation})"
 
 

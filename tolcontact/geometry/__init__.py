@@ -2,19 +2,19 @@
 
 from tolcontact.geometry.analytic_surfaces import surface_arrays, surfaces_of
 from tolcontact.geometry.brep_face import FaceInFile
-from tolcontact.geometry.part_preview import SeenPart, seen
+from tolcontact.geometry.part_preview import PartPreview, preview
 from tolcontact.geometry.step_listing import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.geometry.surface_recognition import known_surfaces, with_known_surfaces
 
 __all__ = [
     "BodyInFile",
     "FaceInFile",
-    "SeenPart",
+    "PartPreview",
     "bodies_in",
     "faces_in",
     "known_surfaces",
     "parts_from",
-    "seen",
+    "preview",
     "surface_arrays",
     "surfaces_of",
     "with_known_surfaces",

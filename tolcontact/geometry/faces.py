@@ -12,7 +12,7 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.vectors import Vector
 from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.brep_face import FaceInFile, described, numbered
+from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
@@ -133,8 +133,8 @@ def _by_function(face: Face, mesh: trimesh.Trimesh, selection: Picked) -> np.nda
 
 
 def _by_kind(face: Face, mesh: trimesh.Trimesh, selection: Cylinder | Largest) -> np.ndarray:
-    number_of, _ = numbered(mesh)
-    faces = described(mesh)
+    number_of, _ = number_faces(mesh)
+    faces = describe_faces(mesh)
     if isinstance(selection, Cylinder):
         hits = [candidate for candidate in faces if _is_cylinder(candidate, selection)]
     else:

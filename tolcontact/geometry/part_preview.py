@@ -1,4 +1,4 @@
-"""A part as it is seen before anything is computed: its shape in its place, and its faces with the words that choose them."""
+"""Previews of parts before anything is computed: shapes in their places, and code that chooses each face."""
 
 from typing import NamedTuple
 
@@ -9,32 +9,32 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Part
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.brep_face import FaceInFile, described, numbered
+from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces
 from tolcontact.geometry.files import BREP
 from tolcontact.geometry.shapes import shape
 
-SLIGHT = 1e-6  # of a direction, and of a part's size
+MARGIN = 1e-6  # of a direction, and of a part's size
 
 
-class SeenPart(NamedTuple):
-    """Triangles in the nominal assembly: vertices (vertex, 3) [mm], faces (triangle, 3); and what they belong to.
+class PartPreview(NamedTuple):
+    """The triangles of a part in the nominal assembly: vertices (vertex, 3) [mm] and faces (triangle, 3).
 
-    rotation   (3, 3) of the part
-    face_of    (triangle,) numbers of faces from 0: of a STEP file's, or smooth pieces
-    described  the faces, and
-    words      how a script chooses each
+    rotation      (3, 3) of the part
+    face_of       (triangle,) numbers of faces from 0: of the B-rep faces of a STEP file, or of smooth pieces
+    descriptions  of the faces
+    snippets      Python code that chooses each face
     """
 
     rotation: np.ndarray
     vertices: np.ndarray
     faces: np.ndarray
     face_of: np.ndarray
-    described: tuple[FaceInFile, ...]
-    words: tuple[str, ...]
+    descriptions: tuple[FaceInFile, ...]
+    snippets: tuple[str, ...]
 
 
-def seen(part: Part) -> SeenPart | None:
-    """A part; None if its shape or its place is wrong."""
+def preview(part: Part) -> PartPreview | None:
+    """Return the preview of a part, None if its shape or its place is wrong."""
     if any(part.faults()):
         return None
     try:
@@ -43,31 +43,32 @@ def seen(part: Part) -> SeenPart | None:
         return None
     R = Rotation.from_rotvec(part.rotation).as_matrix()
     vertices = np.asarray(mesh.vertices) @ R.T + np.array(part.at)
-    face_of, _ = numbered(mesh)
-    faces = described(mesh)
-    return SeenPart(R, vertices, np.asarray(mesh.faces), face_of, faces, tuple(_words(mesh, face_of, face) for face in faces))
+    face_of, _ = number_faces(mesh)
+    faces = describe_faces(mesh)
+    snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
+    return PartPreview(R, vertices, np.asarray(mesh.faces), face_of, faces, snippets)
 
 
-def _words(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:
+def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:
     if BREP in mesh.face_attributes:
         return f"face(tc.Brep({_vector(np.array(face.point))}))"
     if face.kind == "cylinder" and face.radius is not None:
         return f"face(tc.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
-    own = face_of == face.number - 1
+    mask = face_of == face.number - 1
     if face.kind == "plane" and face.direction is not None:
-        along = np.array(face.direction)
-        axis = int(np.argmax(np.abs(along)))
-        is_named = abs(along[axis]) > 1 - SLIGHT
-        way = f'"{"+-"[int(along[axis] < 0)]}{"xyz"[axis]}"' if is_named else f"tc.Facing({_vector(along)})"
-        alike = np.asarray(mesh.face_normals) @ along >= np.cos(FACE_ANGLE)
-        return f"face({way})" if (alike == own).all() else f"face({way}, {_inside(mesh, own)})"
-    return f"face({_inside(mesh, own)})"
+        normal = np.array(face.direction)
+        axis = int(np.argmax(np.abs(normal)))
+        is_axis = abs(normal[axis]) > 1 - MARGIN
+        direction = f'"{"+-"[int(normal[axis] < 0)]}{"xyz"[axis]}"' if is_axis else f"tc.Facing({_vector(normal)})"
+        is_facing = np.asarray(mesh.face_normals) @ normal >= np.cos(FACE_ANGLE)
+        return f"face({direction})" if (is_facing == mask).all() else f"face({direction}, {_box(mesh, mask)})"
+    return f"face({_box(mesh, mask)})"
 
 
-def _inside(mesh: trimesh.Trimesh, own: np.ndarray) -> str:
-    """The box around some triangles (triangle,) of bool, with a little room."""
-    corners, room = np.asarray(mesh.vertices)[mesh.faces[own]].reshape(-1, 3), SLIGHT * mesh.scale
-    return f"tc.Inside({_vector(corners.min(axis=0) - room)}, {_vector(corners.max(axis=0) + room)})"
+def _box(mesh: trimesh.Trimesh, mask: np.ndarray) -> str:
+    """Return code for the box, with a small margin, around the triangles of a mask (triangle,)."""
+    corners, margin = np.asarray(mesh.vertices)[mesh.faces[mask]].reshape(-1, 3), MARGIN * mesh.scale
+    return f"tc.Inside({_vector(corners.min(axis=0) - margin)}, {_vector(corners.max(axis=0) + margin)})"
 
 
 def _vector(x: np.ndarray) -> str:

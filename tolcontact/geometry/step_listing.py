@@ -1,4 +1,4 @@
-"""What a STEP file holds, before anything is declared of it; and all of its bodies as parts. Lengths in mm."""
+"""The content of a STEP file before anything is declared, and all of its bodies as parts. Lengths in mm."""
 
 import re
 from collections.abc import Sequence
@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.vectors import Vector
 from tolcontact.errors import STEERING, GeometryFault, ModelError, OptionError, shown
-from tolcontact.geometry.brep_face import FaceInFile, described, in_words
+from tolcontact.geometry.brep_face import FaceInFile, describe_faces, plain_vector
 from tolcontact.geometry.files import key_of, read_files
-from tolcontact.geometry.files.bodies import SHOWN
+from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
 from tolcontact.readable import Readable
 
@@ -22,13 +22,13 @@ from tolcontact.readable import Readable
 class BodyInFile(Readable):
     """A body of a STEP file.
 
-    number, name   from 1 in the file's order; unlike that of any other body of it
-    path           names of the products that it is in, from the root on
-    lower, upper   corners of the box around it in its place [mm]; None if its triangles cannot be told from others
-    at, rotation   where its own frame stands, as of a Part [mm, rad]
+    number, name   from 1 in the file's order; a name that no other body of the file has
+    path           names of the products that contain the body, from the root on
+    lower, upper   corners of the box around the body in its place [mm]; None if its triangles are unknown
+    at, rotation   place of its own frame, as of a Part [mm, rad]
     faces          number of its B-rep faces
     is_open        whether its faces do not close
-    units          of length in the file, in its words; empty if it states none. All lengths here are in mm
+    units          unit of length in the file, as the file calls it; empty if it states none. All lengths here are in mm
     """
 
     number: int
@@ -43,27 +43,30 @@ class BodyInFile(Readable):
     units: str
 
     def __str__(self) -> str:
-        called = f"{self.number}. {shown(self.name) or 'without a name'}"
+        title = f"{self.number}. {shown(self.name) or 'without a name'}"
         if self.lower is None or self.upper is None:
-            return f"{called}: its faces cannot be told from those of others"
+            return f"{title}: its faces cannot be told from those of others"
         size = " x ".join(f"{up - low:.4g}" for low, up in zip(self.lower, self.upper, strict=True))
-        return f"{called}: {'open, ' if self.is_open else ''}{size} mm, {self.faces} faces"
+        return f"{title}: {'open, ' if self.is_open else ''}{size} mm, {self.faces} faces"
 
 
 def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
-    """The bodies of a STEP file, in its order. Raises OptionError if it cannot be read."""
-    held = _product(path)
-    return tuple(_body(held, number) for number in range(1, len(held.bodies) + 1))
+    """Return the bodies of a STEP file, in its order. Raises OptionError if it cannot be read."""
+    product = _product(path)
+    return tuple(_body(product, number) for number in range(1, len(product.bodies) + 1))
 
 
 def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFile, ...]:
-    """The B-rep faces of a body of a STEP file, of the only one if none is named. Raises OptionError as `bodies_in`."""
-    held = _product(path)
+    """Return the B-rep faces of a body of a STEP file; `body` may be left out if there is only one.
+
+    Raises OptionError if the file cannot be read, or has no such body.
+    """
+    product = _product(path)
     try:
-        mesh = held.part(body)
+        mesh = product.part(body)
     except GeometryFault as fault:
         raise OptionError(str(fault)) from fault
-    return described(mesh)
+    return describe_faces(mesh)
 
 
 def parts_from(
@@ -74,35 +77,34 @@ def parts_from(
     fixed: bool | None = None,
     chord: float | None = None,
 ) -> dict[str, Part]:
-    """Declare the bodies of a STEP file as parts of a model, each in its place: all, or those named. By their names.
+    """Declare bodies of a STEP file as parts of a model, each in its place, and return the parts by their names.
 
-    A part is called like the body in the file, without the signs that no part may have in its name; where names repeat, the
-    second is called "name (2)" and so on. The part's own frame is that of its product, the same for all of its places.
-    `fixed` is as of a Part, `chord` [mm] as of a Mesh.
-    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if the names are one text.
+    All bodies are declared, or those in `names`. A part has the name of its body in the file, without characters that a
+    part's name may not have; where a name repeats, the second body is "name (2)" and so on. The part's own frame is the
+    frame of its product, which is the same in all places of the product. `fixed` is as of a Part, `chord` [mm] as of a Mesh.
+    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if `names` is one text.
     """
     if isinstance(names, str):
         raise TypeError(f"names is {names!r}; expected a list of the names of bodies")
     try:
-        found = bodies_in(path)
+        bodies = bodies_in(path)
     except OptionError as error:
         raise ModelError(model.name, [str(error)]) from error
-    wanted = list(names) if names is not None else [body.name for body in found]
-    known = {body.name: body for body in found}
-    if missing := [name for name in wanted if name not in known]:
-        listed = ", ".join(f'"{body.name}"' for body in found[:SHOWN]) + (", ..." if len(found) > SHOWN else "")
+    by_name = {body.name: body for body in bodies}
+    if missing := [name for name in (() if names is None else names) if name not in by_name]:
+        listed = ", ".join(f'"{body.name}"' for body in bodies[:MAX_LISTED]) + (", ..." if len(bodies) > MAX_LISTED else "")
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
-    chosen = found if names is None else [known[name] for name in wanted]
+    declared = bodies if names is None else [by_name[name] for name in names]
     return {
         name: model.part(name, Mesh(path, body=body.number, chord=chord), at=body.at, rotation=body.rotation, fixed=fixed)
-        for body in chosen
+        for body in declared
         if (name := _part_name(body))
     }
 
 
 def _part_name(body: BodyInFile) -> str:
-    plain = re.sub(r"[/\t\n]", "_", STEERING.sub("_", body.name)).strip()
-    return plain if re.match(r"\w", plain) else f"body {body.number} {plain}".strip()
+    name = re.sub(r"[/\t\n]", "_", STEERING.sub("_", body.name)).strip()
+    return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 
 
 def _product(path: str | Path) -> Product:
@@ -117,10 +119,10 @@ def _product(path: str | Path) -> Product:
     return content.product
 
 
-def _body(held: Product, number: int) -> BodyInFile:
-    body = held.bodies[number - 1]
-    lower, upper = (None if corner is None else in_words(corner) for corner in (body.lower, body.upper))
+def _body(product: Product, number: int) -> BodyInFile:
+    body = product.bodies[number - 1]
+    lower, upper = (None if corner is None else plain_vector(corner) for corner in (body.lower, body.upper))
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
-    faces = len(np.unique(held.brep[body.triangles]))
-    place = in_words(body.place[:3, 3]), in_words(rotation)
-    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open, shown(held.text.units))
+    faces = len(np.unique(product.brep[body.triangles]))
+    place = plain_vector(body.place[:3, 3]), plain_vector(rotation)
+    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open, shown(product.text.units))

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
-from tolcontact.geometry.brep_face import FIT
+from tolcontact.geometry.brep_face import FIT_TOLERANCE
 from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.fitting import fit_surface
@@ -69,7 +69,7 @@ def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, faces: np.ndarr
 
 
 def _round_fit(mesh: trimesh.Trimesh, faces: np.ndarray) -> AnalyticSurface | None:
-    surface = fit_surface(np.asarray(mesh.triangles)[faces], FIT)
+    surface = fit_surface(np.asarray(mesh.triangles)[faces], FIT_TOLERANCE)
     return None if isinstance(surface, Plane) else surface
 
 

@@ -14,7 +14,7 @@ from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import edges
 from tolcontact.geometry.files.step_text import NamedFace, Solid
 
-SHOWN = 12  # bodies that a message lists
+MAX_LISTED = 12  # bodies that a message lists
 SAME = 1e-6  # [mm], and of what lies farther off than 1 mm its share: a surface and what a text says of it differ by less
 
 
@@ -122,8 +122,8 @@ def _told_apart(found: Sequence[Body]) -> Iterator[Body]:
 
 def listed(found: Sequence[Body]) -> str:
     """Some bodies with their numbers, names, sizes and places."""
-    first = "; ".join(f"{number}. {body}" for number, body in enumerate(found[:SHOWN], start=1))
-    return first + (f"; and {len(found) - SHOWN} more" if len(found) > SHOWN else "")
+    first = "; ".join(f"{number}. {body}" for number, body in enumerate(found[:MAX_LISTED], start=1))
+    return first + (f"; and {len(found) - MAX_LISTED} more" if len(found) > MAX_LISTED else "")
 
 
 def _body(

@@ -5,7 +5,7 @@ from typing import Any
 
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal
-from tolcontact.geometry import seen
+from tolcontact.geometry import preview
 from tolcontact.report.annotations import Marks, fixed_points, marks_of_nominal
 from tolcontact.report.html.packed_array import packed
 from tolcontact.report.html.scene import Drawn, drawn_marks
@@ -37,7 +37,7 @@ def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
 
 def _parts(assembly: Assembly, faulty: set[str]) -> Iterator[Drawn]:
     for part in assembly.parts:
-        own = seen(part)
+        own = preview(part)
         if own is None:
             continue
         yield {
@@ -47,5 +47,7 @@ def _parts(assembly: Assembly, faulty: set[str]) -> Iterator[Drawn]:
             "vertices": packed(own.vertices),
             "faces": packed(own.faces, "i4"),
             "faceOfTriangle": packed(own.face_of, "i4"),
-            "described": [{"said": str(face), "words": words} for face, words in zip(own.described, own.words, strict=True)],
+            "described": [
+                {"said": str(face), "words": words} for face, words in zip(own.descriptions, own.snippets, strict=True)
+            ],
         }
