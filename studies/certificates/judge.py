@@ -68,14 +68,14 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
         rows = np.flatnonzero(certified & (run["carrying"].sum(axis=1) > 0))
         for row in rng.permutation(rows)[:LOOKED_AT]:
             for pair in nominal.pairs:
-                if pair.own is not None and pair.reference is not None:
+                if pair.moving_face is not None and pair.reference is not None:
                     sides = faces(pair, R[[row], CORRECTED], t[[row], CORRECTED], run["deviations"][[row]])
                     inside = depth(nominal, pair, sides)
                     limit = (
                         0.01 * nominal.assembly.finest()
                         + pair.facets
-                        + chord_height(pair.own)
-                        + chord_height(pair.surface)
+                        + chord_height(pair.moving_face)
+                        + chord_height(pair.reference_face)
                         + 1e-6 * size
                         + shifted(sides, pair)
                     )
@@ -128,10 +128,10 @@ def depth(nominal: Nominal, pair: ContactPoints, sides: Sides) -> float:
     """How deep points of the moving face, as it has grown, lie in the reference body, below its face [mm]."""
     r = pair.reference
     (R_m, t_m, h_m), (R_r, t_r, h_r) = sides
-    points = trimesh.sample.sample_surface(pair.own.mesh, 2000, seed=1)[0]
-    points = np.vstack([points, pair.own.mesh.vertices])
-    triangle, nearest = pair.own.nearest(points)
-    points = points + (h_m[0] + h_r[0]) * pair.own.normals(triangle, nearest)
+    points = trimesh.sample.sample_surface(pair.moving_face.mesh, 2000, seed=1)[0]
+    points = np.vstack([points, pair.moving_face.mesh.vertices])
+    triangle, nearest = pair.moving_face.nearest(points)
+    points = points + (h_m[0] + h_r[0]) * pair.moving_face.normals(triangle, nearest)
     places = (points @ R_m[0].T + t_m[0] - t_r[0]) @ R_r[0]
     body = nominal.parts[r].body
     V, F = np.array(body.vertices), np.array(body.faces, dtype=np.int64)
@@ -158,7 +158,7 @@ def main() -> None:
             except tc.TolcontactError:
                 total["refused"] += 1
                 break
-            round_ = any(pair.own.curvature > 0 for pair in program.nominal.pairs if pair.own is not None)
+            round_ = any(pair.moving_face.curvature > 0 for pair in program.nominal.pairs if pair.moving_face is not None)
             run = simulate(program, said.samples // 10 if round_ else said.samples)
             runs[solver] = run
             statuses.update((solver, Status(status).name) for status in run["status"])

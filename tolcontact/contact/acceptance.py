@@ -33,7 +33,7 @@ class Doubt:
         self._open = min(INSIDE * size, SHARE * nominal.assembly.finest())
         self._round = {}
         for k in curved_pairs(nominal, group):
-            surface, points = self._group_pairs[k].surface, self._group_pairs[k].P_m
+            surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m
             self._round[k] = (surface.curvature if surface is not None else 0.0, *_ball(points))
         self._balls = [(side.part, *_ball(side.points)) for side in group.sides]
 

@@ -87,7 +87,7 @@ class Candidates:
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
         """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
-        return project(fixed(self._some[k]), self._pairs[k].surface, relative, self._reaches[k])
+        return project(fixed(self._some[k]), self._pairs[k].reference_face, relative, self._reaches[k])
 
     def survey(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]

@@ -117,8 +117,7 @@ file therefore ends as one message that names the file and what to do.
 
 from tolcontact.discretization.discretizing import discretize
 from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
-from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = ["ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "discretize"]

@@ -1,6 +1,5 @@
-"""Where the faces of a contact pair may touch: points of the moving face, and their feet on the reference face."""
+"""Contact points of a pair of faces: points of the moving face, and their feet on the reference face."""
 
-import functools
 import logging
 import math
 import warnings
@@ -8,10 +7,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
-from tolcontact.discretization.nominal import ContactPoints, NominalPart
-from tolcontact.discretization.offsets import Offsets
+from tolcontact.discretization.nominal import ContactPoints, NominalPart, Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import ContactWarning, GeometryFault, designation, shown
@@ -22,11 +21,11 @@ from tolcontact.geometry.overlap import overlap_corners, rim_points
 from tolcontact.geometry.spreading import own_vertices, spread
 from tolcontact.geometry.surface import Surface
 
-DEFAULT_REACH = 0.1
+DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
-MANY = 100_000  # contact points of a pair; more are announced
+MAX_SILENT_POINTS = 100_000  # of a pair; more points are announced with a warning
 SECONDS_PER_POINT = 1e-4
-SAME = 1e-9  # of the part's size: points that are no farther apart are one
+POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
 
 log = logging.getLogger(__name__)
 
@@ -34,112 +33,149 @@ log = logging.getLogger(__name__)
 def contact_points(
     assembly: Assembly, pair: ContactPair, placed: Mapping[Part, NominalPart], meshes: Meshes, features: Features
 ) -> ContactPoints:
-    """The contact points of a declared pair, between the parts as `placed`.
+    """Return the contact points of a declared pair, between the parts as `placed`.
 
     Raises GeometryFault if its faces are nowhere within reach, or point the same way.
     """
     moving, reference = placed[pair.moving.part], placed[pair.reference.part]
-    own = patch(pair.moving, meshes)
+    unplaced = patch(pair.moving, meshes)
+    moving_face = unplaced.placed(*moving.placement)
+    reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
-    target = patch(pair.reference, meshes).placed(*reference.placement)
-    placed_own = own.placed(*moving.placement)
-    deviating = _deviating(pair.moving, moving, meshes, features), _deviating(pair.reference, reference, meshes, features)
-    made = functools.partial(
-        ContactPoints,
-        pair.name,
-        assembly.parts.index(moving.part),
-        assembly.parts.index(reference.part),
-        surface=target,
-        own=placed_own,
-        facets=facet_error(placed_own, target, reach),
+    deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
+    balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) else []
+    if balls_and_shafts:
+        P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
+    else:
+        P_m = _candidates(assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach)
+        P_m, P_r, n_r = _touching(pair, P_m, moving_face, reference_face, reach)
+    points = ContactPoints(
+        name=pair.name,
+        moving=assembly.parts.index(moving.part),
+        reference=assembly.parts.index(reference.part),
+        P_m=P_m,
+        P_r=P_r,
+        n_r=n_r,
+        offsets=Offsets.none(len(P_m)),
+        reference_face=reference_face,
+        moving_face=moving_face,
+        facets=facet_error(moving_face, reference_face, reach),
+        round=RoundPoints.of(balls_and_shafts) if balls_and_shafts else None,
         deviating=deviating,
     )
-    if pair.points is None and pair.spacing is None and (found := round_points(placed_own, target, reach)):
-        touching, feet, normals = (np.array(each) for each in zip(*(point.nominal() for point in found), strict=True))
-        return made(touching, feet, normals, Offsets.none(len(found)), round=RoundPoints.of(found))
+    if balls_and_shafts or not any(deviating):
+        return points
+    return replace(points, offsets=_height_offsets(deviating, points.facing))
+
+
+def _is_open(pair: ContactPair) -> bool:
+    """Return whether the model leaves the choice of points open."""
+    return pair.points is None and pair.spacing is None
+
+
+def _candidates(
+    assembly: Assembly,
+    pair: ContactPair,
+    moving: NominalPart,
+    mesh: trimesh.Trimesh,
+    faces: tuple[Surface, Surface],
+    reach: float,
+) -> np.ndarray:
+    """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
+
+    `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places.
+    """
+    moving_face, reference_face = faces
     if isinstance(pair.points, str):
-        sampled = own_vertices(own.mesh)
+        points = own_vertices(mesh)
     else:
-        evenly = DEFAULT_POINTS if pair.points is None and pair.spacing is None else pair.points
-        _announce(pair, own.mesh.area, evenly)
-        sampled = spread(own.mesh, evenly, pair.spacing)
-    P_m, finest = moving.placed(sampled), assembly.finest()
-    if is_flat(placed_own) and is_flat(target):
-        if pair.points is None and pair.spacing is None:
-            P_m = np.concatenate([P_m, overlap_corners(placed_own, target)])
+        count = DEFAULT_POINTS if _is_open(pair) else pair.points
+        _announce(pair, mesh.area, count)
+        points = spread(mesh, count, pair.spacing)
+    P_m, finest = moving.placed(points), assembly.finest()
+    if is_flat(moving_face) and is_flat(reference_face):
+        if _is_open(pair):
+            P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
     elif math.isfinite(finest):
-        P_m = _by_curvature(pair, placed_own, target, P_m, finest, reach)
-    P_m = distinct(P_m, SAME * moving.mesh.scale)
-    if placed_own.surfaces:
-        P_m, _, _ = placed_own.project(P_m)
-    P_r, n_r, over = target.project(P_m)
+        P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach)
+    P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)
+    if moving_face.surfaces:
+        P_m, _, _ = moving_face.project(P_m)
+    return P_m
+
+
+def _touching(
+    pair: ContactPair, P_m: np.ndarray, moving_face: Surface, reference_face: Surface, reach: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return P_m, P_r and n_r (point, 3) of the points over the reference face and within reach of it."""
+    P_r, n_r, is_over = reference_face.project(P_m)
     distance = np.linalg.norm(P_m - P_r, axis=1)
-    kept = over & (distance <= reach)
-    if not kept.any():
+    is_touching = is_over & (distance <= reach)
+    if not is_touching.any():
         raise GeometryFault(
             f"its faces never come within {reach:g} mm of each other; the nearest of {len(P_m)} points is "
             f"{distance.min():g} mm away"
-            + (" and overhangs the rim" if not over.any() else "")
+            + (" and overhangs the rim" if not is_over.any() else "")
             + "; check the placement of the parts and the faces, or raise within="
         )
-    _, normals, _ = placed_own.project(P_m[kept])
-    if ((normals * n_r[kept]).sum(axis=1) > 0).all():
+    _, normals, _ = moving_face.project(P_m[is_touching])
+    if ((normals * n_r[is_touching]).sum(axis=1) > 0).all():
         raise GeometryFault(
             f"its faces {pair.moving} and {pair.reference} point the same way, so one cannot rest on the other; "
             "choose faces that face each other"
         )
-    points = made(P_m[kept], P_r[kept], n_r[kept], Offsets.none(int(kept.sum())))
-    return replace(points, offsets=_heights(deviating, points.facing)) if any(deviating) else points
+    return P_m[is_touching], P_r[is_touching], n_r[is_touching]
 
 
-def _deviating(face: Face, part: NominalPart, meshes: Meshes, features: Features) -> FaceDeviation | None:
-    """What a face deviates by, if it is of a feature."""
-    if not part.part.features:
-        return None
-    return features.face_at(face, meshes, part.placement)
+def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features) -> FaceDeviation | None:
+    """Return the deviation of a face; None if it belongs to no feature."""
+    return features.face_at(face, meshes, part.placement) if part.part.features else None
 
 
-def _heights(deviating: tuple[FaceDeviation | None, FaceDeviation | None], facing: np.ndarray) -> Offsets:
-    """What points stand out by as faces grow; `facing` (point,): 1 where they face each other."""
-    of_side = zip(deviating, (facing, np.ones_like(facing)), strict=True)
-    grown = [
+def _height_offsets(deviating: tuple[FaceDeviation | None, FaceDeviation | None], facing: np.ndarray) -> Offsets:
+    """Return the heights of points as faces grow; `facing` (point,) is 1 where the faces are parallel."""
+    sides = zip(deviating, (facing, np.ones_like(facing)), strict=True)
+    offsets = [
         Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share))
-        for face, share in of_side
+        for face, share in sides
         if face is not None and face.grows
     ]
-    return Offsets.joined(grown, len(facing)) if grown else Offsets.none(len(facing))
+    return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
 
 
 def _announce(pair: ContactPair, area: float, count: int | None) -> None:
     points = count if pair.spacing is None else area / pair.spacing**2
     log.log(
-        logging.WARNING if points and points > MANY else logging.INFO,
+        logging.WARNING if points and points > MAX_SILENT_POINTS else logging.INFO,
         'contact pair "%s": about %d contact points, about %.0f s',
         shown(pair.name), points or 0, SECONDS_PER_POINT * (points or 0),
     )  # fmt: skip
 
 
-def _by_curvature(pair: ContactPair, own: Surface, target: Surface, P_m: np.ndarray, finest: float, reach: float) -> np.ndarray:
-    """The contact points P_m (point, 3) of curved faces, with what curvature adds if the model leaves the choice open.
+def _with_curvature(
+    pair: ContactPair, moving_face: Surface, reference_face: Surface, P_m: np.ndarray, finest: float, reach: float
+) -> np.ndarray:
+    """Return points P_m (point, 3) of curved faces; if the choice is open, with the points that follow curvature added.
 
-    Warns of what they, or the triangles, leave unseen of more than CHORD times `finest`, the smallest tolerance range.
+    Warns if the points, or the triangles, leave more than CHORD times `finest` undetected, the smallest tolerance range.
     """
-    every = following(own, target, chord=CHORD * finest, within=reach)
-    if is_flat(target) and own.curvature > 0:
-        every = np.concatenate([every, rim_points(own, target, math.sqrt(8 * CHORD * finest / own.curvature), reach)])
-    if pair.points is None and pair.spacing is None:
-        P_m = np.concatenate([P_m, every])
-    errors = {
-        "between its contact points": sampling_error(P_m, every, target, unit=finest, within=reach),
-        "between flat triangles and the round faces that they approximate": facet_error(own, target, reach),
-    }
-    advice = ("give it more points, or leave points and spacing out", "use a finer mesh")
-    for (seen, error), what in zip(errors.items(), advice, strict=True):
+    dense = following(moving_face, reference_face, chord=CHORD * finest, within=reach)
+    if is_flat(reference_face) and moving_face.curvature > 0:
+        step = math.sqrt(8 * CHORD * finest / moving_face.curvature)
+        dense = np.concatenate([dense, rim_points(moving_face, reference_face, step, reach)])
+    if _is_open(pair):
+        P_m = np.concatenate([P_m, dense])
+    between_points = sampling_error(P_m, dense, reference_face, unit=finest, within=reach)
+    under_facets = facet_error(moving_face, reference_face, reach)
+    for error, place, advice in (
+        (between_points, "between its contact points", "give it more points, or leave points and spacing out"),
+        (under_facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
+    ):
         if error > CHORD * finest:
             warnings.warn(
-                f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {seen}, "
-                f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {what}",
+                f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
+                f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {advice}",
                 ContactWarning,
-                stacklevel=6,
+                stacklevel=7,
             )
     return P_m

@@ -11,75 +11,79 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
-from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart
-from tolcontact.discretization.offsets import Offsets
-from tolcontact.discretization.three_two_one import lay_out
+from tolcontact.discretization.locators import Locators, scheme_locators
+from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import GeometryFault, ModelError, designation
-from tolcontact.features.nominal_features import Features, datum_order
+from tolcontact.features import Features, datum_order
 from tolcontact.geometry.faces import Meshes
-from tolcontact.geometry.files.reading import read_files
+from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, shape
 
 log = logging.getLogger(__name__)
 
 
+class _Faults(list[str]):
+    """The faults of an assembly."""
+
+    def attempt(self, place: str, build: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what `build` returns; None, and a fault at `place`, if the geometry does not allow it."""
+        try:
+            return build(*arguments)
+        except GeometryFault as fault:
+            self.append(f"{place}: {fault}")
+            return None
+
+
 def discretize(assembly: Assembly) -> Nominal:
-    """The nominal model of an assembly.
+    """Return the nominal model of an assembly.
 
     Raises ModelError with every fault of the declaration and of its geometry.
     """
-    faults = list(assembly.faults())
-    clean = not faults
-    clear = [part for part in assembly.parts if not any(part.geometry.faults())]
-    log.info("reading the shapes of %d parts", len(clear))
-    contents = read_files(part.geometry for part in clear)
-    attempts = {part: _attempt(faults, designation("part", part), shape, part.geometry, contents) for part in clear}
-    shapes = {part: found for part, found in attempts.items() if found is not None}
-    meshes = {part: found.mesh for part, found in shapes.items()}
+    faults = _Faults(assembly.faults())
+    is_sound = not faults
+    shapes = _shapes(assembly, faults)
+    meshes = {part: read.mesh for part, read in shapes.items()}
     parts = [_nominal_part(assembly, part, meshes, faults) for part in assembly.parts]
     features = Features(sum(len(part.locators) for part in parts if part is not None))
-    if clean and None not in parts:
+    if is_sound and None not in parts:
         _add_features(assembly, meshes, features, faults)
         parts = [_on_features(part, features, meshes, faults) for part in parts if part is not None]
-    placed = {part: nominal for part, nominal in zip(assembly.parts, parts, strict=True) if nominal is not None}
+    nominal_parts = tuple(part for part in parts if part is not None)
+    placed = {nominal.part: nominal for nominal in nominal_parts}
     pairs = [
-        _attempt(faults, designation("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
+        faults.attempt(designation("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
         for pair in assembly.pairs
         if not any(pair.faults()) and all(part in placed for part in (*pair.moving.parts, *pair.reference.parts))
     ]
-    if clean:
-        faults.extend(_immovable(assembly))
-    labels = [label for nominal in placed.values() for label in nominal.locators.labels]
-    labels += [*features.labels, *(each.name for each in assembly.variables)]
-    if clean:
-        faults.extend(
-            f'contributor "{label}" is declared {labels.count(label)} times; its draws would be the same, so rename part, '
-            "locator, feature or variable"
-            for label in dict.fromkeys(labels)
-            if labels.count(label) > 1
-        )
-    if clean and not faults:
-        faults.extend(_strange_contributors(assembly, labels))
-    faults.extend(
-        f"{designation('contact pair', pair)}: its name is reserved for the one-sided locators of a part; rename it"
-        for pair in assembly.pairs
-        if any(pair.name == _supports(part) for part in assembly.parts if has_supports(assembly, part))
-    )
+    if is_sound:
+        faults.extend(_immovable_pairs(assembly))
+        labels = [label for nominal in nominal_parts for label in nominal.locators.labels]
+        labels += [*features.labels, *(variable.name for variable in assembly.variables)]
+        faults.extend(_repeated_labels(labels))
+        if not faults:
+            faults.extend(_contributor_faults(assembly, labels))
+    faults.extend(_reserved_names(assembly))
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
-    found = tuple(part for part in parts if part is not None)
-    made = tuple(pair for pair in pairs if pair is not None)
-    return Nominal(assembly, found, (*made, *_support_pairs(found)), assembly.measures, features)
+    return Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
 
 
-def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: list[str]) -> None:
+def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
+    """Return the shapes of the parts that can be read."""
+    readable = [part for part in assembly.parts if not any(part.geometry.faults())]
+    log.info("reading the shapes of %d parts", len(readable))
+    contents = read_files(part.geometry for part in readable)
+    attempts = {part: faults.attempt(designation("part", part), shape, part.geometry, contents) for part in readable}
+    return {part: read for part, read in attempts.items() if read is not None}
+
+
+def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: _Faults) -> None:
     for index, part in enumerate(assembly.parts):
         ordered, circular = datum_order(part)
         for feature in ordered:
-            _attempt(faults, f'part "{part.name}": {designation("feature", feature)}', features.add, feature, index, meshes)
+            faults.attempt(f'part "{part.name}": {designation("feature", feature)}', features.add, feature, index, meshes)
         if circular:
             names = ", ".join(f'"{feature.name}"' for feature in circular)
             faults.append(
@@ -88,84 +92,91 @@ def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults
             )
 
 
-def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: list[str]) -> NominalPart:
-    """The part, with what its locators stand against."""
-    location = part.scheme
-    if location is None or not part.part.features:
+def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: _Faults) -> NominalPart:
+    """Return the part with the faces of features that its locators stand against."""
+    scheme = part.scheme
+    if scheme is None or not part.part.features:
         return part
-    if isinstance(location, ThreeTwoOne):
-        found = [
-            _attempt(faults, designation("part", part.part), features.face_at, f, meshes, part.placement)
-            for f in location.faces
-        ]
-        faces = tuple(found[k] for k in (0, 0, 0, 1, 1, 2))
+    if isinstance(scheme, ThreeTwoOne):
+        place = designation("part", part.part)
+        deviations = [faults.attempt(place, features.face_at, face, meshes, part.placement) for face in scheme.faces]
+        faces = tuple(deviations[k] for k in (0, 0, 0, 1, 1, 2))
     else:
-        faces = tuple(own.on and features.face_of(own.on, np.array(own.point), part.placement) for own in location)
+        faces = tuple(
+            locator.on and features.face_of(locator.on, np.array(locator.point), part.placement) for locator in scheme
+        )
     return replace(part, locators=replace(part.locators, faces=faces))
 
 
-def _strange_contributors(assembly: Assembly, labels: Sequence[str]) -> Iterator[str]:
-    """References to contributors that there are not, and contributors that two things would draw."""
-    known = set(labels)
-    variables = {each.name for each in assembly.variables}
-    drawn: dict[str, str] = {}
-    for kind, name, line, named in (
-        *(("variable", each.name, each.declared_at, tuple(each.drives)) for each in assembly.variables),
-        *(("correlation", each.name, each.declared_at, each.labels) for each in assembly.correlations),
-        *(("population", each.name, each.declared_at, each.columns) for each in assembly.populations),
+def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
+    for label in dict.fromkeys(labels):
+        if labels.count(label) > 1:
+            yield (
+                f'contributor "{label}" is declared {labels.count(label)} times; its draws would be the same, so rename part, '
+                "locator, feature or variable"
+            )
+
+
+def _contributor_faults(assembly: Assembly, labels: Sequence[str]) -> Iterator[str]:
+    """Yield references to unknown contributors, and contributors with two sources of draws."""
+    recognized, variables = set(labels), {variable.name for variable in assembly.variables}
+    sources: dict[str, str] = {}
+    for kind, place, references in (
+        *(("variable", designation("variable", cause), tuple(cause.drives)) for cause in assembly.variables),
+        *(("correlation", designation("correlation", copula), copula.labels) for copula in assembly.correlations),
+        *(("population", designation("population", table), table.columns) for table in assembly.populations),
     ):
-        who = f'{kind} "{name}" ({line})'
-        for label in named:
-            if label not in known:
-                near = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
-                yield f'{who}: unknown contributor "{label}"; contributors are, for example: {", ".join(near)}'
+        for label in references:
+            if label not in recognized:
+                similar = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
+                yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar)}'
             elif kind == "variable" and label in variables:
-                yield f'{who}: it drives the variable "{label}"; a variable drives locators and features alone'
-            elif kind != "variable" and label in drawn:
-                yield f'{who}: contributor "{label}" is drawn by {drawn[label]} already; leave it out of one of them'
+                yield f'{place}: it drives the variable "{label}"; a variable drives locators and features alone'
+            elif kind != "variable" and label in sources:
+                yield f'{place}: contributor "{label}" is drawn by {sources[label]} already; leave it out of one of them'
             elif kind != "variable":
-                drawn[label] = who
+                sources[label] = place
 
 
-def _supports(part: Part) -> str:
+def _reserved_names(assembly: Assembly) -> Iterator[str]:
+    reserved = {_supports_name(part) for part in assembly.parts if has_supports(assembly, part)}
+    for pair in assembly.pairs:
+        if pair.name in reserved:
+            place = designation("contact pair", pair)
+            yield f"{place}: its name is reserved for the one-sided locators of a part; rename it"
+
+
+def _supports_name(part: Part) -> str:
     return f"supports of {part.name}"
 
 
 def _support_pairs(parts: tuple[NominalPart, ...]) -> Iterator[ContactPoints]:
-    """The one-sided locators of each free part, as a contact pair."""
-    first = 0
+    """Yield the one-sided locators of each free part as a contact pair."""
+    start = 0
     for index, part in enumerate(parts):
-        own = np.flatnonzero(part.locators.one_sided)
-        if part.free and own.size:
-            P, n = part.locators.points[own], part.locators.directions[own]
-            yield ContactPoints(
-                _supports(part.part), index, part.parent, P, P, n, _raised(part.locators, first, own), locators=first + own
-            )
-        first += len(part.locators)
+        supports = np.flatnonzero(part.locators.one_sided)
+        if part.free and supports.size:
+            P, n = part.locators.points[supports], part.locators.directions[supports]
+            offsets = _support_offsets(part.locators, start, supports)
+            name = _supports_name(part.part)
+            yield ContactPoints(name, index, part.parent, P, P, n, offsets, locators=start + supports)
+        start += len(part.locators)
 
 
-def _raised(locators: Locators, first: int, own: np.ndarray) -> Offsets:
-    """What supports stand out by: their own deviations, columns `first` on, and what their faces come out of the part."""
-    every = [Offsets(first + own, np.eye(len(own)))]
-    for place, number in enumerate(own):
+def _support_offsets(locators: Locators, start: int, supports: np.ndarray) -> Offsets:
+    """Return the heights of supports: their own deviations, columns `start` on, and those of the faces they stand against."""
+    offsets = [Offsets(start + supports, np.eye(len(supports)))]
+    for place, number in enumerate(supports):
         columns, factors = locators.pushes(number)
         if columns.size:
-            matrix = np.zeros((len(columns), len(own)))
+            matrix = np.zeros((len(columns), len(supports)))
             matrix[:, place] = factors
-            every.append(Offsets(columns, matrix))
-    return Offsets.joined(every, len(own)) if len(every) > 1 else every[0]
+            offsets.append(Offsets(columns, matrix))
+    return Offsets.joined(offsets, len(supports)) if len(offsets) > 1 else offsets[0]
 
 
-def _attempt(faults: list[str], where: str, build: Callable[..., Any], *arguments: Any) -> Any:
-    """What `build` gives; None, and a fault noted, if the geometry does not allow it."""
-    try:
-        return build(*arguments)
-    except GeometryFault as fault:
-        faults.append(f"{where}: {fault}")
-        return None
-
-
-def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[str]) -> NominalPart | None:
+def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: _Faults) -> NominalPart | None:
+    """Return a part in its nominal place with its locators; None if it has no shape or is badly declared."""
     if part not in meshes or any(part.faults()):
         return None
     mesh = meshes[part]
@@ -177,7 +188,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
     if location is not None and not any(location.faults()):
         if isinstance(location.scheme, ThreeTwoOne):
             if all(mentioned in meshes for mentioned in location.mentioned):
-                locators = _attempt(faults, designation("part", part), lay_out, location.scheme, meshes) or ()
+                locators = faults.attempt(designation("part", part), scheme_locators, location.scheme, meshes) or ()
         else:
             locators = location.scheme
     common = location.tolerance if location else None
@@ -185,7 +196,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
     if location is not None and location.floating:
         nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
-        _attempt(faults, designation("part", part), nominal.check_independent)
+        faults.attempt(designation("part", part), nominal.check_independent)
     parent = location.on if location else None
     return NominalPart(
         name=part.name,
@@ -202,8 +213,8 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: list[s
 
 
 def _middle(mesh: Any) -> np.ndarray:
-    """The middle (3,) of a mesh's surface."""
-    return np.asarray(mesh.area_faces @ mesh.triangles_center / mesh.area)
+    """Return the middle (3,) of a mesh's surface."""
+    return mesh.area_faces @ mesh.triangles_center / mesh.area
 
 
 def _locators(
@@ -220,8 +231,8 @@ def _locators(
     )
 
 
-def _immovable(assembly: Assembly) -> list[str]:
-    """Pairs that no free part could ever open."""
+def _immovable_pairs(assembly: Assembly) -> list[str]:
+    """Return a fault for each pair that no free part can open."""
     return [
         f"{designation('contact pair', pair)}: contact cannot move its sides relative to each other; "
         f'declare part "{pair.moving.part.name}" free (fixed=False)'

@@ -1,29 +1,32 @@
-"""Locators with numbers, and the locator matrix: what six of them, or more, say about the pose of their part."""
+"""Locators with numbers, the locator matrix by which they place their part, and the locators of a 3-2-1 scheme."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.declaration import Tolerance
+from tolcontact.declaration import Face, Locator, ThreeTwoOne, Tolerance
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
+from tolcontact.geometry.faces import Meshes, patch
 
-CONDITION_LIMIT = 1e8
+MAX_CONDITION = 1e8
+MIN_DETERMINANT = 0.1  # of the normals of three faces that count as independent
+SCHEME_NAMES = ("A1", "A2", "A3", "B1", "B2", "C1")
 
 
 @dataclass(frozen=True, eq=False)
 class Locators:
-    """Locators of a part, or of a model, in the nominal assembly frame.
+    """The locators of a part, or of a model, in the nominal assembly frame.
 
-    labels       "part.locator" for each
+    labels       "part.locator" for each locator
     points       (locator, 3) [mm]
     directions   (locator, 3): unit vectors into the part
-    tolerances   one for each
+    tolerances   one for each locator
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
-    faces        of the features that they stand against, one for each; None of one that stands against a nominal face
-    floating     middle (3,) and size [mm] of a part that they leave freedoms; None of one that they fix
+    faces        for each locator the face of a feature that it stands against; None for a nominal face
+    floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
     """
 
     labels: tuple[str, ...]
@@ -39,21 +42,21 @@ class Locators:
         return len(self.labels)
 
     @classmethod
-    def joined(cls, several: Iterable["Locators"]) -> "Locators":
-        """Those of several parts, one after the other."""
-        every = tuple(several)
+    def joined(cls, parts: Iterable["Locators"]) -> "Locators":
+        """Return the locators of several parts, one part after the other."""
+        parts = tuple(parts)
         return cls(
-            labels=tuple(label for own in every for label in own.labels),
-            points=np.vstack([own.points for own in every]),
-            directions=np.vstack([own.directions for own in every]),
-            tolerances=tuple(tolerance for own in every for tolerance in own.tolerances),
-            stiffness=np.concatenate([own.stiffness for own in every]),
-            one_sided=np.concatenate([own.one_sided for own in every]),
-            faces=tuple(face for own in every for face in own.faces),
+            labels=tuple(label for part in parts for label in part.labels),
+            points=np.vstack([part.points for part in parts]),
+            directions=np.vstack([part.directions for part in parts]),
+            tolerances=tuple(tolerance for part in parts for tolerance in part.tolerances),
+            stiffness=np.concatenate([part.stiffness for part in parts]),
+            one_sided=np.concatenate([part.one_sided for part in parts]),
+            faces=tuple(face for part in parts for face in part.faces),
         )
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
-        """Columns (k,) of the deviations by which the face at a locator comes out of its part there, and how far for 1 (k,)."""
+        """Return the columns (k,) of deviations that move the face at a locator out of its part, and how far for 1 (k,)."""
         face = self.faces[locator]
         if face is None:
             return np.zeros(0, dtype=int), np.zeros(0)
@@ -61,7 +64,7 @@ class Locators:
 
     @property
     def matrix(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and the centroid c (3,) that they turn about."""
+        """The rows [n', (p - c) x n)'] of the locator matrix J (locator, 6), and the centroid c (3,) about which they turn."""
         centre = self.points.mean(axis=0) if self.floating is None else self.floating[0]
         return np.hstack([self.directions, np.cross(self.points - centre, self.directions)]), centre
 
@@ -69,8 +72,8 @@ class Locators:
     def placing_matrix(self) -> tuple[np.ndarray, np.ndarray]:
         """The matrix M (6, locator) of q = M d, and the centroid c (3,) about which the part turns.
 
-        Where they leave freedoms the part moves as little as it can. Six locators give M = J^-1. Of more than six the
-        two-sided ones are kept exactly, and the one-sided ones as well as it goes, in the sense of least squares.
+        A floating part moves as little as possible. Six locators give M = J^-1. With more than six the two-sided locators are
+        kept exactly, and the one-sided locators by least squares.
         """
         J, centre = self.matrix
         if self.floating is not None:
@@ -85,31 +88,31 @@ class Locators:
         return M, centre
 
     def _least_motion(self, J: np.ndarray, size: float) -> np.ndarray:
-        """M (6, locator) of the least motion that keeps two-sided locators exactly, and one-sided ones as well as it goes.
+        """Return M (6, locator) of the least motion that keeps two-sided locators exactly, and one-sided ones by least squares.
 
-        Motions count as translations, and rotations [rad] times the part's `size` [mm].
+        Rotations [rad] are weighed by the part's `size` [mm].
         """
         to_q = np.diag([1.0] * 3 + [1 / size] * 3)
         exact, supports = (J @ to_q)[~self.one_sided], (J @ to_q)[self.one_sided]
         M = np.zeros((6, len(J)))
         M[:, ~self.one_sided] = np.linalg.pinv(exact)
-        open_ = np.linalg.svd(exact)[2][len(exact) :].T
-        back = open_ @ np.linalg.pinv(supports @ open_, rcond=1 / CONDITION_LIMIT)
-        M[:, ~self.one_sided] -= back @ supports @ M[:, ~self.one_sided]
-        M[:, self.one_sided] = back
-        return np.asarray(to_q @ M)
+        free = np.linalg.svd(exact)[2][len(exact) :].T
+        by_supports = free @ np.linalg.pinv(supports @ free, rcond=1 / MAX_CONDITION)
+        M[:, ~self.one_sided] -= by_supports @ supports @ M[:, ~self.one_sided]
+        M[:, self.one_sided] = by_supports
+        return to_q @ M
 
     def _contradicting(self, J: np.ndarray) -> str:
-        """Names of two-sided locators that hold the same, by rows (locator, 6) of theirs; none if all are independent."""
+        """Return the names of two-sided locators whose rows J (locator, 6) depend on each other; "" if there are none."""
         U, S, _ = np.linalg.svd(J)
-        if not len(J) or S[-1] * CONDITION_LIMIT > S[0]:
+        if not len(J) or S[-1] * MAX_CONDITION > S[0]:
             return ""
         share = np.abs(U[:, len(S) - 1])
         names = np.array(self.labels)[~self.one_sided]
         return ", ".join(str(name) for name in names[share > 1e-6 * share.max()])
 
     def check_independent(self) -> None:
-        """Raise GeometryFault if they do not fix their part, or if those of a floating part contradict each other."""
+        """Raise GeometryFault if the locators do not fix their part, or if those of a floating part contradict each other."""
         J, centre = self.matrix
         if self.floating is not None:
             scaled = J / np.array([1, 1, 1, *[self.floating[1]] * 3])
@@ -120,11 +123,70 @@ class Locators:
         scaled = J / np.array([1, 1, 1, size, size, size]) if size > 0 else np.zeros_like(J)
         two_sided = scaled[~self.one_sided]
         condition = max(np.linalg.cond(scaled), np.linalg.cond(two_sided) if len(two_sided) else 0.0)
-        if not condition < CONDITION_LIMIT:
+        if not condition < MAX_CONDITION:
             names = self._contradicting(two_sided)
-            held = f"{names} hold the same, so they contradict each other and leave a direction free; " if names else ""
+            cause = f"{names} hold the same, so they contradict each other and leave a direction free; " if names else ""
             raise GeometryFault(
-                f"its {len(J)} locators do not fix it: {held}the locator matrix has condition number {condition:.1e}, the "
-                f"limit is {CONDITION_LIMIT:.0e}; the points of the primary face must not lie on a line, and the directions "
+                f"its {len(J)} locators do not fix it: {cause}the locator matrix has condition number {condition:.1e}, the "
+                f"limit is {MAX_CONDITION:.0e}; the points of the primary face must not lie on a line, and the directions "
                 "together must constrain all three translations and all three rotations"
             )
+
+
+def scheme_locators(scheme: ThreeTwoOne, meshes: Meshes) -> tuple[Locator, ...]:
+    """Return the six locators of a 3-2-1 scheme, in the part's own frame; directions point into the part.
+
+    Each face is taken as its bounding rectangle along the edges that it shares with the other two. Raises GeometryFault if the
+    three faces are not independent, or the inset leaves no room.
+    """
+    corners, normals = zip(*(_vertices_and_normal(face, meshes) for face in scheme.faces), strict=True)
+    outward = np.array(normals)
+    if abs(np.linalg.det(outward)) < MIN_DETERMINANT:
+        raise GeometryFault(
+            "the three faces of its 3-2-1 scheme are not independent; choose faces at wide angles to each other"
+        )
+    # Coordinates a, b, c along edge directions: dual to the normals, so that a step along one stays on the other two.
+    edges = -np.linalg.inv(outward).T
+    edges /= np.linalg.norm(edges, axis=1, keepdims=True)
+    a, b, c = edges
+    primary, secondary, tertiary = corners
+    near_c, far_c = _stations(primary, c, scheme.inset)
+    near_b, far_b = _stations(primary, b, scheme.inset)
+    side_near, side_far = _stations(secondary, c, scheme.inset)
+    points = [
+        _place(edges, outward, primary, 0, {1: near_b, 2: near_c}),
+        _place(edges, outward, primary, 0, {1: near_b, 2: far_c}),
+        _place(edges, outward, primary, 0, {1: far_b, 2: (near_c + far_c) / 2}),
+        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_near}),
+        _place(edges, outward, secondary, 1, {0: _middle(secondary, a), 2: side_far}),
+        _place(edges, outward, tertiary, 2, {0: _middle(tertiary, a), 1: _middle(tertiary, b)}),
+    ]
+    directions = -outward[[0, 0, 0, 1, 1, 2]]
+    return tuple(Locator(name, p, n) for name, p, n in zip(SCHEME_NAMES, points, directions, strict=True))
+
+
+def _vertices_and_normal(face: Face, meshes: Meshes) -> tuple[np.ndarray, np.ndarray]:
+    mesh = patch(face, meshes).mesh
+    normal = mesh.area_faces @ mesh.face_normals
+    return np.asarray(mesh.vertices), normal / np.linalg.norm(normal)
+
+
+def _stations(points: np.ndarray, along: np.ndarray, inset: float) -> tuple[float, float]:
+    """Return the places [mm] along a direction at an inset from both ends of a face."""
+    places = points @ along
+    lower, upper = places.min() + inset, places.max() - inset
+    if not lower < upper:
+        length = places.max() - places.min()
+        raise GeometryFault(f"an inset of {inset:g} mm leaves no room on a face that is {length:g} mm long; make it smaller")
+    return lower, upper
+
+
+def _middle(points: np.ndarray, along: np.ndarray) -> float:
+    places = points @ along
+    return float(places.min() + places.max()) / 2
+
+
+def _place(edges: np.ndarray, outward: np.ndarray, points: np.ndarray, face: int, stations: dict[int, float]) -> np.ndarray:
+    """Return the point on the plane of a face whose coordinates along edges are `stations`, by the edges' numbers."""
+    rows = [outward[face], *(edges[axis] for axis in stations)]
+    return np.linalg.solve(np.array(rows), np.array([float((points @ outward[face]).max()), *stations.values()]))

@@ -1,5 +1,6 @@
 """The nominal model: every declared thing with its numbers, in the nominal assembly frame W. Lengths in mm."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -8,7 +9,6 @@ import trimesh
 
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
-from tolcontact.discretization.offsets import Offsets
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import FaceDeviation, Features, NominalFeature
 from tolcontact.geometry.curvature import chord_height
@@ -22,7 +22,7 @@ class NominalPart:
     """A part in its nominal place.
 
     vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
-    locators             those that hold it, as `scheme` declares them; none if it is fixed
+    locators             as `scheme` declares them; none if the part is fixed
     parent               index of the part that it is located on; None for the ground
     """
 
@@ -43,22 +43,61 @@ class NominalPart:
         return trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
 
     def placed(self, p: np.ndarray) -> np.ndarray:
-        """Own coordinates (..., 3) to nominal assembly coordinates (..., 3) [mm]."""
+        """Return nominal assembly coordinates (..., 3) [mm] of points (..., 3) in the part's own frame."""
         R_WP, t_WP = self.placement
-        return np.asarray(p @ R_WP.T + t_WP)
+        return p @ R_WP.T + t_WP
+
+
+@dataclass(frozen=True, eq=False)
+class Offsets:
+    """Heights of the contact points of a pair along n^r, linear in the deviations. Gaps are smaller by these heights.
+
+    columns   (contributor,): columns of the deviations
+    matrix    (contributor, point): height of each point for a deviation of 1
+    """
+
+    columns: np.ndarray
+    matrix: np.ndarray
+
+    @classmethod
+    def none(cls, points: int) -> "Offsets":
+        """Return the offsets of points whose heights do not vary."""
+        return cls(np.zeros(0, dtype=int), np.zeros((0, points)))
+
+    @classmethod
+    def joined(cls, terms: "Sequence[Offsets]", points: int) -> "Offsets":
+        """Return the sum of several offsets of the same points."""
+        columns = np.unique(np.concatenate([np.zeros(0, dtype=int), *(term.columns for term in terms)]))
+        matrix = np.zeros((len(columns), points))
+        for term in terms:
+            matrix[np.searchsorted(columns, term.columns)] += term.matrix
+        return cls(columns, matrix)
+
+    def take(self, points: np.ndarray) -> "Offsets":
+        """Return the offsets of some points."""
+        return Offsets(self.columns, self.matrix[:, points])
+
+    def heights(self, deviations: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return heights (row, slot) [mm] of `points` (row, slot) for deviations (row, column), summed up in a fixed order."""
+        heights = np.zeros(points.shape)
+        for column, row in zip(self.columns, self.matrix, strict=True):
+            heights += deviations[:, column, None] * row[points]
+        return heights
 
 
 @dataclass(frozen=True, eq=False)
 class ContactPoints:
     """Contact points of one pair, fixed for all realizations: P^m, P^r, n^r of the paper, each (point, 3).
 
-    One-sided locators are contact points, too: of their part against what it is located on, a part or (None) the ground.
-    Their `offsets` are the locators' deviations. They have no faces; of a pair of faces `surface` is the reference face in
-    its nominal place, and `own` the moving one.
-    `facets` [mm] is how far their triangles may lie off the round faces that they approximate. Where `round` says
-    that a ball or a shaft touches walls, gaps are not those of fixed points: they follow from it at any pose.
-    `deviating` is what the moving and the reference face deviate by, if they are of features; heights of fixed points are
-    among the offsets. `locators` (point,) are the numbers of those that the points are, if they are supports.
+    The one-sided locators of a part are a pair of this kind, too. Its reference is the part that it is located on, or None for
+    the ground. It has no faces, and its offsets are the locators' deviations.
+
+    moving_face, reference_face   in their nominal places
+    facets      [mm] largest distance between their triangles and the round faces that these approximate
+    round       the balls and shafts beside walls from which gaps follow at any pose; None if the contact points are fixed
+    deviating   deviations of the moving and the reference face, if these belong to features; their heights at fixed points are
+                among the offsets
+    locators    (point,) numbers of the one-sided locators
     """
 
     name: str
@@ -68,8 +107,8 @@ class ContactPoints:
     P_r: np.ndarray
     n_r: np.ndarray
     offsets: Offsets
-    surface: Surface | None = None
-    own: Surface | None = None
+    reference_face: Surface | None = None
+    moving_face: Surface | None = None
     facets: float = 0.0
     round: RoundPoints | None = None
     deviating: tuple[FaceDeviation | None, FaceDeviation | None] = (None, None)
@@ -77,42 +116,42 @@ class ContactPoints:
 
     @cached_property
     def facing(self) -> np.ndarray:
-        """-n^m . n^r (point,): the share of the moving face's height by which it comes nearer there."""
-        if self.own is None or self.round:
+        """The share -n^m . n^r (point,) of the moving face's height by which gaps shrink."""
+        if self.moving_face is None or self.round:
             return np.ones(len(self.P_m))
-        triangle, nearest = self.own.nearest(self.P_m)
-        return np.asarray(-(self.own.normals(triangle, nearest) * self.n_r).sum(axis=1))
+        triangle, nearest = self.moving_face.nearest(self.P_m)
+        return -(self.moving_face.normals(triangle, nearest) * self.n_r).sum(axis=1)
 
     def heights(self, deviations: np.ndarray) -> np.ndarray:
-        """How much farther out its two faces lie together (row,) [mm], for deviations (row, contributor)."""
-        found = np.zeros(len(deviations))
+        """Return the sum of the heights of both faces (row,) [mm] for deviations (row, contributor)."""
+        heights = np.zeros(len(deviations))
         for face in self.deviating:
             if face is not None and face.grows:
-                found += face.heights(deviations)
-        return found
+                heights += face.heights(deviations)
+        return heights
 
     @cached_property
     def bulge(self) -> float:
-        """How far [mm] round surfaces that were fitted to triangles, and count instead, stand out of these."""
-        faces = [face for face in (self.own, self.surface) if face is not None]
+        """The largest height [mm] of round surfaces over the triangles that they were fitted to and replace."""
+        faces = [face for face in (self.moving_face, self.reference_face) if face is not None]
         pieces = [piece.face for face in faces for piece in face.pieces if piece.surface.is_fitted]
         return max(map(chord_height, pieces), default=0.0)
 
     @property
     def in_words(self) -> str:
-        """How many points they are, of what, and what they rely on."""
-        said = f"{len(self.P_m)} contact points{', exact on round faces' if self.round else ''}"
-        return said + (f"; triangles up to {self.bulge:.2g} mm inside" if self.bulge > 0 else "")
+        """The number and the kind of the points, and their accuracy."""
+        text = f"{len(self.P_m)} contact points{', exact on round faces' if self.round else ''}"
+        return text + (f"; triangles up to {self.bulge:.2g} mm inside" if self.bulge > 0 else "")
 
     @property
     def is_supports(self) -> bool:
-        """Whether they are one-sided locators."""
-        return self.surface is None
+        """Whether the points are one-sided locators."""
+        return self.reference_face is None
 
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
-    """An assembly with numbers: what everything downstream is built from."""
+    """An assembly with numbers."""
 
     assembly: Assembly
     parts: tuple[NominalPart, ...]
@@ -122,71 +161,70 @@ class Nominal:
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
-        """The faces of a pair as they are; None for one-sided locators, which have none."""
+        """Return the faces of a pair with their bodies; None for one-sided locators, which have none."""
         pair = self.pairs[index]
-        if pair.own is None or pair.surface is None or pair.reference is None:
+        if pair.moving_face is None or pair.reference_face is None or pair.reference is None:
             return None
         if index not in self._face_pairs:
             self._face_pairs[index] = FacePair(
-                side(pair.own, self.parts[pair.moving].body, len(pair.P_m)),
-                side(pair.surface, self.parts[pair.reference].body, len(pair.P_m)),
+                side(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
+                side(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
             )
         return self._face_pairs[index]
 
     @cached_property
     def locators(self) -> Locators:
-        """Those of all parts, one part after the other: the first columns of deviations."""
+        """The locators of all parts, one part after the other: the first columns of deviations."""
         return Locators.joined(part.locators for part in self.parts)
 
     @property
     def features(self) -> tuple[NominalFeature, ...]:
-        """Those of all parts."""
+        """The features of all parts."""
         return tuple(self._features.features)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:
-        """The faces of features that pairs and locators are of."""
+        """The deviating faces of features that belong to pairs and locators."""
         return self._features.faces
 
     @cached_property
     def contributors(self) -> tuple[str, ...]:
-        """Labels of all that varies, the columns of deviations: locators, freedoms of features, and variables."""
-        return (*self.locators.labels, *self._features.labels, *(each.name for each in self.assembly.variables))
+        """The labels of the columns of deviations: locators, freedoms of features, and variables."""
+        return (*self.locators.labels, *self._features.labels, *(variable.name for variable in self.assembly.variables))
 
     def columns(self, part: int) -> np.ndarray:
-        """Which of them belong to a part."""
-        first = sum(len(own.locators) for own in self.parts[:part])
-        return np.arange(first, first + len(self.parts[part].locators))
+        """Return the columns of a part's locators."""
+        start = sum(len(earlier.locators) for earlier in self.parts[:part])
+        return np.arange(start, start + len(self.parts[part].locators))
 
     def part_index(self, part: Part) -> int:
         return self.assembly.parts.index(part)
 
     def triangles(self, face: Face) -> list[int]:
-        """Indices of the triangles, in their part's mesh, of which a face consists or is cut."""
+        """Return the indices of the triangles of a face in its part's mesh."""
         return [int(k) for k in triangles(face, {part.part: part.mesh for part in self.parts})]
 
     def position(self, point: Point) -> np.ndarray:
-        """Nominal assembly coordinates (3,) [mm] of a declared point."""
-        own = (
-            point.position
-            if point.end is None or point.on is None
-            else self._features.nominal(point.on).geometry.end(point.end)
-        )
-        return self.parts[self.part_index(point.part)].placed(np.array(own))
+        """Return the nominal assembly coordinates (3,) [mm] of a declared point."""
+        if point.end is not None and point.on is not None:
+            position = self._features.nominal(point.on).geometry.end(point.end)
+        else:
+            position = np.array(point.position)
+        return self.parts[self.part_index(point.part)].placed(position)
 
     def face_at(self, point: Point) -> FaceDeviation | None:
-        """What a declared point moves with beside its part: the face of its feature that it is on, or the middle of two."""
+        """Return the face of a feature that a declared point moves with, or the middle of two; None for other points."""
         if point.on is None:
             return None
-        own = self._features.nominal(point.on)
-        number = None if point.position is None else own.face_with(np.array(point.position))
-        return own.deviation(number, self.parts[own.part].placement)
+        feature = self._features.nominal(point.on)
+        number = None if point.position is None else feature.face_with(np.array(point.position))
+        return feature.deviation(number, self.parts[feature.part].placement)
 
     def outward(self, point: Point) -> np.ndarray:
-        """Outward normal (3,), in the nominal assembly frame, of the face at a point on a feature."""
+        """Return the outward normal (3,) of the face at a point on a feature, in the nominal assembly frame."""
         part = self.parts[self.part_index(point.part)]
         if point.on is None or point.position is None:
             return np.zeros(3)
-        surface = self._features.nominal(point.on).surfaces[0]  # what grows in height has one face
+        surface = self._features.nominal(point.on).surfaces[0]  # features that grow in height have one face
         triangle, foot = surface.nearest(np.array([point.position]))
-        return np.asarray(part.placement[0] @ surface.normals(triangle, foot)[0])
+        return part.placement[0] @ surface.normals(triangle, foot)[0]

@@ -1,17 +1,18 @@
-"""How far round walls reach around their axis, and the tangent planes that hollow ones have. Assembly frame, mm."""
+"""Arcs of round walls around their axis, and the tangent planes of hollow walls. Nominal assembly frame, mm."""
 
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere
 from tolcontact.geometry.surface import Piece
 
 TANGENTS = 5  # of a whole hollow wall, besides the nearest
-FACET = math.radians(31.0)  # no facet of a round face turns by more: a wider gap is one
-MISSING = 0.05  # of its area: what triangles of a round face leave out at most
-LEAN = 0.9  # of the way to the rim of a cap
-SMALL = 1e-6  # of a face's size
+MAX_FACET_ANGLE = math.radians(31.0)  # between neighbouring vertices of a round face: a wider gap is a gap of the face
+MAX_MISSING_SHARE = 0.05  # of the area of a round face that its triangles leave out
+CAP_SHARE = 0.9  # of the angle to the rim of a cap, at which its tangent planes are
+RADIUS_TOLERANCE = 1e-6  # of a face's size
 
 
 class NotRoundError(Exception):
@@ -19,75 +20,76 @@ class NotRoundError(Exception):
 
 
 def arc(wall: Piece) -> tuple[np.ndarray, float]:
-    """The middle of a round face, seen from its axis (3,), and how far [rad] it reaches to either side of that; pi if whole.
+    """Return the unit vector (3,) from the axis to the middle of a round face, and half its arc's angle [rad], pi if whole.
 
-    Raises NotRoundError if something is missing in between.
+    Raises NotRoundError if a part of the face is missing within the arc.
     """
-    if wall.surface.kind == "sphere":
-        return _cap(wall)
+    if isinstance(wall.surface, Sphere):
+        return _cap(wall, wall.surface)
     vertices, axis = np.asarray(wall.face.mesh.vertices), wall.surface.axis
     across = vertices - wall.surface.origin
     across -= (across @ axis)[:, None] * axis
-    across = across[np.linalg.norm(across, axis=1) > SMALL * wall.face.mesh.scale]
-    if wall.surface.kind == "plane" or not len(across):
+    across = across[np.linalg.norm(across, axis=1) > RADIUS_TOLERANCE * wall.face.mesh.scale]
+    if isinstance(wall.surface, Plane) or not len(across):
         return np.linalg.svd(axis[None])[2][1], math.pi
     x = across[0] / np.linalg.norm(across[0])
     y = np.cross(axis, x)
     azimuths = np.sort(np.arctan2(across @ y, across @ x))
     gaps = np.diff(azimuths, append=azimuths[0] + 2 * math.pi)
-    if (gaps > FACET).sum() > 1:
+    if (gaps > MAX_FACET_ANGLE).sum() > 1:
         raise NotRoundError
     widest = int(gaps.argmax())
-    if gaps[widest] < FACET:
+    if gaps[widest] < MAX_FACET_ANGLE:
         middle, opening = x, math.pi
     else:
         opening = math.pi - float(gaps[widest]) / 2
-        turn = float(azimuths[widest] + gaps[widest]) + opening
-        middle = math.cos(turn) * x + math.sin(turn) * y
+        azimuth = float(azimuths[widest] + gaps[widest]) + opening
+        middle = math.cos(azimuth) * x + math.sin(azimuth) * y
     _check_area(wall, opening)
     return middle, opening
 
 
 def _check_area(wall: Piece, opening: float) -> None:
-    """Raise NotRoundError if a cylinder or cone has less area than from end to end of its axis and of its arc."""
+    """Raise NotRoundError if a cylinder or cone has less area than its whole arc from end to end of its axis."""
     along = (np.asarray(wall.face.mesh.vertices) - wall.surface.origin) @ wall.surface.axis
-    if wall.surface.kind == "cylinder":
+    if isinstance(wall.surface, Cylinder):
         expected = 2 * opening * wall.surface.radius * float(np.ptp(along))
-    elif wall.surface.kind == "cone":
+    elif isinstance(wall.surface, Cone):
         slants = along / math.cos(wall.surface.angle)
         expected = opening * math.sin(wall.surface.angle) * abs(float(slants.max() ** 2 - slants.min() ** 2))
     else:
         return
-    if wall.face.mesh.area < (1 - MISSING) * expected:
+    if wall.face.mesh.area < (1 - MAX_MISSING_SHARE) * expected:
         raise NotRoundError
 
 
-def _cap(wall: Piece) -> tuple[np.ndarray, float]:
-    mesh, sphere = wall.face.mesh, wall.surface
+def _cap(wall: Piece, sphere: Sphere) -> tuple[np.ndarray, float]:
+    """Return the unit vector (3,) from the centre to the middle of a cap, and the angle [rad] to its rim; pi if whole."""
+    mesh = wall.face.mesh
     outward = (np.asarray(mesh.vertices) - sphere.origin) / sphere.radius
     middle = (np.asarray(mesh.area_faces)[:, None] * (np.asarray(mesh.triangles_center) - sphere.origin)).sum(axis=0)
-    if np.linalg.norm(middle) < MISSING * mesh.area * sphere.radius:
+    if np.linalg.norm(middle) < MAX_MISSING_SHARE * mesh.area * sphere.radius:
         middle, opening = outward[0], math.pi
     else:
         middle /= np.linalg.norm(middle)
         opening = math.acos(min(max(float((outward @ middle).min()), -1.0), 1.0))
-    if mesh.area < (1 - MISSING) * 2 * math.pi * sphere.radius**2 * (1 - math.cos(opening)):
+    if mesh.area < (1 - MAX_MISSING_SHARE) * 2 * math.pi * sphere.radius**2 * (1 - math.cos(opening)):
         raise NotRoundError
     return middle, opening
 
 
-def directions(wall: Piece) -> Sequence[np.ndarray]:
-    """Unit vectors (3,), from the axis, of tangent planes that a hollow wall has besides the nearest.
+def tangent_directions(wall: Piece) -> Sequence[np.ndarray]:
+    """Return unit vectors (3,) from the axis to the tangent planes that a hollow wall has besides the nearest.
 
-    They turn with the part, since they are counted from a vertex.
+    They are counted from a vertex, so they turn with the part.
     """
     x, opening = arc(wall)
-    if wall.surface.kind == "sphere":
-        y, z = _beside(wall, x)
-        lean, turns = min(LEAN * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
-        aside = [math.cos(turn) * y + math.sin(turn) * z for turn in turns]
-        found = [x, *(math.cos(lean) * x + math.sin(lean) * each for each in aside)]
-        return [*found, -x] if opening == math.pi else found
+    if isinstance(wall.surface, Sphere):
+        y, z = _directions_across(wall, x)
+        lean, azimuths = min(CAP_SHARE * opening, math.pi / 2), np.arange(TANGENTS - 1) * 2 * math.pi / (TANGENTS - 1)
+        sideways = [math.cos(azimuth) * y + math.sin(azimuth) * z for azimuth in azimuths]
+        directions = [x, *(math.cos(lean) * x + math.sin(lean) * across for across in sideways)]
+        return [*directions, -x] if opening == math.pi else directions
     y = np.cross(wall.surface.axis, x)
     if opening == math.pi:
         azimuths = np.arange(TANGENTS) * 2 * math.pi / TANGENTS
@@ -96,8 +98,8 @@ def directions(wall: Piece) -> Sequence[np.ndarray]:
     return [math.cos(azimuth) * x + math.sin(azimuth) * y for azimuth in azimuths]
 
 
-def _beside(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors across x (3,) and each other, by the vertex that is farthest from its line."""
+def _directions_across(wall: Piece, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two unit vectors across x (3,) and each other; the first points to the vertex farthest from the line along x."""
     across = np.asarray(wall.face.mesh.vertices) - wall.surface.origin
     across -= (across @ x)[:, None] * x
     y = across[np.linalg.norm(across, axis=1).argmax()]

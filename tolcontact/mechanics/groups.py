@@ -65,7 +65,11 @@ class Group:
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
     """Positions of the pairs of a group whose points are held by fixed planes for a curved reference face."""
     pairs = [nominal.pairs[index] for index in group.pairs]
-    return [k for k, pair in enumerate(pairs) if pair.surface is not None and pair.round is None and pair.surface.curvature > 0]
+    return [
+        k
+        for k, pair in enumerate(pairs)
+        if pair.reference_face is not None and pair.round is None and pair.reference_face.curvature > 0
+    ]
 
 
 def contact_groups(nominal: Nominal) -> list[Group]:
