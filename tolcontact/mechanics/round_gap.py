@@ -11,6 +11,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints, RoundPoint, RoundPoints
+from tolcontact.geometry.analytic_surfaces import Cone, Sphere, Torus
 from tolcontact.mechanics.face_pose import face_height
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
@@ -184,37 +185,38 @@ def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Ter
 
 
 def _distance(point: RoundPoint, c: ca.SX, grown: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX, ca.SX]:
-    """Distance of a point c (3, 1) from the wall's surface [mm], its gradient (3, 1) and second derivative (3, 3).
+    """Return the distance of a point c (3, 1) from the wall [mm], its gradient (3, 1) and second derivative (3, 3) in parts.
 
-    Positive outside; see AnalyticSurface.distance. Of a hollow wall that is not whole it is that of the nearest tangent plane
-    which the wall has. The second derivative is in two parts, of which the first is positive semidefinite; it depends on
-    what freedom is left once ball and wall have grown by `grown` [mm] together.
+    It is AnalyticSurface.distance; for a hollow wall that is not whole, the distance from the nearest tangent plane that the
+    wall has. The first part of the second derivative is positive semidefinite. It depends on the freedom that is left once
+    ball and wall have grown by `grown` [mm] together.
     """
-    kind, w, x = point.wall.kind, ca.DM(point.wall.axis), ca.DM(point.towards)
-    R, r, one, nothing = float(point.wall.radius), float(point.radius), ca.SX.eye(3), ca.SX.zeros(3, 3)
-    p = c - ca.DM(point.wall.origin)
-    least = ca.fmax(ca.fabs(R - r - grown), CLOSE * r)
-    if kind == "sphere":
+    wall, w, x = point.wall, ca.DM(point.wall.axis), ca.DM(point.towards)
+    r, nothing = float(point.radius), ca.SX.zeros(3, 3)
+    p = c - ca.DM(wall.origin)
+    least = ca.fmax(ca.fabs(float(wall.radius) - r - grown), CLOSE * r)
+    if isinstance(wall, Sphere):
         _, n = _direction(p + ASIDE * x)
         n, is_free = _within(point, n)
         length, t = ca.dot(n, p), ca.cross(x, n)  # along the rim, if the wall ends there
         along_rim = t @ t.T / ca.fmax(ca.norm_2(_across(x, p)) * np.sin(point.opening), CLOSE * r)
-        return length - R, n, ca.if_else(is_free, (one - n @ n.T) / ca.fmax(length, least), along_rim), nothing
+        around = (ca.SX.eye(3) - n @ n.T) / ca.fmax(length, least)
+        return wall.height(length, 0.0), n, ca.if_else(is_free, around, along_rim), nothing
     along = ca.dot(w, p)
     _, outward = _direction(_across(w, p) + ASIDE * x)
     _, outward = _direction(_across(w, outward))
     outward, is_free = _within(point, outward)
-    length, round_ = ca.dot(outward, p), ca.cross(w, outward)
-    if kind == "cylinder":
-        return length - R, outward, is_free * round_ @ round_.T / ca.fmax(length, least), nothing
-    if kind == "cone":
-        cos, sin = np.cos(point.wall.angle), np.sin(point.wall.angle)
-        n = cos * outward - sin * w
-        return length * cos - along * sin, n, is_free * cos * round_ @ round_.T / ca.fmax(length, CLOSE * r), nothing
-    tube, n = _direction((length - R) * outward + along * w)
-    across = ca.cross(round_, n)
-    turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
-    return tube - float(point.wall.minor), n, across @ across.T / ca.fmax(tube, CLOSE * r), turning * round_ @ round_.T
+    length, t = ca.dot(outward, p), ca.cross(w, outward)
+    if isinstance(wall, Torus):
+        tube, n = _direction(wall.from_circle(length, outward, along, w))
+        across = ca.cross(t, n)
+        turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
+        return wall.height(tube, along), n, across @ across.T / ca.fmax(tube, CLOSE * r), turning * t @ t.T
+    if isinstance(wall, Cone):
+        cos = np.cos(wall.angle)
+        n = cos * outward - np.sin(wall.angle) * w
+        return wall.height(length, along), n, is_free * cos * t @ t.T / ca.fmax(length, CLOSE * r), nothing
+    return wall.height(length, along), outward, is_free * t @ t.T / ca.fmax(length, least), nothing
 
 
 def _across(w: ca.DM, vector: ca.SX) -> ca.SX:
