@@ -14,8 +14,8 @@ from tolcontact.report import summary_text
 
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
-    "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive",
-    "report", "plot", "workflow", "cli",
+    "declaration", "features", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics",
+    "archive", "report", "plot", "workflow", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
 

@@ -74,9 +74,9 @@ objective wants, from nowhere else: with "active points" or "all points" only as
 ## Features, and the tolerances of a drawing
 
 `part.feature(name, face, tolerances..., datum=...)` names a face: a plane, cylinder, cone, sphere or a general surface, or two
-opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and serves wherever a face
-does. Whatever touches it, is located by it, or is measured at `feature.point(x, y, z)` or at an end of its axis,
-`feature.axis(0)`, goes with its one deviation; also pairs and 3-2-1 schemes that choose its triangles without naming it.
+opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and can be used in place of a
+face. Its one deviation moves everything that touches it, is located by it, or is measured at `feature.point(x, y, z)` or at an
+end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 schemes that choose its triangles without naming it.
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
@@ -87,27 +87,7 @@ does. Whatever touches it, is located by it, or is measured at `feature.point(x,
 feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
 >>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
 
-| tolerance | of | what it controls |
-|---|---|---|
-| `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
-| `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
-| `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
-| `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
-| `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
-| `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
-| `tc.Flatness` | plane | form, which moves nothing yet |
-
-A tolerance limits what its datums lock, and nothing else: a hole's position to a plane across it is a tolerance of its tilt.
-Datums are features of the same part; "A-B" is a common datum, "B(M)" one at maximum material, as in `tc.Position(0.2,
-"A|B(M)")`. If they deviate themselves, what refers to them follows. A part's frame is that of its shape, where datums are
-nominal. A datum shift is not drawn: the contact of the datum feature with its mate does that. Several tolerances of a feature
-are nested, form within orientation within location (a finer lower frame is a second position, to fewer datums); each draws
-what the narrower ones leave.
-
-`zone="flat", along="x"` puts an axis between planes; `projected=20` has the zone stand out of the primary datum by so much;
-`material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the
-process uses it), "accepts" (only a check does) or "none". `rule=`, `cp=` and `cpk=` are in `tolcontact.variation`. This is how
-ISO 1101, 5459 and 2692 have it; sizes do not limit form (independency, ISO 8015), where ASME's Rule #1 does.
+`tolcontact.features` lists the tolerances, what each of them controls, and how datums work.
 
 ## Shared causes, correlation, measured parts
 

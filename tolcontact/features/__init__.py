@@ -1,4 +1,53 @@
-"""Features: the freedoms that their tolerances control, their datum systems and zones, and how their faces deviate."""
+"""Features: tolerances of a drawing become freedoms of faces. A chapter of the guide.
+
+A face is recognized as a plane, cylinder, cone, sphere or general surface; two opposed planes are a slot, a tab or a thickness.
+It deviates as a whole by small displacements in mm, each of them a contributor:
+
+| feature | displacements |
+|---|---|
+| plane; middle of two planes | offset in its middle, two tilts at the edges of its smallest rectangle |
+| cylinder, cone | two shifts in the middle of its axis, two tilts at its ends; of a cone also a shift along the axis |
+| sphere | three shifts of its centre |
+| general surface | those of six displacements that move its vertices along their normals |
+| cylinder, sphere, two planes | its size: a diameter or a distance |
+
+>>> import tolcontact as tc
+>>> model = tc.Assembly("block")
+>>> block = model.part("block", tc.Box(100, 50, 10), fixed=True)
+>>> foot = block.feature("foot", block.face("-z"), datum="A")
+>>> top = block.feature("top", block.face("+z"), tc.Parallelism(0.1, "A"), tc.Profile(0.3, "A"))
+>>> far = block.feature("far", block.face("+x"), tc.Perpendicularity(0.1, "A"))
+>>> height = model.measure("height", top.point(0, 0, 10), along="z")
+>>> tc.build(model).nominal.contributors
+('block.top.tilt x', 'block.top.tilt y', 'block.top.offset', 'block.far.tilt z')
+
+## Tolerances
+
+| tolerance | of | what it controls |
+|---|---|---|
+| `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
+| `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
+| `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
+| `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
+| `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
+| `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
+| `tc.Flatness` | plane | form, which does not move a feature |
+
+`zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum.
+`material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the
+process uses it), "accepts" (only a check does) or "none". `rule=`, `cp=` and `cpk=` are in `tolcontact.variation`. All this
+follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), while ASME's Rule #1 makes them do so.
+
+## Datums
+
+Datums are features of the same part; "A-B" is a common datum, "B(M)" one at maximum material, as in `tc.Position(0.2,
+"A|B(M)")`. A tolerance limits only what its datums lock: a hole's position to a plane across it is a tolerance of its tilt. If
+datums deviate, the features that refer to them follow. The frame of a part is that of its shape, where datums are nominal. A
+datum shift is not drawn: it follows from the contact of the datum feature with its mate.
+
+Several tolerances of a feature are nested, form within orientation within location; a finer lower frame is a second position,
+to fewer datums. Each tolerance draws the freedoms that the narrower ones leave, as the top of the block shows.
+"""
 
 from tolcontact.features.feature_geometry import AxisFeature, FeatureOfSize, PlaneFeature
 from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, datum_order
@@ -6,13 +55,6 @@ from tolcontact.features.tolerance_kinds import zone_of
 from tolcontact.features.tolerance_layers import Layer
 
 __all__ = [
-    "AxisFeature",
-    "FaceDeviation",
-    "FeatureOfSize",
-    "Features",
-    "Layer",
-    "NominalFeature",
-    "PlaneFeature",
-    "datum_order",
+    "AxisFeature", "FaceDeviation", "FeatureOfSize", "Features", "Layer", "NominalFeature", "PlaneFeature", "datum_order",
     "zone_of",
-]
+]  # fmt: skip
