@@ -15,7 +15,7 @@ from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import ContactWarning, GeometryFault, designation, shown
 from tolcontact.features import FaceDeviation, Features
-from tolcontact.geometry.curvature import CHORD, distinct, facet_error, following, is_flat, sampling_error
+from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
 from tolcontact.geometry.spreading import own_vertices, spread
@@ -157,11 +157,11 @@ def _with_curvature(
 ) -> np.ndarray:
     """Return points P_m (point, 3) of curved faces; if the choice is open, with the points that follow curvature added.
 
-    Warns if the points, or the triangles, leave more than CHORD times `finest` undetected, the smallest tolerance range.
+    Warns if the points, or the triangles, leave more than CHORD_SHARE times `finest` undetected, the smallest tolerance range.
     """
-    dense = following(moving_face, reference_face, chord=CHORD * finest, within=reach)
+    dense = curvature_points(moving_face, reference_face, chord=CHORD_SHARE * finest, within=reach)
     if is_flat(reference_face) and moving_face.curvature > 0:
-        step = math.sqrt(8 * CHORD * finest / moving_face.curvature)
+        step = math.sqrt(8 * CHORD_SHARE * finest / moving_face.curvature)
         dense = np.concatenate([dense, rim_points(moving_face, reference_face, step, reach)])
     if _is_open(pair):
         P_m = np.concatenate([P_m, dense])
@@ -171,7 +171,7 @@ def _with_curvature(
         (between_points, "between its contact points", "give it more points, or leave points and spacing out"),
         (under_facets, "between flat triangles and the round faces that they approximate", "use a finer mesh"),
     ):
-        if error > CHORD * finest:
+        if error > CHORD_SHARE * finest:
             warnings.warn(
                 f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
                 f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {advice}",
