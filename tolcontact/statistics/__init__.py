@@ -77,10 +77,12 @@ each point.
 from tolcontact.statistics.archived_analysis import kept_analysis
 from tolcontact.statistics.contact import TouchingShares, touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
+from tolcontact.statistics.measure_statistics import STATISTICS, limits
 from tolcontact.statistics.run_comparison import compare_runs
-from tolcontact.statistics.summary import Summary, estimate_of, limits, summarize
+from tolcontact.statistics.summary import Summary, estimate_of, summarize
 
 __all__ = [
+    "STATISTICS",
     "BlockSums", "DisplacementFields", "Summary", "TouchingShares", "compare_runs", "estimate_of", "kept_analysis", "limits",
     "summarize", "touching",
 ]  # fmt: skip

@@ -3,10 +3,8 @@
 from tolcontact.vocabulary.allocation import *  # noqa: F403
 from tolcontact.vocabulary.analyses import *  # noqa: F403
 from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)
-from tolcontact.vocabulary.comparison import *  # noqa: F403
 from tolcontact.vocabulary.contributions import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
-from tolcontact.vocabulary.population import *  # noqa: F403
 from tolcontact.vocabulary.relocation import *  # noqa: F403
 from tolcontact.vocabulary.sensitivities import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403

@@ -22,6 +22,7 @@ SOLVER, RUN, DESIGN, STATUS_MEANING, EXTENT = "solver", "run", "design", "status
 BOUNDS = ("lower", "upper")
 MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube", "sobol")  # sampling plans
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
+METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
 KEPT = ("measures", "poses", "all")
 FIELD_CHOICES = ("some", "all", "none")  # besides a number
 

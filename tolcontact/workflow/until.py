@@ -10,8 +10,8 @@ from tolcontact.archive import opened
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import block_rows
-from tolcontact.statistics import estimate_of
-from tolcontact.vocabulary import EVERY_STATISTIC, OUTSIDE, PPM
+from tolcontact.statistics import STATISTICS, estimate_of
+from tolcontact.vocabulary import OUTSIDE, PPM
 
 log = logging.getLogger(__name__)
 
@@ -40,8 +40,8 @@ class Target:
                 f'until is {text!r}; expected a text such as "corner height: 6 sigma +-1 %" or "gap: mean +-0.001"'
             )
         statistic = _WORDS.get(found["statistic"], found["statistic"])
-        if statistic not in EVERY_STATISTIC:
-            known = ", ".join([PPM, *EVERY_STATISTIC])
+        if statistic not in STATISTICS:
+            known = ", ".join([PPM, *STATISTICS])
             raise OptionError(f'until has "{found["statistic"]}"; expected one of: {known}')
         half = float(found["half"])
         if found["of"]:
