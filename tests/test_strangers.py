@@ -14,7 +14,7 @@ import tolcontact as tc
 from tests import cases
 from tolcontact.archive.header import declaration
 from tolcontact.declaration import tape
-from tolcontact.declaration.rebuilding import from_document
+from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.mechanics import tape as symbolic_tape
 

@@ -15,7 +15,7 @@ from tolcontact.archive.surface_rows import nothing_checked
 from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import ACCURACY, Program
 from tolcontact.declaration import Mesh
-from tolcontact.declaration.document import plain_faces, to_document
+from tolcontact.declaration.document import Writing, to_document
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.method import Method
@@ -356,7 +356,7 @@ def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -
 
 def declaration(program: Program) -> str:
     """The declared model as JSON."""
-    return json.dumps(to_document(program.nominal.assembly, plain_faces(program.nominal.triangles), program.tapes))
+    return json.dumps(to_document(program.nominal.assembly, Writing(program.nominal.triangles, program.tapes)))
 
 
 def versions() -> str:

@@ -11,7 +11,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
-from tolcontact.declaration.rebuilding import from_document
+from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 

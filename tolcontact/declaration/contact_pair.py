@@ -25,10 +25,10 @@ class ContactPair(Readable):
     name: str
     moving: Face
     reference: Face
-    points: int | str | None
-    spacing: float | None
-    within: float | None
-    declared_at: str
+    points: int | str | None = None
+    spacing: float | None = None
+    within: float | None = None
+    declared_at: str = ""
 
     def faults(self) -> Iterator[str]:
         yield from self.moving.faults()

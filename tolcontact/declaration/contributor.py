@@ -27,8 +27,8 @@ class Variable(Readable):
     name: str
     tolerance: Tolerance
     drives: Mapping[str, float]
-    units: str
-    declared_at: str
+    units: str = "mm"
+    declared_at: str = ""
 
     def faults(self) -> Iterator[str]:
         yield from self.tolerance.faults()
@@ -51,7 +51,7 @@ class Correlation(Readable):
 
     labels: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
-    declared_at: str
+    declared_at: str = ""
 
     @property
     def name(self) -> str:
@@ -90,8 +90,8 @@ class Population(Readable):
 
     columns: tuple[str, ...]
     values: np.ndarray
-    source: str
-    declared_at: str
+    source: str = "given"
+    declared_at: str = ""
 
     @property
     def name(self) -> str:

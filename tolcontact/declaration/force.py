@@ -15,7 +15,7 @@ class Force(Readable):
     name: str
     at: Point
     vector: Vector
-    declared_at: str
+    declared_at: str = ""
 
     def faults(self) -> Iterator[str]:
         yield from self.at.faults()

@@ -84,7 +84,7 @@ class ThreeTwoOne(Readable):
     primary: Face
     secondary: Face
     tertiary: Face
-    inset: float
+    inset: float = 0.0
 
     @property
     def faces(self) -> tuple[Face, Face, Face]:
@@ -116,9 +116,9 @@ class Location(Readable):
 
     part: Part
     scheme: ThreeTwoOne | tuple[Locator, ...]
-    tolerance: Tolerance | None
-    on: Part | None
-    declared_at: str
+    tolerance: Tolerance | None = None
+    on: Part | None = None
+    declared_at: str = ""
     floating: bool = False
 
     @property

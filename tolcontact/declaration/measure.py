@@ -26,11 +26,11 @@ class Measure(Readable):
 
     name: str
     of: Point | Callable[[Any], Any] | tuple[Any, ...]
-    to: Point | None
-    along: Vector | None
-    tolerance: float | None
-    units: str
-    declared_at: str
+    to: Point | None = None
+    along: Vector | None = None
+    tolerance: float | None = None
+    units: str = "mm"
+    declared_at: str = ""
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
 

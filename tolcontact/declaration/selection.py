@@ -135,6 +135,11 @@ class Brep(Readable):
         object.__setattr__(self, "name", which if isinstance(which, str) else None)
         object.__setattr__(self, "at", None if number is not None or self.name is not None else vector(which))
 
+    @property
+    def which(self) -> int | str | Vector | None:
+        """The number, the name, or the point."""
+        return next((value for value in (self.number, self.name, self.at) if value is not None), None)
+
     def faults(self) -> Iterator[str]:
         if self.at is not None and not is_finite(self.at):
             yield "a B-rep face needs its number, its name, or a point on it, three finite numbers"

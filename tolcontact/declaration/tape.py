@@ -7,7 +7,7 @@ value.
 
 from typing import Any
 
-from tolcontact.declaration.said import Said
+from tolcontact.declaration.codec import MAX_NUMBER, Place
 
 Tape = tuple[tuple[Any, ...], ...]
 
@@ -23,24 +23,23 @@ OPERANDS = {"input": 1, "const": 1, **dict.fromkeys(UNARY, 1), **dict.fromkeys(B
 LONGEST = 1_000_000  # steps: an expression of more takes minutes to compile
 
 
-def tape_of(said: Said, inputs: int) -> Tape:
-    """The tape that a document holds, of so many inputs at most.
+def tape_of(rows: list[list[Any]], place: Place) -> Tape:
+    """Return the tape that a document has at `place`.
 
-    Raises ArchiveError if it is not a list of known steps, each on earlier ones.
+    Raises EntryError for a step that is unknown, or is not on inputs and earlier steps.
     """
-    rows: list[tuple[Any, ...]] = []
-    for row in said:
-        first, *operands = list(row) or [row]
-        name = first.one_of(OPERANDS)
-        if len(operands) != OPERANDS[name]:
-            raise row.refused(f"{name!r} with {len(operands)} operands")
-        if name == "const":
-            rows.append((name, operands[0].constant()))
-        else:
-            count = inputs if name == "input" else len(rows)
-            rows.append((name, *(operand.index(count) for operand in operands)))
-        if len(rows) > LONGEST:
-            raise said.refused(f"more than {LONGEST} steps")
-    if not rows:
-        raise said.refused("no steps")
-    return tuple(rows)
+    if not 0 < len(rows) <= LONGEST:
+        raise place.error("it has no steps" if not rows else f"it has more than {LONGEST} steps")
+    for k, (operation, *operands) in enumerate(row or [None] for row in rows):
+        if operation not in OPERANDS:
+            raise place[k].mismatch("the name of an operation", operation)
+        if len(operands) != OPERANDS[operation]:
+            raise place[k].error(f"{operation!r} with {len(operands)} operands")
+        count = place.sources.inputs if operation == "input" else k
+        for operand in operands:
+            if operation == "const":  # an expression may compare with infinity
+                if not isinstance(operand, float) and not (isinstance(operand, int) and abs(operand) <= MAX_NUMBER):
+                    raise place[k].mismatch("a number", operand)
+            elif not (isinstance(operand, int) and 0 <= operand < count):
+                raise place[k].mismatch(f"a whole number from 0 to {count - 1}", operand)
+    return tuple(map(tuple, rows))

@@ -1,0 +1,400 @@
+"""Codecs: how a value stands in a document of plain values (dicts, lists, numbers, texts), and how it is read from there.
+
+A `Record` follows from a class: the names, the types and the defaults of its fields stand in that class alone. msgspec checks
+the structure of an entry and describes it as JSON schema; `faults()` of the class checks its values. Nothing is converted, and
+nothing in a document is run. References between declared things are codecs of `tolcontact.declaration.document`.
+"""
+
+import inspect
+import re
+import types
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+from msgspec import UNSET, Meta, UnsetType
+
+from tolcontact.errors import TolcontactError
+
+MAX_NUMBER = 1e100  # its square is finite
+MAX_MESSAGE = 300
+PLAIN_TYPES = {
+    "int": "a whole number", "float": "a number", "str": "a text", "bool": "true or false", "array": "a list",
+    "object": "named values", "null": "null",
+}  # fmt: skip
+
+
+class EntryError(Exception):
+    """An entry of a document that is not what a codec expects; the message begins with its place."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What a document is read with: meshes by part, the folder of its shape files (None: it may name none), its file name.
+
+    `parts` are those that have been read, by name, and `inputs` is the largest number of inputs of an expression.
+    """
+
+    meshes: Mapping[str, Any]
+    folder: Path | None = None
+    file: str = ""
+    parts: dict[str, Any] = field(default_factory=dict)
+    inputs: int = 0
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a document, such as `parts[2].name`.
+
+    part     the part whose features an entry there may name
+    record   the entry of the record that it belongs to
+    """
+
+    sources: Sources
+    path: str = ""
+    part: Any = None
+    record: Any = None
+
+    def __getitem__(self, key: str | int) -> "Place":
+        if isinstance(key, int):
+            return replace(self, path=f"{self.path}[{key}]")
+        return replace(self, path=f"{self.path}.{key}" if self.path else key)
+
+    @property
+    def line(self) -> str:
+        """The text that takes the place of the script line that declared a thing."""
+        return f"{self.sources.file}: {self.path.rpartition('.')[2]}" if self.sources.file else ""
+
+    def error(self, reason: str) -> EntryError:
+        """Return the error for an entry that has a fault."""
+        reason = reason if len(reason) <= MAX_MESSAGE else f"{reason[:MAX_MESSAGE]}..."
+        return EntryError(f"{self.path}: {reason}" if self.path else reason)
+
+    def mismatch(self, expected: str, value: Any) -> EntryError:
+        """Return the error for a value that is not what is expected."""
+        if isinstance(value, Mapping):
+            actual = "named values"
+        elif isinstance(value, list | tuple):
+            actual = f"a list of {len(value)}"
+        elif isinstance(value, str):
+            actual = repr(value) if len(value) <= 40 else "a text"
+        elif isinstance(value, int) and abs(value) > MAX_NUMBER:
+            actual = "a huge number"  # Python refuses to print whole numbers of more than 4300 digits
+        else:
+            actual = repr(value)
+        return self.error(f"expected {expected}, got {actual}")
+
+    def converted(self, value: Any, wire: Any) -> Any:
+        """Return the value as msgspec has it for the type `wire`. Raises EntryError if it has another structure."""
+        try:
+            return msgspec.convert(value, wire)
+        except msgspec.ValidationError as error:
+            reason, _, path = str(error).partition(" - at `$")
+            path = self.path + path.removesuffix("`") if path else self.path
+            raise replace(self, path=path.removeprefix("." * (not self.path))).error(_in_words(reason)) from error
+
+    def checked(self, thing: Any) -> Any:
+        """Return a declared thing. Raises EntryError if it has faults."""
+        for fault in thing.faults() if hasattr(thing, "faults") else ():
+            raise self.error(fault)
+        return thing
+
+
+def _in_words(reason: str) -> str:
+    """Return a message of msgspec in the words of this package."""
+    if reason.startswith("Object missing required field"):
+        return "it has no " + reason.rpartition("field ")[2].replace("`", "'")
+    if reason.startswith("Object contains unknown field"):
+        return "unknown name " + reason.partition("field ")[2].replace("`", "'") + "; leave it out"
+
+    def plain(match: re.Match[str]) -> str:
+        names = match[1].split(" | ")
+        return " or ".join(PLAIN_TYPES.get(name, name) for name in names if name != "int" or "float" not in names)
+
+    return re.sub("`([^`]*)`", plain, reason[:1].lower() + reason[1:])
+
+
+class Codec:
+    """How values of a class are written and read. `wire` is the type of their entries for msgspec."""
+
+    wire: Any = Any
+    cls: Any = object
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        """Return the entry of a value."""
+        raise NotImplementedError
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        """Return the value of an entry. Raises EntryError if it has none."""
+        raise NotImplementedError
+
+    def fits(self, entry: Any) -> bool:
+        """Whether an entry is meant to be of this kind."""
+        return True
+
+    def holds(self, value: Any) -> bool:
+        """Whether a value is of this kind."""
+        return isinstance(value, self.cls)
+
+
+class Plain(Codec):
+    """Numbers, texts and truth values, and tuples and mappings of them. Numbers are finite; whole ones stay whole.
+
+    write   gives the entry of a value, if that is not the value itself
+    read    gives the value of a sound entry, likewise
+    """
+
+    def __init__(
+        self,
+        annotation: Any,
+        write: Callable[[Any, Any], Any] = lambda value, writing: value,
+        read: Callable[[Any, Place], Any] = lambda value, place: value,
+    ) -> None:
+        self.wire, self.write, self.read = _wire(annotation), write, read
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        return self.write(value, writing)
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        value = place.converted(entry, self.wire)
+        _check_numbers(value, place)
+        return self.read(value, place)
+
+    def fits(self, entry: Any) -> bool:
+        return not isinstance(entry, dict | list)
+
+
+def _check_numbers(value: Any, place: Place) -> None:
+    if isinstance(value, int | float) and not abs(value) <= MAX_NUMBER:
+        raise place.mismatch("a finite number", value)
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list | tuple) else ()
+    for key, item in items:
+        _check_numbers(item, place[key])
+
+
+def _wire(annotation: Any) -> Any:
+    """Return the type of msgspec for an annotation: a float may be whole, a sequence is a list."""
+    arguments = get_args(annotation)
+    if annotation is float:
+        return int | float
+    if get_origin(annotation) is Annotated:
+        return Annotated[(_wire(arguments[0]), *arguments[1:])]  # type: ignore[return-value]
+    if get_origin(annotation) in (Union, types.UnionType):
+        return Union[tuple(map(_wire, arguments))]
+    if get_origin(annotation) in (tuple, list):
+        return get_origin(annotation)[tuple(item if item is ... else _wire(item) for item in arguments)]
+    if isinstance(get_origin(annotation), type) and issubclass(get_origin(annotation), Mapping):
+        return dict[str, _wire(arguments[1])]  # type: ignore[misc]
+    return annotation
+
+
+class Items(Codec):
+    """Lists of things of one kind; of `count` things, if that is not 0."""
+
+    cls = tuple
+
+    def __init__(self, codec: Codec, count: int = 0) -> None:
+        self.codec, self.count, self.wire = codec, count, list[codec.wire]  # type: ignore[name-defined]
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        return [self.codec.encode(item, writing) for item in value]
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        entries = place.converted(entry, list[Any])
+        if self.count and len(entries) != self.count:
+            raise place.mismatch(f"a list of {self.count}", entries)
+        return tuple(self.codec.decode(item, place[k], **arguments) for k, item in enumerate(entries))
+
+    def fits(self, entry: Any) -> bool:
+        return isinstance(entry, list)
+
+
+class Named(Codec):
+    """Codecs whose entries have a definition in the JSON schema."""
+
+    registry: "dict[str, Named]" = {}  # noqa: RUF012 filled by all instances
+
+    def __init__(self, name: str) -> None:
+        self.registry[name] = self
+        self.name, self.wire = name, Annotated[Any, Meta(extra_json_schema={"$ref": f"#/$defs/{name}"})]
+
+    def definition(self) -> dict[str, Any]:
+        """Return the JSON schema of an entry."""
+        raise NotImplementedError
+
+
+class Choice(Named):
+    """One of several kinds: entries that the first fitting codec reads."""
+
+    def __init__(self, name: str, expected: str, *codecs: Codec) -> None:
+        super().__init__(name)
+        self.expected, self.codecs = expected, codecs
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        return next(codec for codec in self.codecs if codec.holds(value)).encode(value, writing)
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        for codec in self.codecs:
+            if codec.fits(entry):
+                return codec.decode(entry, place, **arguments)
+        raise place.mismatch(self.expected, entry)
+
+    def definition(self) -> dict[str, Any]:
+        return {"anyOf": [msgspec.json.schema(codec.wire) for codec in self.codecs]}
+
+
+@dataclass(frozen=True)
+class Inline:
+    """A field whose value stands under some of several keys of its record.
+
+    keys     their types for msgspec
+    encode   gives the entries of a thing under these keys
+    decode   gives the value of the field from these entries; UNSET leaves it to the class
+    """
+
+    keys: Mapping[str, Any]
+    encode: Callable[[Any, Any], dict[str, Any]]
+    decode: Callable[[Mapping[str, Any], Place], Any]
+
+
+@dataclass(frozen=True)
+class Field:
+    """The place of a field, or of several as a list, in the entry of a record."""
+
+    key: str
+    names: tuple[str, ...]
+    codec: Any  # a Codec, or Inline
+    default: Any  # inspect.Parameter.empty if there is none
+    is_omitted: bool  # if it has its default value
+
+    def value(self, thing: Any) -> Any:
+        """Return what a thing has there."""
+        return getattr(thing, self.names[0]) if len(self.names) == 1 else tuple(getattr(thing, name) for name in self.names)
+
+
+class Record(Named):
+    """Things of one class: an entry has a key for each field, or for those in `keys`.
+
+    keys     in the order of the document: "name", "key=field", "key=field+field" for a list of several fields; "name?" is
+             left out if it has its default value
+    kind     what an entry has under "kind"
+    mark     a key that tells these entries from others
+    codecs   of fields whose type does not tell theirs
+    """
+
+    def __init__(
+        self, cls: Any, keys: str, *, kind: str = "", mark: str = "", name: str = "", **codecs: Codec | Inline
+    ) -> None:
+        super().__init__(name or cls.__name__)
+        self.cls, self.kind, self.mark = cls, kind, mark
+        parameters, hints = inspect.signature(cls).parameters, get_type_hints(cls, include_extras=True)
+        self.fields = []
+        for word in keys.split():
+            key, _, joined = word.removesuffix("?").partition("=")
+            names = tuple((joined or key).split("+"))
+            codec = codecs.get(key) or _codec_of(*(hints[name] for name in names))
+            self.fields.append(Field(key, names, codec, parameters[names[0]].default, word.endswith("?")))
+        self.struct = msgspec.defstruct(self.name, list(self._struct_fields()), forbid_unknown_fields=True, kw_only=True)
+
+    def _struct_fields(self) -> Iterator[tuple[str, Any] | tuple[str, Any, Any]]:
+        if self.kind:
+            yield "kind", Annotated[str, Meta(extra_json_schema={"const": self.kind})]
+        for member in self.fields:
+            if isinstance(member.codec, Inline):
+                yield from ((key, wire | UnsetType, UNSET) for key, wire in member.codec.keys.items())
+            elif member.default is inspect.Parameter.empty:
+                yield member.key, member.codec.wire
+            else:
+                yield member.key, member.codec.wire | UnsetType, UNSET
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        entry = {"kind": self.kind} if self.kind else {}
+        for member in self.fields:
+            if isinstance(member.codec, Inline):
+                entry |= member.codec.encode(value, writing)
+            elif not (member.is_omitted and member.value(value) == member.default):
+                entry[member.key] = member.codec.encode(member.value(value), writing)
+        return entry
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        struct = place.converted(entry, self.struct)
+        place = replace(place, record=struct)
+        for member in self.fields:
+            if isinstance(member.codec, Inline):
+                entries = {key: item for key in member.codec.keys if (item := getattr(struct, key)) is not UNSET}
+                value = member.codec.decode(entries, place)
+            else:
+                item = getattr(struct, member.key)
+                value = UNSET if item is UNSET else member.codec.decode(item, place[member.key])
+            if value is not UNSET:
+                arguments |= zip(member.names, [value] if len(member.names) == 1 else value, strict=True)
+            if member.names[0] == "part":
+                place = replace(place, part=arguments["part"])
+            if member.key == "declared_at":
+                arguments.setdefault("declared_at", place.line)
+        try:
+            thing = self.cls(**arguments)
+        except (TypeError, ValueError, TolcontactError) as error:
+            raise place.error(str(error)) from error
+        return place.checked(thing)
+
+    def fits(self, entry: Any) -> bool:
+        if self.kind:
+            return isinstance(entry, dict) and entry.get("kind") == self.kind
+        return isinstance(entry, dict) and (not self.mark or self.mark in entry)
+
+    def definition(self) -> dict[str, Any]:
+        schema: dict[str, Any] = msgspec.json.schema_components([self.struct], ref_template="#/$defs/{name}")[1][self.name]
+        for member in self.fields:
+            if member.default is None or isinstance(member.default, str | int | float | tuple):
+                schema["properties"].get(member.key, {})["default"] = member.default
+        return schema
+
+
+class Optional(Codec):
+    """Things that an entry has, or null."""
+
+    def __init__(self, codec: Codec) -> None:
+        self.codec, self.wire = codec, codec.wire | None
+
+    def encode(self, value: Any, writing: Any) -> Any:
+        return None if value is None else self.codec.encode(value, writing)
+
+    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
+        return None if entry is None else self.codec.decode(entry, place, **arguments)
+
+
+CODECS: dict[Any, Codec] = {}  # of declared classes, by class
+
+
+def _codec_of(*annotations: Any) -> Codec:
+    """Return the codec of a field from its type; of several fields that of their list."""
+    if len(annotations) > 1:
+        codec = CODECS.get(annotations[0])
+        return Items(codec, len(annotations)) if codec else Plain(tuple[annotations])  # type: ignore[valid-type]
+    annotation, arguments = annotations[0], get_args(annotations[0])
+    if annotation in CODECS:
+        return CODECS[annotation]
+    declared = [CODECS[argument] for argument in arguments if argument in CODECS]
+    if not declared:
+        return Plain(annotation)
+    return Items(declared[0]) if get_origin(annotation) is tuple else Optional(declared[0])
+
+
+def definitions() -> dict[str, Any]:
+    """Return the JSON schemas of all named entries."""
+    return {name: _simplified(codec.definition()) for name, codec in sorted(Named.registry.items())}
+
+
+def _simplified(schema: Any) -> Any:
+    """Return a schema in which "integer or number" is "number"."""
+    if isinstance(schema, list | tuple):
+        items = [_simplified(item) for item in schema]
+        return [item for item in items if item != {"type": "integer"}] if {"type": "number"} in items else items
+    if not isinstance(schema, dict):
+        return schema
+    schema = {key: _simplified(value) for key, value in schema.items()}
+    alternatives = schema.get("anyOf", ())
+    return {**alternatives[0], **{k: v for k, v in schema.items() if k != "anyOf"}} if len(alternatives) == 1 else schema
