@@ -174,9 +174,9 @@ A model script is a Python file with a function `assembly()` that returns the de
 under a main guard it runs by itself, with the options of `tolcontact run`; the files in `models/` are such scripts.
 
 The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
-"model.json")` writes them, by the schema `model.schema.json` in this package; what a script would leave out may be left out,
-files of shapes are named from the folder of the JSON file, and errors state the place:
-`parts[2].features[0].tolerances[1].width`.
+"model.json")` writes them. What a script would leave out may be left out, files of shapes are named from the folder of the
+JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON schema follows from the classes of
+this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
 
 Every archive holds its model as JSON, too, with the triangles of meshes beside it: `tc.model_of(results)` rebuilds the
 assembly without running any code of the script. Functions of poses are kept as lists of elementary operations.

@@ -6,10 +6,12 @@ nothing in a document is run. References between declared things are codecs of `
 """
 
 import inspect
+import operator
 import re
 import types
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -182,7 +184,7 @@ def _wire(annotation: Any) -> Any:
     if get_origin(annotation) is Annotated:
         return Annotated[(_wire(arguments[0]), *arguments[1:])]  # type: ignore[return-value]
     if get_origin(annotation) in (Union, types.UnionType):
-        return Union[tuple(map(_wire, arguments))]
+        return reduce(operator.or_, map(_wire, arguments))
     if get_origin(annotation) in (tuple, list):
         return get_origin(annotation)[tuple(item if item is ... else _wire(item) for item in arguments)]
     if isinstance(get_origin(annotation), type) and issubclass(get_origin(annotation), Mapping):
@@ -215,6 +217,7 @@ class Named(Codec):
     """Codecs whose entries have a definition in the JSON schema."""
 
     registry: "dict[str, Named]" = {}  # noqa: RUF012 filled by all instances
+    struct: Any
 
     def __init__(self, name: str) -> None:
         self.registry[name] = self
@@ -222,7 +225,8 @@ class Named(Codec):
 
     def definition(self) -> dict[str, Any]:
         """Return the JSON schema of an entry."""
-        raise NotImplementedError
+        schemas = msgspec.json.schema_components([self.struct], ref_template="#/$defs/{name}")[1]
+        return next(schema for schema in schemas.values())
 
 
 class Choice(Named):
@@ -295,7 +299,8 @@ class Record(Named):
             key, _, joined = word.removesuffix("?").partition("=")
             names = tuple((joined or key).split("+"))
             codec = codecs.get(key) or _codec_of(*(hints[name] for name in names))
-            self.fields.append(Field(key, names, codec, parameters[names[0]].default, word.endswith("?")))
+            default = parameters[names[0]].default if names[0] in parameters else inspect.Parameter.empty
+            self.fields.append(Field(key, names, codec, default, word.endswith("?")))
         self.struct = msgspec.defstruct(self.name, list(self._struct_fields()), forbid_unknown_fields=True, kw_only=True)
 
     def _struct_fields(self) -> Iterator[tuple[str, Any] | tuple[str, Any, Any]]:
@@ -337,8 +342,15 @@ class Record(Named):
         try:
             thing = self.cls(**arguments)
         except (TypeError, ValueError, TolcontactError) as error:
-            raise place.error(str(error)) from error
-        return place.checked(thing)
+            raise self._fault(str(error), place) from error
+        for fault in thing.faults() if hasattr(thing, "faults") else ():
+            raise self._fault(fault, place)
+        return thing
+
+    def _fault(self, fault: str, place: Place) -> EntryError:
+        """Return the error for a fault of a thing; its first word may be a field, which then is its place."""
+        keys = [member.key for member in self.fields if fault.split(" ", maxsplit=1)[0] in member.names]
+        return (place[keys[0]] if keys else place).error(fault)
 
     def fits(self, entry: Any) -> bool:
         if self.kind:
@@ -346,7 +358,7 @@ class Record(Named):
         return isinstance(entry, dict) and (not self.mark or self.mark in entry)
 
     def definition(self) -> dict[str, Any]:
-        schema: dict[str, Any] = msgspec.json.schema_components([self.struct], ref_template="#/$defs/{name}")[1][self.name]
+        schema = super().definition()
         for member in self.fields:
             if member.default is None or isinstance(member.default, str | int | float | tuple):
                 schema["properties"].get(member.key, {})["default"] = member.default

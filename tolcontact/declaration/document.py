@@ -14,7 +14,20 @@ import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.codec import CODECS, Choice, EntryError, Inline, Items, Named, Optional, Place, Plain, Record, Sources
+from tolcontact.declaration.codec import (
+    CODECS,
+    Choice,
+    Codec,
+    EntryError,
+    Inline,
+    Items,
+    Named,
+    Optional,
+    Place,
+    Plain,
+    Record,
+    Sources,
+)
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
@@ -35,7 +48,7 @@ from tolcontact.poses import ENTRIES
 Document = dict[str, Any]
 UNIT_TOLERANCE = 1e-12  # of the length of a direction
 MAX_FREEDOMS = 7  # of a feature, with its size
-Index = Annotated[int, Meta(ge=0, lt=2**31)]
+MAX_INDEX = 2**31 - 1  # of triangles, points, faces
 
 
 @dataclass(frozen=True)
@@ -62,6 +75,8 @@ def _number(**limits: float) -> Any:
     return Annotated[float, Meta(extra_json_schema=limits)]
 
 
+# Limits that msgspec itself would check crash its 0.22 in a union with a list: classes check them, or `_indices`.
+INDEX = Annotated[int, Meta(extra_json_schema={"minimum": 0, "maximum": MAX_INDEX})]
 POSITIVE, NOT_NEGATIVE = _number(exclusiveMinimum=0), _number(minimum=0)
 
 
@@ -93,6 +108,19 @@ def _floats(value: Any, writing: Writing) -> Any:
     return None if value is None else float(value)
 
 
+def _indices(value: Any, place: Place) -> Any:
+    """Return indices, or what else stands for them. Raises EntryError for one that no triangle, point or face can have."""
+    for k, index in enumerate(value) if isinstance(value, tuple) else [(None, value)]:
+        if isinstance(index, int) and not 0 <= index <= MAX_INDEX:
+            raise (place if k is None else place[k]).mismatch(f"a whole number from 0 to {MAX_INDEX}", index)
+    return value
+
+
+def _brep(value: Any, place: Place) -> Any:
+    """Return the number, the name or the point of a B-rep face."""
+    return value if isinstance(value, tuple) else _indices(value, place)
+
+
 def _array(rows: list[list[float]], place: Place) -> np.ndarray:
     """Return rows of equal length as an array (row, column)."""
     for k, row in enumerate(rows):
@@ -105,24 +133,28 @@ class AxisFace(Plain):
     """Criteria that are one of six directions, without an angle."""
 
     def __init__(self) -> None:
-        super().__init__(_text(DIRECTIONS), lambda face, writing: face.direction, lambda text, place: place.checked(Facing(text)))
+        super().__init__(
+            _text(DIRECTIONS), lambda face, writing: face.direction, lambda text, place: place.checked(Facing(text))
+        )
 
     def holds(self, value: Any) -> bool:
         return isinstance(value, Facing) and isinstance(value.direction, str) and value == Facing(value.direction)
 
 
-class Wrapped(Plain):
-    """Records as the only value of an entry, under the key `mark`."""
+class Wrapped(Codec):
+    """Entries with one value, under the key `mark`."""
 
-    def __init__(self, mark: str, record: Record) -> None:
-        self.mark, self.record, self.cls = mark, record, record.cls
-        self.wire = msgspec.defstruct(mark.title(), [(mark, record.wire)], forbid_unknown_fields=True)
+    def __init__(self, mark: str, codec: Codec) -> None:
+        self.mark, self.codec, self.cls = mark, codec, codec.cls
+        self.struct = msgspec.defstruct(mark.title(), [(mark, codec.wire)], forbid_unknown_fields=True)
+        schema = msgspec.json.schema_components([self.struct])[1][mark.title()]
+        self.wire = Annotated[Any, Meta(extra_json_schema=schema)]
 
     def encode(self, value: Any, writing: Writing) -> Document:
-        return {self.mark: self.record.encode(value, writing)}
+        return {self.mark: self.codec.encode(value, writing)}
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
-        return self.record.decode(getattr(place.converted(entry, self.wire), self.mark), place[self.mark])
+        return self.codec.decode(getattr(place.converted(entry, self.struct), self.mark), place[self.mark])
 
     def fits(self, entry: Any) -> bool:
         return isinstance(entry, dict) and self.mark in entry
@@ -143,7 +175,10 @@ class Faces(Named):
 
     def encode(self, value: Face, writing: Writing) -> Document:
         if writing.folder is not None:
-            return {"part": value.part.name, "select": [_criterion(value, criterion, writing) for criterion in value.selections]}
+            return {
+                "part": value.part.name,
+                "select": [_criterion(value, criterion, writing) for criterion in value.selections],
+            }
         boxes = [[box.lower, box.upper] for box in value.selections if isinstance(box, Inside)]
         others = [criterion for criterion in value.selections if not isinstance(criterion, Inside)]
         is_axis = len(others) == 1 and AXIS.holds(others[0])
@@ -239,7 +274,8 @@ def _tolerance_record(cls: Any) -> Record:
     """Return the record of a geometric tolerance: its width, and what is not at its default."""
     keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
     return Record(
-        cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE), zone=Plain(_text(ZONES) | None), along=Optional(FREE_DIRECTION),
+        cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
+        zone=Plain(_text(ZONES) | None), along=Optional(FREE_DIRECTION),
         material=Plain(_text(MATERIALS)), bonus=Plain(_text(BONUSES)), rule=Plain(_text(RULES)),
     )  # fmt: skip
 
@@ -247,7 +283,7 @@ def _tolerance_record(cls: Any) -> Record:
 UNIT_VECTOR = Plain(_text([*DIRECTIONS, "x", "y", "z"]) | Vector, read=_unit_vector)
 FREE_DIRECTION = Plain(_text([*DIRECTIONS, "x", "y", "z"]) | Vector, write=lambda value, writing: direction(value))
 AXIS = AxisFace()
-TRIANGLES = Plain(tuple[Index, ...], write=lambda indices, writing: list(map(int, indices)))
+TRIANGLES = Plain(tuple[INDEX, ...], lambda indices, writing: list(map(int, indices)), _indices)
 BOXES = Plain(tuple[tuple[Vector, Vector], ...])
 FLOAT, ARGUMENTS, KEYWORDS = Plain(float, write=_floats), Plain(tuple[float, ...]), Plain(Mapping[str, float])
 CODECS |= {
@@ -262,7 +298,7 @@ CRITERION = Choice(
     Record(Facing, "facing=direction angle", mark="facing", facing=FREE_DIRECTION, angle=Plain(POSITIVE)),
     Record(Inside, "inside=lower+upper", mark="inside"),
     Record(Near, "near=part within", mark="near", near=CODECS[Part], within=Plain(POSITIVE)),
-    Record(Brep, "brep=which", mark="brep", brep=Plain(Annotated[int, Meta(ge=0, lt=2**31)] | str | Vector)),
+    Record(Brep, "brep=which", mark="brep", brep=Plain(INDEX | str | Vector, read=_brep)),
     Wrapped("cylinder", Record(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
     Record(
         Largest, "largest=kind direction?", mark="largest", largest=Plain(_text(SURFACES)), direction=Optional(FREE_DIRECTION)
@@ -286,7 +322,9 @@ SIZE = Record(
     Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), lower=Plain(float | None),
     moves=Plain(_text(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
-CONTROL = Choice("FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values()))
+CONTROL = Choice(
+    "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
+)
 FEATURE = Record(Feature, "faces tolerances name datum declared_at", tolerances=Items(CONTROL))
 SHAPE = Shape(
     "Shape",
@@ -324,7 +362,7 @@ LISTS = {
     "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
-        points=Plain(Annotated[int, Meta(ge=1, lt=2**31)] | _text([VERTICES]) | None),
+        points=Plain(INDEX | _text([VERTICES]) | None, read=_indices),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None),
     ),
     "measures": Record(

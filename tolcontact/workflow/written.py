@@ -9,7 +9,7 @@ from tolcontact.workflow.run import DEFAULT_SOLVER, Model, chosen, declared
 
 
 def write_model(model: Model, path: str | Path) -> None:
-    """Write a model as JSON to `path`: its declarations, by the schema `model.schema.json` of tolcontact.declaration.
+    """Write a model as JSON to `path`: its declarations (see tolcontact.declaration).
 
     Shapes are named as files, from the folder of `path` if they are in it. Faces that a function picks become triangles, and
     functions of poses the steps of their expressions.
