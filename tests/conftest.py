@@ -22,6 +22,20 @@ CHECKED = [
 install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
 
 
+def pytest_addoption(parser):
+    parser.addoption("--nightly", action="store_true", help="run the tests marked nightly too")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Deselect the tests marked nightly, unless `--nightly` or `-m` asks for them."""
+    if config.getoption("--nightly") or "nightly" in config.getoption("markexpr"):
+        return
+    nightly = [item for item in items if item.get_closest_marker("nightly")]
+    if nightly:
+        config.hook.pytest_deselected(items=nightly)
+        items[:] = [item for item in items if not item.get_closest_marker("nightly")]
+
+
 @pytest.fixture(scope="session")
 def archive(tmp_path_factory):
     """An archive of 300 realizations of the stack. Copy it to change it."""

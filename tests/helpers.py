@@ -9,6 +9,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import pytest
 import xarray as xr
 
 import tolcontact as tc
@@ -19,9 +20,16 @@ ROOT = Path(__file__).resolve().parents[1]
 SCRIPTS = ROOT / "tests" / "scripts"
 COMMAND = [sys.executable, "-m", "tolcontact"]
 
+WAITING = 300  # s after which a process that a test waits for is ended; a loaded machine needs many times what an idle one does
+
 EXACT = tc.Method(resolution="exact")
 ALL_POINTS = tc.Method(resolution="exact", objective="all points")
 SEATED = tc.Method(resolution="exact", objective="seating")
+
+
+def nightly(*values):
+    """Return parameters of items that run at night only; the other items prove the same claim."""
+    return [pytest.param(*(value if isinstance(value, tuple) else (value,)), marks=pytest.mark.nightly) for value in values]
 
 
 def simulate(assembly, samples=200, seed=1, block=1000, **options):
@@ -88,7 +96,7 @@ def start(command, *, env=None, **options):
         signal.signal(signal.SIGINT, before)
 
 
-def finish(process, said=None, timeout=120):
+def finish(process, said=None, timeout=WAITING):
     """What a process has printed in the end, to be told something first; it is ended where it does not end."""
     try:
         out, err = process.communicate(said, timeout=timeout)
@@ -99,7 +107,7 @@ def finish(process, said=None, timeout=120):
     return Done(process.returncode, out, err)
 
 
-def run(command, *, timeout=120, **options):
+def run(command, *, timeout=WAITING, **options):
     """Start a process and wait for its end."""
     return finish(start(command, **options), timeout=timeout)
 

@@ -9,7 +9,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call, simulate
+from tests.helpers import call, nightly, simulate
 from tolcontact.simulation import simulate_blocks
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.sample import Sample
@@ -48,7 +48,7 @@ def estimates(values, lower, upper):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", DISTRIBUTIONS)
+@pytest.mark.parametrize("name", ["normal", *nightly(*(name for name in DISTRIBUTIONS if name != "normal"))])
 def test_intervals_cover_the_truth_in_95_of_100(name):
     distribution, lower, upper = DISTRIBUTIONS[name]
     expected, rng = truth(distribution, lower, upper), np.random.default_rng(8)
@@ -143,7 +143,7 @@ def test_measures_are_absolute_or_relative(absolute, nominal, quantities):
     assert summary["measure_upper"].values == pytest.approx(np.array(nominal) + 0.2)
 
 
-@pytest.mark.parametrize("absolute", [False, True])
+@pytest.mark.parametrize("absolute", [True, *nightly(False)])
 @pytest.mark.parametrize("sides", [(-0.25, 0.1), (None, 0.1), (-0.25, None)])
 def test_limits_are_compared_with_the_measure_as_it_is_said(absolute, sides):
     off = 15.0 if absolute else 0.0

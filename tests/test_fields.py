@@ -6,6 +6,7 @@ import trimesh
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 
 
 def pile(sections: int) -> tc.Assembly:
@@ -22,7 +23,7 @@ def pile(sections: int) -> tc.Assembly:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("sections", [8, 200, 700])
+@pytest.mark.parametrize("sections", [8, 200, *nightly(700)])
 def test_the_field_of_a_part_with_any_number_of_vertices_is_that_of_its_poses(sections):
     tree = tc.run(pile(sections), samples=300, solver="daqp", surfaces=0)
     field = tree["field/block"].to_dataset()

@@ -7,6 +7,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import Frame, floating
+from tests.helpers import nightly
 from tolcontact.errors import ModelError
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import Status
@@ -20,9 +21,9 @@ def drawn(results, label):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", ["qpoases", "daqp"])
-@pytest.mark.parametrize("frame", [None, MOVED], ids=["still", "moved"])
-@pytest.mark.parametrize("sections", [24, 90])
+@pytest.mark.parametrize("solver", ["daqp", *nightly("qpoases")])
+@pytest.mark.parametrize("frame", [*nightly(None), MOVED], ids=["still", "moved"])
+@pytest.mark.parametrize("sections", [24, *nightly(90)])
 def test_a_shaft_in_a_v_comes_to_where_its_diameter_and_the_walls_say(frame, solver, sections):
     results = tc.run(floating.floating_shaft_in_a_v(sections, frame=frame), samples=300, solver=solver)
     assert_resolved(results)
@@ -91,7 +92,7 @@ def room_left(q, holes, studs, room):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("material", ["", "M"])
+@pytest.mark.parametrize("material", [*nightly(""), "M"])
 def test_the_share_that_cannot_be_assembled_is_that_of_an_independent_computation(material):
     """Two hole patterns, position at maximum material or without: the least of the largest misfits, by shifting and turning."""
     words = {"material": "M", "bonus": "fills"} if material else {}

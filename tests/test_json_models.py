@@ -12,7 +12,7 @@ from jsonschema import Draft202012Validator
 import tolcontact as tc
 from tests import cases
 from tests.cases import floating, toleranced
-from tests.helpers import run
+from tests.helpers import nightly, run
 from tolcontact.declaration.codec import Named, Record
 from tolcontact.declaration.json_model import json_schema
 from tolcontact.declaration.script import load_model
@@ -86,7 +86,7 @@ def with_everything(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["plain", "everything", "shaft", "lid", "model"])
+@pytest.mark.parametrize("name", ["plain", "everything", *nightly("shaft", "lid", "model")])
 def test_models_come_back_exactly(name, tmp_path):
     models = {
         "everything": with_everything, "shaft": lambda _: floating.floating_shaft_in_a_v(),

@@ -5,13 +5,13 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import contents, finish, run, script, start
+from tests.helpers import contents, finish, nightly, run, script, start
 from tolcontact.errors import ArchiveError
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize(("after", "keep"), [(4096, "all"), (12_000, "measures")])
+@pytest.mark.parametrize(("after", "keep"), [(4096, "all"), *nightly((12_000, "measures"))])
 def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
     path = tmp_path / "killed.nc"
     with start(script("run_stack", path, 40_000, "--keep", keep)) as begun:
@@ -29,8 +29,9 @@ def test_a_killed_run_keeps_its_rows_and_goes_on(after, keep, tmp_path):
         assert contents(path, group).identical(contents(whole, group)), group
 
 
-def test_a_run_may_be_killed_at_any_of_its_writes(tmp_path):
-    done = run(script("kill_at_each_write", tmp_path, 15), timeout=600)
+@pytest.mark.parametrize("step", [60, *nightly(15)])
+def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
+    done = run(script("kill_at_each_write", tmp_path, step))
     assert done.returncode == 0, done.stderr
 
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 from tolcontact.simulation.cluster import local_cluster
 from tolcontact.simulation.lazy import TOGETHER
 
@@ -22,9 +23,8 @@ def rows_of(results, name):
 @pytest.mark.parametrize(
     ("name", "samples", "options"),
     [
-        ("ra1", 40_000, {"solver": "qpoases"}),
         ("stack", 3000, {"solver": "daqp", "method": {"resolution": "exact"}}),
-        ("spindle", 513, {"solver": "daqp"}),
+        *nightly(("ra1", 40_000, {"solver": "qpoases"}), ("spindle", 513, {"solver": "daqp"})),
     ],
 )
 def test_realizations_are_those_of_a_run(name, samples, options):

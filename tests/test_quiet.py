@@ -9,14 +9,14 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED, run, script
+from tests.helpers import SEATED, nightly, run, script
 from tolcontact.compilation import usable_plugins
 from tolcontact.mechanics.quiet import quiet
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("solver", usable_plugins())
-@pytest.mark.parametrize("case", ["block on six", "parked"])
+@pytest.mark.parametrize("case", ["block on six", *nightly("parked")])
 def test_solvers_print_nothing(solver, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
     tc.run(a, samples=300 if solver == "qpoases" else 20, seed=1, solver=solver, method=SEATED, surfaces=0)

@@ -6,7 +6,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import EXACT, contents
+from tests.helpers import EXACT, contents, nightly
 from tolcontact import vocabulary
 from tolcontact.archive import writer
 from tolcontact.checksums import crc32
@@ -14,7 +14,7 @@ from tolcontact.errors import ArchiveError
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), ("qpoases", "measures")])
+@pytest.mark.parametrize(("solver", "keep"), [("daqp", "all"), *nightly(("qpoases", "measures"))])
 def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path):
     paths = [tmp_path / "grown.nc", tmp_path / "whole.nc"]
     for samples in (300, 5000, 5000, 9000):

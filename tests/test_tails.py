@@ -11,7 +11,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED, call
+from tests.helpers import SEATED, call, nightly
 from tolcontact.simulation import map_blocks
 from tolcontact.statistics import rare_events
 from tolcontact.statistics.rare_events import REPLICATES, tail_probability
@@ -29,7 +29,7 @@ TAILS = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TAILS)
+@pytest.mark.parametrize("name", ["corner", *nightly(*(name for name in TAILS if name != "corner"))])
 def test_intervals_cover_known_tails(name):
     """Estimates from 40 000 realizations each; of 500, two standard errors of a coverage of 95 % are 2 %."""
     score, dimensions, truth = TAILS[name]

@@ -11,7 +11,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, SCRIPTS, contents, finish, run, start
+from tests.helpers import COMMAND, SCRIPTS, contents, finish, nightly, run, start
 from tolcontact import vocabulary
 from tolcontact.errors import ArchiveError
 
@@ -38,7 +38,7 @@ def left_in(folder):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("apart", [0.0, 0.5])
+@pytest.mark.parametrize("apart", [0.0, *nightly(0.5)])
 def test_of_two_runs_on_one_new_name_one_is_refused_and_the_others_rows_are_whole(apart, tmp_path):
     begun = [begin(tmp_path, "--samples", 30_000, "--out", "new.nc", "--seed", 1)]
     time.sleep(apart)
@@ -124,7 +124,7 @@ def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by,
     while begun.poll() is None and not finished(tmp_path / "stopped.nc"):
         time.sleep(0.1)
     begun.send_signal(by)
-    done = finish(begun, timeout=20)
+    done = finish(begun)
     assert done.returncode == code
     assert "of 10 000 000 done; continue with --resume" in done.stderr
     assert left_in(tmp_path) == ["stopped.nc"]
@@ -140,7 +140,7 @@ def test_a_run_that_is_stopped_before_it_began_leaves_nothing(tmp_path):
     while not lock.exists() and begun.poll() is None:
         time.sleep(0.01)
     begun.send_signal(signal.SIGTERM)
-    done = finish(begun, timeout=20)
+    done = finish(begun)
     assert done.returncode == 143 and "nothing is kept" in done.stderr
     assert left_in(tmp_path) == []
 
