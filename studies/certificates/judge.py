@@ -12,7 +12,6 @@ import igl
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
-from tolcontact.recomputed import ArchivedPoint
 
 import tolcontact as tc
 from studies.certificates.scenes import scene
@@ -20,6 +19,7 @@ from tolcontact.compilation import Program
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.simulation import Block, simulate_blocks
+from tolcontact.testing.referee import ArchivedPoint
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SOLVERS = ("daqp", "qpoases")
