@@ -17,15 +17,15 @@
 ## Contact points
 
 Points are spread over the moving face, as far apart as possible, starting from the corners of its rim. They follow `points=`
-or `spacing=`, not the tessellation. Each is projected onto the reference face, and takes part if it does not overhang the rim
-of that face and lies within `within` of it. A point has a place on the moving part, one on the reference part, and the
-outward normal of the reference face there.
+or `spacing=`, not the tessellation. Each point is projected onto the reference face. It takes part if it does not overhang the
+rim of that face and lies within `within` of it. A contact point has a place on the moving part, a place on the reference part,
+and the outward normal of the reference face there.
 
 If you leave out both `points` and `spacing`, contact points are added. For two flat faces these are the points where their
-rims cross or where a corner of one lies over the other: there they touch first, however the parts tilt. For curved faces they
-follow curvature, so closely that the faces cannot sink into each other between them by more than a two-thousandth of the
-smallest tolerance range; 5000 points at most. The smallest tolerance range is that of any locator or measure in mm. A range
-narrower than a thousandth of the widest one is taken for a constant and does not count.
+rims cross or where a corner of one lies over the other: tilted parts touch there first. For curved faces the points follow
+curvature. They are at most 5000, and so close that the faces cannot sink into each other between them by more than a
+two-thousandth of the smallest tolerance range. This is the smallest range of any locator or measure in mm; a range narrower
+than a thousandth of the widest one is taken for a constant and does not count.
 
 ## Warnings
 
@@ -46,8 +46,8 @@ A `tc.ContactWarning` states the error in mm if your points, or the triangles of
 >>> print(caught[0].message)
 contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
-A `tc.UnitsWarning` names a mesh whose size is implausible in mm, by itself (below 1 mm, above 10 m) or beside a part that it
-touches, if nobody stated its units; and a mesh from which locators, measures or forces lie farther away than it is large.
+A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, by itself (below 1 mm, above 10 m) or
+beside a part that it touches. It also names a mesh if a locator, measure or force is farther from it than its own size.
 
 ## Meshes
 
@@ -55,23 +55,23 @@ touches, if nobody stated its units; and a mesh from which locators, measures or
 states its own, a GLB file is in m, `mesh.units` of a Trimesh applies if it is set, and all others are in mm.
 
 Meshes may be open, or hold several bodies. A surface whose outside is undefined is rejected: neighbouring triangles oriented
-inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles,
-and reach 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles; triangles that
-meet at more than 30 degrees form an edge.
+inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles
+and extend to 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles. Triangles
+that meet at more than 30 degrees form an edge.
 
 ## Round faces
 
-A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus, and where a cylinder, cone or sphere
-can be fitted to the vertices of a smooth piece of a mesh (at least five facets, none of which turns by more than 30 degrees)
-so that none is farther off than 1 um. Contact points, their feet and normals then lie on that surface, not on its triangles.
-So a prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are
-as round as their triangles.
+A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. It is also known where a cylinder,
+cone or sphere fits all vertices of a smooth piece of a mesh to within 1 um; the piece has at least five facets, with turns of
+at most 30 degrees between them. Contact points, their feet and normals then lie on that surface, not on its triangles. So a
+prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are as
+round as their triangles.
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
-beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a hole
-(an inner cylinder) parallel to it, or along a plane. What touches is found at every pose, tilted ones too: a pin jams in its
-hole by the right angle, whatever the tessellation. Where an edge of the wall, a gap in it or another curve may touch first,
-the pair has sampled points. `tolcontact check` says which pairs are of round faces; `points=` or `spacing=` overrule it.
+beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a
+parallel hole (an inner cylinder), or along a plane. The points of contact are computed at every pose, also a tilted one: a pin
+jams in its hole at the right angle for any tessellation. Where an edge of the wall, a gap in it or another curve may touch
+first, the pair has sampled points. `tolcontact check` names the pairs of round faces; `points=` or `spacing=` overrule it.
 
 >>> stand = tc.Assembly("pin in a hole")
 >>> plate = stand.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=24)), fixed=True)
@@ -88,31 +88,31 @@ program of pin in a hole: ...
 
 Diameters of features vary exactly in these contacts: the radius of the ball, the shaft or the wall is the drawn one.
 
-The faces are taken to be as long as they are in the nominal assembly: a shaft that is pushed out of its hole, or a ball beyond
-the end of its wall, is not noticed at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).
+The ends of the faces are those of the nominal assembly. A shaft that is pushed out of its hole, or a ball beyond the end of its
+wall, is not detected at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).
 
 ## STEP files
 
 STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um (or 5e-6 of the extent of the
-file, beyond 0.4 m) and 0.1 rad (`tc.Mesh(file, chord=0.1)`: within 0.1 mm; what touches on surfaces that the file states does
-not depend on it), and keep their boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the
-file states a plane, cylinder, cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces that
-meet in a vertex come to each other); elsewhere they are rounded to what single precision resolves, 1e-5 mm at 100 mm and 2e-4
-mm at 1 m. If that would be more than a million triangles, or takes too long, faces are triangulated 30 times as coarsely, and
-to 0.5 rad; a warning says so.
+file, beyond 0.4 m) and 0.1 rad; with `tc.Mesh(file, chord=0.1)` to within 0.1 mm. Contact on surfaces that the file states does
+not depend on this. Faces keep their boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where
+the file states a plane, cylinder, cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces
+that meet in a vertex come to each other). Elsewhere they have single precision, 1e-5 mm at 100 mm and 2e-4 mm at 1 m. If there
+would be more than a million triangles, or if it takes too long, faces are triangulated 30 times as coarsely, and to 0.5 rad; a
+warning says so.
 
-An assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them, `tc.Mesh(file, body=...)` is one
-of them in the frame of its product, and `tc.parts_from(model, file)` declares all of them, or those named, as parts in their
-places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
-directions, radii and areas, and with their names where the file gives any: `tc.Brep("...")` chooses by them. (Where the faces
-of a body have several colours they are out of the file's order, and their names are not known.) Where a file states no simple
-surface, a plane, cylinder, cone or sphere is fitted to the vertices if none is farther off than 1 um, and how far is stated.
-References to other files are rejected.
+A file of an assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them. `tc.Mesh(file, body=...)`
+is one of the bodies in the frame of its product, and `tc.parts_from(model, file)` declares all bodies, or the named ones, as
+parts in their places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers,
+kinds, directions, radii and areas, and with the names that the file gives them: `tc.Brep("...")` chooses by these. (If the faces
+of a body have several colours, they are out of the file's order and their names are unknown.) Where a file states no simple
+surface, a plane, cylinder, cone or sphere is fitted if it is within 1 um of all vertices, and its distance is stated. References
+to other files are rejected.
 
 ## Files from others
 
 Shape files are read by a separate process with a limit on time (30 s, and 20 s for each MB) and memory (6 GiB). A damaged
-file therefore ends as one message that names the file and what to do.
+file therefore ends in one message that names the file and says what to do.
 """
 
 from tolcontact.discretization.discretizing import discretize

@@ -39,7 +39,7 @@ class NominalPart:
 
     @cached_property
     def body(self) -> trimesh.Trimesh:
-        """Its mesh in its nominal place."""
+        """The mesh in its nominal place."""
         return trimesh.Trimesh(self.placed(np.asarray(self.mesh.vertices)), self.mesh.faces, process=False)
 
     def placed(self, p: np.ndarray) -> np.ndarray:

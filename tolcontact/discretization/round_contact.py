@@ -26,7 +26,7 @@ NORMAL_TOLERANCE = 1e-7  # between the normals of neighbouring triangles of one 
 def round_points(moving: Surface, reference: Surface, reach: float) -> list[RoundPoint]:
     """Return the contact points of two faces that touch as balls or shafts beside walls; none if they may touch otherwise.
 
-    Walls farther away than `reach` [mm] have no points.
+    Walls at a distance above `reach` [mm] have no points.
     """
     try:
         pieces = itertools.product(_pieces(moving), _pieces(reference))

@@ -14,9 +14,10 @@ from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.brep_face import FIT_TOLERANCE
 
 Probes = tuple[np.ndarray, np.ndarray]  # places (point, 3) [mm] and unit vectors (point, entry, 3) along which to measure there
+Coordinates = tuple[np.ndarray, tuple[str, ...], np.ndarray, np.ndarray, Probes]  # the fields of a FeatureGeometry
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class FeatureGeometry:
     """The coordinates of a feature.
 
@@ -69,7 +70,7 @@ class FeatureGeometry:
         return self.centre
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class FeatureOfSize(FeatureGeometry):
     """A feature with a diameter or a distance.
 
@@ -85,7 +86,7 @@ class FeatureOfSize(FeatureGeometry):
         return np.zeros(3), -0.5 if self.is_inner else 0.5
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class PlaneFeature(FeatureGeometry):
     """A plane with an outward normal (3,)."""
 
@@ -110,7 +111,7 @@ class PlaneFeature(FeatureGeometry):
         return (heights[pairs[:, 0]] - heights[pairs[:, 1]])[:, None] / 2
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class SlabFeature(PlaneFeature, FeatureOfSize):
     """Two opposed planes, with their outward normals (3,): a thickness or a slot. Its middle has the coordinates of a plane."""
 
@@ -127,7 +128,7 @@ class SlabFeature(PlaneFeature, FeatureOfSize):
         return (-1.0 if self.is_inner else 1.0) * moving[face] / sum(moving) * self.normals[face], 0.0
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class AxisFeature(FeatureGeometry):
     """A feature with an axis: its direction (3,), and half its length [mm]. Coordinates: two shifts, then two tilts."""
 
@@ -149,14 +150,14 @@ class AxisFeature(FeatureGeometry):
         return rows if across is None else np.einsum("c,pcq->pq", across, rows)[:, None]
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class CylinderFeature(AxisFeature, FeatureOfSize):
     """A cylinder."""
 
     plural: ClassVar[str] = "cylinders"
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class ConeFeature(AxisFeature):
     """A cone, with places on its surface and the normals there. Its last coordinate is along the axis."""
 
@@ -169,7 +170,7 @@ class ConeFeature(AxisFeature):
         return self.walls
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class SphereFeature(FeatureOfSize):
     """A sphere, whose centre shifts."""
 
@@ -180,7 +181,7 @@ class SphereFeature(FeatureOfSize):
         return self.size / 2
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False)
 class GeneralFeature(FeatureGeometry):
     """A surface of no simple kind, and the simple surface that its vertices come nearest to."""
 

@@ -1,7 +1,6 @@
 """Recognition of features: faces become a plane, a pair of planes, a cylinder, a cone, a sphere or a general surface."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
@@ -9,6 +8,7 @@ from scipy.spatial import ConvexHull, QhullError
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import (
     ConeFeature,
+    Coordinates,
     CylinderFeature,
     FeatureGeometry,
     GeneralFeature,
@@ -75,21 +75,14 @@ def _analytic_surface(face: Surface) -> AnalyticSurface | None:
 
 
 def _sphere(face: Surface, sphere: Sphere) -> SphereFeature:
-    twists = np.vstack([AXES, np.zeros((3, 3))])
-    return SphereFeature(
-        centre=sphere.origin,
-        names=tuple(f"shift {axis}" for axis in "xyz"),
-        twists=twists,
-        values=twists.T,
-        extremes=(sphere.origin[None], AXES[None]),
-        size=2 * sphere.radius,
-        is_inner=face.pieces[0].is_hollow,
-    )
+    twists, extremes = np.vstack([AXES, np.zeros((3, 3))]), (sphere.origin[None], AXES[None])
+    coordinates = sphere.origin, ("shift x", "shift y", "shift z"), twists, twists.T, extremes
+    return SphereFeature(*coordinates, size=2 * sphere.radius, is_inner=face.pieces[0].is_hollow)
 
 
 def _plane(face: Surface, plane: Plane) -> PlaneFeature:
     coordinates = _plane_coordinates(plane.origin, plane.axis, np.asarray(face.mesh.vertices))
-    return PlaneFeature(normal=plane.axis, **coordinates)
+    return PlaneFeature(*coordinates, normal=plane.axis)
 
 
 def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) -> SlabFeature:
@@ -104,16 +97,11 @@ def _slab(faces: Sequence[Surface], surfaces: Sequence[AnalyticSurface | None]) 
     middle = sum(heights) / 2
     projections = np.vstack([points - (points @ n - middle)[:, None] * n for points in outlines])
     distance = heights[0] - heights[1]  # positive: material is between the planes
-    return SlabFeature(
-        normal=n,
-        normals=(first_plane.axis, second_plane.axis),
-        size=abs(distance),
-        is_inner=distance < 0,
-        **_plane_coordinates(middle * n, n, projections),
-    )
+    coordinates, normals = _plane_coordinates(middle * n, n, projections), (n, second_plane.axis)
+    return SlabFeature(*coordinates, normal=n, normals=normals, size=abs(distance), is_inner=distance < 0)
 
 
-def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> dict[str, Any]:
+def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> Coordinates:
     """Return the coordinates of a plane with normal n through `place`, which reaches as far as `points` (point, 3) on it.
 
     Tilts are measured at the edges of the smallest rectangle around the points.
@@ -131,13 +119,8 @@ def _plane_coordinates(place: np.ndarray, n: np.ndarray, points: np.ndarray) -> 
     twists[:3, 0], twists[3:, 1], twists[3:, 2] = n, np.cross(u, n) / half[0], np.cross(v, n) / half[1]
     values[0, :3], values[1, 3:], values[2, 3:] = n, np.cross(u, n) * half[0], np.cross(v, n) * half[1]
     places = centre + (corners - middle) @ np.array([u, v])
-    return {
-        "centre": centre,
-        "names": ("offset", f"tilt {names[0]}", f"tilt {names[1]}"),
-        "twists": twists,
-        "values": values,
-        "extremes": (places, np.tile(n, (len(places), 1, 1))),
-    }
+    extremes = places, np.tile(n, (len(places), 1, 1))
+    return centre, ("offset", f"tilt {names[0]}", f"tilt {names[1]}"), twists, values, extremes
 
 
 def _rectangle_angle(corners: np.ndarray) -> float:
@@ -155,29 +138,31 @@ def _turned(corners: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _cylinder(face: Surface, cylinder: Cylinder) -> CylinderFeature:
-    size, is_inner = 2 * cylinder.radius, face.pieces[0].is_hollow
-    return CylinderFeature(size=size, is_inner=is_inner, **_axis_coordinates(face, cylinder))
+    coordinates, axis, half = _axis_coordinates(face, cylinder)
+    is_inner = face.pieces[0].is_hollow
+    return CylinderFeature(*coordinates, axis=axis, half=half, size=2 * cylinder.radius, is_inner=is_inner)
 
 
 def _cone(face: Surface, cone: Cone) -> ConeFeature:
     """Return a cone: an axis that also shifts along itself, and the normals of the wall around both ends."""
-    coordinates = _axis_coordinates(face, cone)
-    axis, (ends, directions) = coordinates["axis"], coordinates["extremes"]
+    (centre, names, twists, values, extremes), axis, half = _axis_coordinates(face, cone)
     along = np.concatenate([axis, np.zeros(3)])
-    coordinates["names"] += ("along",)
-    coordinates["twists"] = np.column_stack([coordinates["twists"], along])
-    coordinates["values"] = np.vstack([coordinates["values"], along])
+    coordinates = centre, (*names, "along"), np.column_stack([twists, along]), np.vstack([values, along]), extremes
+    ends, directions = extremes
     u, v = directions[0]
     azimuths = np.arange(CONE_PROBES) * 2 * np.pi / CONE_PROBES
     outward = np.cos(azimuths)[:, None] * u + np.sin(azimuths)[:, None] * v
     radii = np.abs((ends - cone.origin) @ cone.axis)[:, None, None] * np.tan(cone.angle)
     places = (ends[:, None] + radii * outward).reshape(-1, 3)
     normals = np.cos(cone.angle) * np.tile(outward, (2, 1)) - np.sin(cone.angle) * cone.axis
-    return ConeFeature(walls=(places, normals[:, None]), **coordinates)
+    return ConeFeature(*coordinates, axis=axis, half=half, walls=(places, normals[:, None]))
 
 
-def _axis_coordinates(face: Surface, surface: Cylinder | Cone) -> dict[str, Any]:
-    """Return the axis of a cylinder or cone, as long as its face, with two shifts in its middle and two tilts at its ends."""
+def _axis_coordinates(face: Surface, surface: Cylinder | Cone) -> tuple[Coordinates, np.ndarray, float]:
+    """Return the coordinates of a cylinder or cone, its axis (3,), and half the length [mm] of its face.
+
+    The coordinates are two shifts in the middle of the axis and two tilts at its ends.
+    """
     axis = surface.axis * np.sign(surface.axis[np.abs(surface.axis).argmax()])  # the same, whichever way the file has it
     u, v, names = _directions_across(axis)
     along = np.asarray(face.mesh.vertices) @ axis
@@ -187,15 +172,9 @@ def _axis_coordinates(face: Surface, surface: Cylinder | Cone) -> dict[str, Any]
     for k, e in enumerate((u, v)):
         twists[:3, k], values[k, :3] = e, e
         twists[3:, 2 + k], values[2 + k, 3:] = np.cross(axis, e) / half, np.cross(axis, e) * half
-    return {
-        "centre": centre,
-        "names": (f"shift {names[0]}", f"shift {names[1]}", f"tilt {names[0]}", f"tilt {names[1]}"),
-        "twists": twists,
-        "values": values,
-        "extremes": (centre + half * np.array([[-1.0], [1.0]]) * axis, np.array([[u, v]] * 2)),
-        "axis": axis,
-        "half": half,
-    }
+    freedoms = f"shift {names[0]}", f"shift {names[1]}", f"tilt {names[0]}", f"tilt {names[1]}"
+    extremes = centre + half * np.array([[-1.0], [1.0]]) * axis, np.array([[u, v]] * 2)
+    return (centre, freedoms, twists, values, extremes), axis, half
 
 
 def _general(face: Surface) -> GeneralFeature:
@@ -212,14 +191,9 @@ def _general(face: Surface) -> GeneralFeature:
     # The extremes are the vertices that move farthest in some combination of freedoms.
     combinations = np.random.default_rng(0).normal(size=(freedoms.shape[1], EXTREME_TRIALS))
     extremes = np.unique(np.abs(moved @ freedoms @ combinations).argmax(axis=0))
-    return GeneralFeature(
-        centre=centre,
-        names=tuple(f"freedom {k + 1}" for k in range(freedoms.shape[1])),
-        twists=to_twist @ freedoms,
-        values=values,
-        extremes=(points[extremes], normals[extremes, None]),
-        nearest=nearest_surface(np.asarray(mesh.triangles)),
-    )
+    names = tuple(f"freedom {k + 1}" for k in range(freedoms.shape[1]))
+    coordinates = centre, names, to_twist @ freedoms, values, (points[extremes], normals[extremes, None])
+    return GeneralFeature(*coordinates, nearest=nearest_surface(np.asarray(mesh.triangles)))
 
 
 def _simple_displacements(face: Surface) -> list[np.ndarray]:

@@ -40,7 +40,7 @@ class Layer:
 
     rows        (point, component, coordinate) of its zone (see tolerance_kinds.Zone)
     controlled  (coordinate, n): orthonormal directions that its datums lock
-    added       (coordinate, k): those that no narrower tolerance controls and that its rule draws; each is a contributor
+    added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a contributor
     frame       of its datum system
     """
 

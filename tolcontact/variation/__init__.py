@@ -33,7 +33,7 @@ depend on the origin. `rule` says how they fill the zone of a tolerance:
 
 | rule | components |
 |---|---|
-| "99.73 % inside" (default) | normal, independent, with equal spreads, such that 99.73 % of the *features* lie inside |
+| "99.73 % inside" (default) | normal, independent, with equal spreads with which 99.73 % of the *features* lie inside |
 | "6 sigma at the extremes" | the same, with six standard deviations at the worst point equal to the width; fewer lie inside |
 | "truncated" | as "6 sigma at the extremes", without the features that lie outside |
 | "uniform" | uniform in the zone |

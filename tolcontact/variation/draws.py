@@ -147,7 +147,7 @@ class Draws:
 
     @property
     def drive_matrix(self) -> np.ndarray:
-        """What a deviation of 1 of each column adds to others (column, column) through shared causes."""
+        """The amounts (column, column) that a deviation of 1 of each column adds to others through shared causes."""
         matrix = np.zeros((len(self._column), len(self._column)))
         for cause in self._assembly.variables:
             for label, factor in cause.drives.items():

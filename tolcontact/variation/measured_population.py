@@ -93,7 +93,7 @@ def _stated_share(feature: NominalFeature, tolerance: GeometricTolerance) -> flo
     """Return the share of features inside that the rules state; NaN if they state none."""
     has_bonus_beside = tolerance.material and (tolerance.bonus == "accepts" or len(feature.layers) > 1)
     tolerances = feature.feature.geometric
-    if all(other.rule == INSIDE and other.cp == 1 and other.cpk is None for other in tolerances) and not has_bonus_beside:
+    if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
     return 1.0 if tolerance.rule in ("truncated", "uniform") else np.nan
 
