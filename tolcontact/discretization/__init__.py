@@ -101,13 +101,13 @@ that meet in a vertex come to each other). Elsewhere they have single precision,
 would be more than a million triangles, or if it takes too long, faces are triangulated 30 times as coarsely, and to 0.5 rad; a
 warning says so.
 
-A file of an assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them. `tc.Mesh(file, body=...)`
-is one of the bodies in the frame of its product, and `tc.parts_from(model, file)` declares all bodies, or the named ones, as
-parts in their places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers,
-kinds, directions, radii and areas, and with the names that the file gives them: `tc.Brep("...")` chooses by these. (If the faces
-of a body have several colours, they are out of the file's order and their names are unknown.) Where a file states no simple
-surface, a plane, cylinder, cone or sphere is fitted if it is within 1 um of all vertices, and its distance is stated. References
-to other files are rejected.
+A file of an assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them. `tc.Mesh(file,
+body=...)` is one of the bodies in the frame of its product, and `tc.parts_from(model, file)` declares all bodies, or the named
+ones, as parts in their places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their
+numbers, kinds, directions, radii and areas, and with the names that the file gives them: `tc.Brep("...")` chooses by these.
+(If the faces of a body have several colours, they are out of the file's order and their names are unknown.) Where a file
+states no simple surface, a plane, cylinder, cone or sphere is fitted if it is within 1 um of all vertices, and its distance is
+stated. References to other files are rejected.
 
 ## Files from others
 
