@@ -18,7 +18,7 @@ from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.overlap import overlap_corners, rim_points
-from tolcontact.geometry.spreading import own_vertices, spread
+from tolcontact.geometry.spreading import distinct_vertices, spread
 from tolcontact.geometry.surface import Surface
 
 DEFAULT_REACH = 0.1  # of the moving part's size
@@ -87,7 +87,7 @@ def _candidates(
     """
     moving_face, reference_face = faces
     if isinstance(pair.points, str):
-        points = own_vertices(mesh)
+        points = distinct_vertices(mesh)
     else:
         count = DEFAULT_POINTS if _is_open(pair) else pair.points
         _announce(pair, mesh.area, count)

@@ -12,7 +12,7 @@ from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import FaceDeviation, Features, NominalFeature
 from tolcontact.geometry.curvature import chord_height
-from tolcontact.geometry.face_pair import FacePair, side
+from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import triangles
 from tolcontact.geometry.surface import Surface
 
@@ -167,8 +167,8 @@ class Nominal:
             return None
         if index not in self._face_pairs:
             self._face_pairs[index] = FacePair(
-                side(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
-                side(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
+                body_face(pair.moving_face, self.parts[pair.moving].body, len(pair.P_m)),
+                body_face(pair.reference_face, self.parts[pair.reference].body, len(pair.P_m)),
             )
         return self._face_pairs[index]
 

@@ -1,4 +1,4 @@
-"""Both faces of a contact pair as they are: how deep one lies in the other, not at contact points only."""
+"""The depth to which the faces of a contact pair lie in each other, also between contact points."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,19 +13,19 @@ from tolcontact.geometry.edges import rim
 from tolcontact.geometry.surface import Surface
 from tolcontact.vocabulary import ROUNDED
 
-PROBES = 2000  # points of a face at least, beside the corners of its triangles
-DENSER = 4  # times as close as contact points, as far as MOST allows
-MOST = 20_000
-SLIVERS = 20  # times as many would halving long triangles give: points are drawn instead
-TOGETHER = 16  # poses at once
+MIN_POINTS = 2000  # of a face, beside the corners of its triangles
+DENSITY = 4  # times as close as contact points
+MAX_POINTS = 20_000
+MAX_HALVED = 20  # times the desired number of points: if halving long triangles gives more, points are drawn
+POSES_PER_BLOCK = 16
 
 
 @dataclass(frozen=True, eq=False)
-class Side:
-    """A face in its nominal place, and the body that it belongs to.
+class BodyFace:
+    """A face in its nominal place, and the body to which it belongs.
 
-    points   (point, 3) [mm], all over the face, its corners among them
-    normals  (point, 3): outward ones there
+    points   (point, 3) [mm], spread all over the face, its corners among them
+    normals  (point, 3): outward normals there
     """
 
     face: Surface
@@ -34,35 +34,35 @@ class Side:
     normals: np.ndarray
 
     def depth(self, points: np.ndarray) -> np.ndarray:
-        """How deep `points` (point, 3) [mm] lie behind the face, in the body; outside, and beside it, at most ROUNDED.
+        """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the face, in the body; 0 elsewhere.
 
-        Distance to the face [mm]; 0 where a flat face is less than ROUNDED away, as most points of faces that touch are. Of a
-        body that is not closed whatever is behind the face is inside.
+        It is the distance to the face, and 0 where a flat face is less than ROUNDED away, as it is from most points of faces
+        that touch. Everything behind a face is inside a body that is not closed.
         """
         depth = np.zeros(len(points))
         lower, upper = self.body.bounds
-        near = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
+        inside = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
         if self._plane is not None:
             n, height = self._plane
-            near = near[points[near] @ n < height - ROUNDED]
-        if near.size:
-            depth[near] = self.face.depth(points[near])
-            near = near[depth[near] > 0]
-        if near.size and self._is_closed:
-            near = near[depth[near] > max(self._bulge, ROUNDED)]  # what touches need not be looked for in the body
-        if near.size and self._is_closed:
-            turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[near]))
-            depth[near[turns <= 0.5]] = 0
+            inside = inside[points[inside] @ n < height - ROUNDED]
+        if inside.size:
+            depth[inside] = self.face.depth(points[inside])
+            inside = inside[depth[inside] > 0]
+        if inside.size and self._is_closed:
+            inside = inside[depth[inside] > max(self._bulge, ROUNDED)]  # points that only touch count as inside
+        if inside.size and self._is_closed:
+            turns = igl.winding_number(self._vertices, self._faces, np.ascontiguousarray(points[inside]))
+            depth[inside[turns <= 0.5]] = 0
         return depth
 
     @cached_property
     def _bulge(self) -> float:
-        """How far [mm] known surfaces may stand out of the body's flat triangles."""
+        """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
         return max((chord_height(piece.face) for piece in self.face.pieces), default=0.0)
 
     @cached_property
     def _plane(self) -> tuple[np.ndarray, float] | None:
-        """Normal and height of the plane behind which a flat face lies; None of a face that is not flat."""
+        """Normal and height of the plane behind which a flat face lies; None if the face is not flat."""
         normals = self.face.corner_normals.reshape(-1, 3)
         n = normals.mean(axis=0)
         n /= np.linalg.norm(n)
@@ -83,49 +83,50 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class FacePair:
-    """The faces of a pair, ready to be checked at any pose."""
+    """The faces of a pair, for checks at any pose."""
 
-    moving: Side
-    reference: Side
+    moving: BodyFace
+    reference: BodyFace
 
     def depth(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """Largest depth (row,) [mm] of one face in the other's body at X_RM (row, 12), both ways round.
+        """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
-        Faces that lie farther out than they do nominally, by `heights` (row,) [mm] together, count as if one of them did.
+        `heights` (row,) [mm] are the sum by which both faces lie farther out than nominally; each face counts it in full.
         """
-        found = np.zeros(len(X_RM))
-        for first in range(0, len(X_RM), TOGETHER):
-            X, farther = X_RM[first : first + TOGETHER], heights[first : first + TOGETHER]
+        largest = np.zeros(len(X_RM))
+        for start in range(0, len(X_RM), POSES_PER_BLOCK):
+            rows = slice(start, start + POSES_PER_BLOCK)
+            X, outward = X_RM[rows], heights[rows]
             for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
                 places = pose.apply(motion, side.points)
-                if farther.any():
-                    places += farther[:, None, None] * (side.normals @ pose.rotation(motion).swapaxes(1, 2))
+                if outward.any():
+                    places += outward[:, None, None] * (side.normals @ pose.rotation(motion).swapaxes(1, 2))
                 depth = body.depth(places.reshape(-1, 3)).reshape(len(X), -1)
-                found[first : first + TOGETHER] = np.maximum(found[first : first + TOGETHER], depth.max(axis=1, initial=0))
-        return found
+                largest[rows] = np.maximum(largest[rows], depth.max(axis=1, initial=0))
+        return largest
 
 
-def side(face: Surface, body: trimesh.Trimesh, contacts: int) -> Side:
-    """A side of a pair with so many contact points."""
-    wanted = min(max(PROBES, contacts * DENSER**2), MOST)
-    step = float(np.sqrt(face.mesh.area / wanted))
-    points = np.unique(_all_over(face.mesh, step, wanted), axis=0)
-    if len(points) > MOST:
-        points = points[np.random.default_rng(0).choice(len(points), MOST, replace=False)]
+def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
+    """Return a face and its body, for a pair with `contacts` contact points."""
+    count = min(max(MIN_POINTS, contacts * DENSITY**2), MAX_POINTS)
+    step = float(np.sqrt(face.mesh.area / count))
+    points = np.unique(_spread(face.mesh, step, count), axis=0)
+    if len(points) > MAX_POINTS:
+        points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
     triangle, nearest = face.nearest(points)
-    return Side(face, body, face.project(points)[0] if face.surfaces else points, face.normals(triangle, nearest))
+    return BodyFace(face, body, face.project(points)[0] if face.surfaces else points, face.normals(triangle, nearest))
 
 
-def _all_over(mesh: trimesh.Trimesh, step: float, wanted: int) -> np.ndarray:
-    """Points (point, 3) of a face some `step` [mm] apart, its rim and vertices among them.
+def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:
+    """Return points (point, 3) of a face about `step` [mm] apart, its rim and vertices among them.
 
-    Where halving the edges of long slivers would give too many, so many as are `wanted` are drawn inside, with a fixed seed.
+    Where halving the edges of long slivers would give too many points, `count` are drawn inside, with a fixed seed.
     """
     vertices, corners = np.asarray(mesh.vertices), np.asarray(mesh.triangles)
     longest = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2).max(axis=1)
-    if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() <= SLIVERS * wanted:
-        return np.asarray(trimesh.remesh.subdivide_to_size(vertices, mesh.faces, max_edge=step, max_iter=30)[0])
-    inside, _ = trimesh.sample.sample_surface(mesh, wanted, seed=0)
+    if (4.0 ** np.ceil(np.log2(np.maximum(longest / step, 1)))).sum() <= MAX_HALVED * count:
+        return trimesh.remesh.subdivide_to_size(vertices, mesh.faces, max_edge=step, max_iter=30)[0]
+    inside, _ = trimesh.sample.sample_surface(mesh, count, seed=0)
     along_rim = [
         np.linspace(start, end, int(np.ceil(np.linalg.norm(end - start) / step)) + 1)
         for start, end in vertices[rim(mesh.faces)]

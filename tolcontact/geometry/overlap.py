@@ -1,67 +1,74 @@
-"""Where the rim of one face lies under or over the other face: there they touch first, whatever the tilt."""
+"""Points where the rim of one face lies over or under the other face: there they touch first at any tilt."""
 
 import numpy as np
 
 from tolcontact.geometry.edges import edges, rim
 from tolcontact.geometry.surface import Surface
 
-MOST = 2000  # edges of a rim; beyond that its corners are everywhere, and points spread evenly meet them
-STRAIGHT = np.radians(1.0)
-INWARD = 1e-5  # of the face's size: points of a rim are taken so far inside of it
-DROPS = 8  # turns after which a point that drops onto a curved face has arrived
+MAX_EDGES = 2000  # of a rim; beyond that its corners are everywhere, and points spread evenly meet them
+MIN_ANGLE = np.radians(1.0)  # between edges that cross
+INWARD = 1e-5  # of the face's size: distance of points inside the rim
+DROP_ITERATIONS = 8  # of points that drop onto a curved face
 
 
-def overlap_corners(own: Surface, target: Surface) -> np.ndarray:
-    """Points (corner, 3) [mm] of the face `own`: below or above corners of the rim of `target`, and where both rims cross.
+def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
+    """Return points (corner, 3) [mm] of a face below or above corners of the target's rim, and where both rims cross.
 
-    Corners of its own rim are not among them.
+    Corners of the face's own rim are not among them.
     """
-    own_rim, target_rim = (rim(np.asarray(face.mesh.faces)) for face in (own, target))
-    nothing = np.zeros((0, 3))
-    if not (0 < len(own_rim) <= MOST and 0 < len(target_rim) <= MOST):
-        return nothing
-    n = target.corner_normals.reshape(-1, 3).mean(axis=0)
-    n /= np.linalg.norm(n)
-    along = np.linalg.svd(n[None])[2][1:]
-    # Both rims seen along the normal.
-    (a, b), (c, d) = (
-        np.asarray(face.mesh.vertices)[ends].swapaxes(0, 1) for face, ends in ((own, own_rim), (target, target_rim))
-    )
-    p, r = a @ along.T, (b - a) @ along.T
-    q, s = c @ along.T, (d - c) @ along.T
+    face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
+    if not (0 < len(face_rim) <= MAX_EDGES and 0 < len(target_rim) <= MAX_EDGES):
+        return np.zeros((0, 3))
+    n = _mean_normal(target)
+    crossings = _crossings(np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim], n)
+    # Corners of the target's rim, moved along its normal into this face.
+    normal = face.corner_normals.reshape(-1, 3).mean(axis=0)
+    corners = np.asarray(target.mesh.vertices)[np.unique(target_rim)]
+    if abs(n @ normal) < MIN_ANGLE:
+        return crossings
+    height = (np.asarray(face.mesh.vertices)[0] - corners) @ normal / (n @ normal)
+    below = corners + height[:, None] * n
+    _, _, is_over = face.project(below)
+    return np.concatenate([crossings, below[is_over]])
+
+
+def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Return the places (crossing, 3) on edges p where edges q cross them, seen along n (3,); edges (edge, end, 3).
+
+    Where p + a r meets q + b s in the plane across n, a = (q - p) x s / (r x s) and b = (q - p) x r / (r x s).
+    """
+    plane = np.linalg.svd(n[None])[2][1:]
+    (start, end), (q_start, q_end) = (edges.swapaxes(0, 1) for edges in (edges_p, edges_q))
+    p, r = start @ plane.T, (end - start) @ plane.T
+    q, s = q_start @ plane.T, (q_end - q_start) @ plane.T
     cross = r[:, None, 0] * s[None, :, 1] - r[:, None, 1] * s[None, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        apart = q[None] - p[:, None]
-        on_own = (apart[..., 0] * s[None, :, 1] - apart[..., 1] * s[None, :, 0]) / cross
-        on_target = (apart[..., 0] * r[:, None, 1] - apart[..., 1] * r[:, None, 0]) / cross
+        pq = q[None] - p[:, None]
+        a = (pq[..., 0] * s[None, :, 1] - pq[..., 1] * s[None, :, 0]) / cross
+        b = (pq[..., 0] * r[:, None, 1] - pq[..., 1] * r[:, None, 0]) / cross
     lengths = np.linalg.norm(r, axis=1)[:, None] * np.linalg.norm(s, axis=1)[None]
-    crosses = (np.abs(cross) > STRAIGHT * lengths) & (on_own >= 0) & (on_own <= 1) & (on_target >= 0) & (on_target <= 1)
-    first, second = np.nonzero(crosses)
-    crossings = a[first] + on_own[first, second, None] * (b - a)[first]
-    # Corners of the other rim, moved along its normal into this face.
-    normal = own.corner_normals.reshape(-1, 3).mean(axis=0)
-    corners = np.asarray(target.mesh.vertices)[np.unique(target_rim)]
-    if abs(n @ normal) < STRAIGHT:
-        return np.asarray(crossings)
-    height = (np.asarray(own.mesh.vertices)[0] - corners) @ normal / (n @ normal)
-    below = corners + height[:, None] * n
-    _, _, over = own.project(below)
-    return np.asarray(np.concatenate([crossings, below[over]]))
+    row, column = np.nonzero((np.abs(cross) > MIN_ANGLE * lengths) & (a >= 0) & (a <= 1) & (b >= 0) & (b <= 1))
+    return start[row] + a[row, column, None] * (end - start)[row]
 
 
-def rim_points(own: Surface, target: Surface, step: float, within: float) -> np.ndarray:
-    """Points (point, 3) [mm] of the curved face `own` over the rim of the flat face `target`, some `step` [mm] apart.
+def _mean_normal(face: Surface) -> np.ndarray:
+    n = face.corner_normals.reshape(-1, 3).mean(axis=0)
+    n /= np.linalg.norm(n)
+    return n
 
-    Only where the faces are within `within` [mm] of each other.
+
+def rim_points(face: Surface, target: Surface, step: float, within: float) -> np.ndarray:
+    """Return points (point, 3) [mm] of a curved face over the rim of the flat face `target`, about `step` [mm] apart.
+
+    Only points within `within` [mm] of the rim are returned.
     """
     faces, vertices = np.asarray(target.mesh.faces), np.asarray(target.mesh.vertices)
     ends, edge, triangles = edges(faces)
     outer = np.flatnonzero(triangles[edge] == 1)
-    n = target.corner_normals.reshape(-1, 3).mean(axis=0)
-    n /= np.linalg.norm(n)
+    n = _mean_normal(target)
     places = []
     length = np.linalg.norm(vertices[ends[outer, 1]] - vertices[ends[outer, 0]], axis=1)
-    step = max(step, float(length.sum()) / MOST)
+    step = max(step, float(length.sum()) / MAX_EDGES)
     for number, size in zip(outer, length, strict=True):
         a, b = vertices[ends[number]]
         inward = np.cross(n, b - a) / max(size, 1e-300)
@@ -69,10 +76,10 @@ def rim_points(own: Surface, target: Surface, step: float, within: float) -> np.
         share = np.linspace(0, 1, max(int(np.ceil(size / step)), 1) + 1)[:, None]
         places.append(a + share * (b - a) + INWARD * target.mesh.scale * inward)
     start = np.concatenate(places)
-    over = start
-    for _ in range(DROPS):
-        _, feet = own.nearest(over)
-        over = start + ((feet - start) @ n)[:, None] * n
-    arrived = np.linalg.norm(over - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
-    near = np.linalg.norm(over - start, axis=1) <= within
-    return np.asarray(feet[arrived & near])
+    points = start
+    for _ in range(DROP_ITERATIONS):
+        _, feet = face.nearest(points)
+        points = start + ((feet - start) @ n)[:, None] * n
+    has_arrived = np.linalg.norm(points - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
+    is_near = np.linalg.norm(points - start, axis=1) <= within
+    return feet[has_arrived & is_near]

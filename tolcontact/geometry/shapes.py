@@ -9,34 +9,34 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
 
-FIELD_STATIONS = 12
+FIELD_STATIONS = 12  # of a part's size, over which displacement is shown
 
 
 def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
-    """The closed or open triangle surface of a geometry. `contents`: of the files of a model, if they were read together.
+    """Return the closed or open triangle surface of a geometry. `contents` are those of files that were read together.
 
     Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
-    found = read(geometry, read_files([geometry]) if contents is None else contents)
-    mesh = found.mesh
+    surface = read(geometry, read_files([geometry]) if contents is None else contents)
+    mesh = surface.mesh
     if len(mesh.faces) == 0:
         raise GeometryFault(f"{geometry} holds no triangles; expected a triangle surface")
     if not mesh.area > 0:
         raise GeometryFault(f"{geometry} has no area: all its triangles are degenerate")
     _check_outward(mesh, geometry)
-    return found
+    return surface
 
 
 def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
-    """Refuse what has no defined outside: neighbours oriented inconsistently, and closed bodies turned inside out."""
+    """Raise GeometryFault if neighbours are oriented inconsistently, or closed bodies are turned inside out."""
     ends, edge, triangles = edges(mesh.faces)
     sense = np.where(ends[:, 0] < ends[:, 1], 1.0, -1.0)  # neighbours run along their common edge in opposite senses
-    against = int(np.count_nonzero((triangles == 2) & (np.abs(np.bincount(edge, sense)) == 2)))
-    if against:
+    conflicts = int(np.count_nonzero((triangles == 2) & (np.abs(np.bincount(edge, sense)) == 2)))
+    if conflicts:
         raise GeometryFault(
-            f"{geometry}: neighbouring triangles are oriented inconsistently at {against} edges, so its normals do not all "
+            f"{geometry}: neighbouring triangles are oriented inconsistently at {conflicts} edges, so its normals do not all "
             "point outward; repair it (trimesh.repair.fix_normals), or export it again"
         )
     neighbours = np.asarray(mesh.face_adjacency)
@@ -49,38 +49,38 @@ def _check_outward(mesh: trimesh.Trimesh, geometry: Mesh) -> None:
     # A body whose normals point inward is a cavity if another one is around it, else a mistake.
     lower, upper = (_per_body(limit, corners, body, count) for limit in (np.minimum, np.maximum))
     for k in np.flatnonzero(~is_open & (volume < -1e-12 * mesh.scale**3)):
-        around = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))
-        if not any(_encloses(mesh, body == other, mesh.triangles[body == k][0, :1]) for other in around):
-            which = "it is" if count == 1 else f"its body {k + 1} of {count} is"
+        outer = np.flatnonzero((volume > 0) & (lower <= lower[k]).all(axis=1) & (upper >= upper[k]).all(axis=1))
+        if not any(_encloses(mesh, body == candidate, mesh.triangles[body == k][0, :1]) for candidate in outer):
+            subject = "it is" if count == 1 else f"its body {k + 1} of {count} is"
             raise GeometryFault(
-                f"{geometry}: {which} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
+                f"{geometry}: {subject} inside out (volume {volume[k]:.6g} mm3), so its normals point inward; "
                 "turn it (trimesh's invert()), or export it again"
             )
 
 
 def _is_matched(body: np.ndarray, edge: np.ndarray, sense: np.ndarray) -> np.ndarray:
-    """Whether each triangle's own body (face,) runs along all three of its edges (3 face,) as often one way as the other.
+    """Return a mask (face,) of the triangles along whose edges (3 face,) their body runs as often one way as the other.
 
     Where bodies touch along an edge, more than two triangles have it, and a part of one body alone may not close there.
     """
     _, pair = np.unique(np.repeat(body, 3) * (int(edge.max()) + 1) + edge, return_inverse=True)
-    return np.asarray((np.bincount(pair, sense)[pair] == 0).reshape(-1, 3).all(axis=1))
+    return (np.bincount(pair, sense)[pair] == 0).reshape(-1, 3).all(axis=1)
 
 
 def _encloses(mesh: trimesh.Trimesh, faces: np.ndarray, point: np.ndarray) -> bool:
-    """Whether the body of some `faces` (face,) is around `point` (1, 3)."""
+    """Return whether the body of some `faces` (face,) is around `point` (1, 3)."""
     turns = igl.winding_number(np.array(mesh.vertices), np.array(mesh.faces[faces], dtype=np.int64), np.array(point))
     return bool(np.abs(turns).max() > 0.5)
 
 
 def _per_body(limit: np.ufunc, corners: np.ndarray, body: np.ndarray, count: int) -> np.ndarray:
-    found = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
-    limit.at(found, body, limit.reduce(corners, axis=1))
-    return found
+    extremes = np.full((count, 3), -limit.reduce(np.array([-np.inf, np.inf])))
+    limit.at(extremes, body, limit.reduce(corners, axis=1))
+    return extremes
 
 
 def field_surface(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
+    """Return vertices (vertex, 3) and faces (face, 3) fine enough to show how displacement varies over a part."""
     step = mesh.scale / FIELD_STATIONS
     vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=step, max_iter=20)
     merged = trimesh.Trimesh(vertices, faces, process=True)
