@@ -3,17 +3,17 @@
 import numpy as np
 
 from tolcontact.compilation import ACCURACY
-from tolcontact.contact import repeated_steps
-from tolcontact.contact.state import State, Task
+from tolcontact.contact.record import initial_numbers
+from tolcontact.contact.repeated_steps import better_state
+from tolcontact.contact.state import State
 
 
 def state(residual, slack, *, doubtful=False):
     one, none = np.zeros(1), np.zeros((1, 0))
     return State(
-        poses=np.zeros((1, 2, 12)), relative=np.zeros((1, len(slack), 12)), residual=np.array([residual]),
-        slack=np.array([slack]), astray=one, iterations=np.ones(1, dtype=int), second_answers=np.zeros(1, dtype=int),
-        multipliers=none, gap_min=np.zeros((1, len(slack))), searched=np.zeros(1, dtype=bool),
-        doubtful=np.array([doubtful]), slots=[],
+        **initial_numbers(1) | {"kkt_residual": np.array([residual])},
+        poses=np.zeros((1, 2, 12)), relative=np.zeros((1, len(slack), 12)), slack=np.array([slack]), astray=one,
+        multipliers=none, gap_min=np.zeros((1, len(slack))), doubtful=np.array([doubtful]), slots=[],
     )  # fmt: skip
 
 
@@ -37,17 +37,15 @@ def test_answers_are_ranked_certified_before_conflicts_before_none():
     assert [int(answer.rank[0]) for answer in answers] == [0, 1, 2, 2]
 
 
-def test_the_better_of_two_states_is_kept(monkeypatch):
+def test_the_better_of_two_states_is_kept():
     """Realization by realization: the one with less penetration, and less that locators are off, which counts more."""
     inside = np.array([[0.1, 0.0], [0.5, 0.2], [0.0, 0.0], [0.3, 0.4]])
-    monkeypatch.setattr(repeated_steps, "least_gaps", lambda *_: -inside)
     poses = np.zeros((4, 1, 12))
     relative = np.zeros((4, 2, 12))
-    task = Task(poses, relative, np.zeros((4, 1)), np.zeros((4, 0, 0)), [], [])
     best, here = (State.start(poses + number, relative, 2, 0) for number in (1.0, 2.0))
     best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
     here.astray[:] = [0, 0, 1e-3, 0]
-    found = repeated_steps._better(best, task, here)
+    found = better_state(best, here, inside)
     assert found.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
     assert found.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
-    assert repeated_steps._better(None, task, here).slack.tolist() == inside.tolist()
+    assert better_state(None, here, inside).slack.tolist() == inside.tolist()

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.simulation import Block
@@ -28,25 +27,10 @@ def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
 
 
 def row_values(block: Block, kept: Sequence[str]) -> dict[str, np.ndarray]:
-    """The values of variables, by their names, as they are stored."""
-    found = {
-        terms.MEASURED: block.measured,
-        terms.GAP_MIN: block.gap_min,
-        terms.ACTIVE: block.active,
-        terms.CARRYING: block.carrying,
-        terms.REACTION: block.reaction,
-        terms.KKT_RESIDUAL: block.kkt_residual,
-        terms.ITERATIONS: block.iterations,
-        terms.STARTS: block.starts,
-        terms.SECOND_ANSWERS: block.second_answers,
-        terms.SEARCHED: block.searched,
-        terms.DEVIATION: block.deviations,
-        terms.STATUS: block.status,
-    }
-    if terms.ROTATION.name in kept:
-        found |= {terms.ROTATION: pose.rotation(block.poses), terms.TRANSLATION: pose.translation(block.poses)}
+    """Return the values of the variables named in `kept`, by name, as they are stored."""
+    values = block.values()
     return {
-        variable.name: np.ascontiguousarray(found[variable], dtype=variable.kind)
+        variable.name: np.ascontiguousarray(values[variable], dtype=variable.kind)
         for variable in terms.BY_REALIZATION
         if variable.name in kept
     }

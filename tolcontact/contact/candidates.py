@@ -7,18 +7,17 @@ import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.projection import project, reach
-from tolcontact.contact.round_scan import RoundScan
-from tolcontact.contact.scan import PairScan, Scan, fixed, least_gaps, pair_scan
+from tolcontact.contact.projection import half_spacing, project
+from tolcontact.contact.scan import PairScan, RoundScan, Scan, fixed, least_gaps, pair_scan
 from tolcontact.contact.state import State
 from tolcontact.mechanics import curved_pairs
 
-CLUSTERS = 6
-BESIDE = 0.01  # of their radius: what balls and shafts may carry beside a wall, if they came from afar
+MAX_CLUSTERS = 6
+OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
 
 
-class Seen(NamedTuple):
-    """What is seen of the raw state of realizations.
+class RawSurvey(NamedTuple):
+    """Gaps and active points of realizations in their raw state.
 
     scans     for each pair the points that may carry
     least     (realization, pair) [mm]: least gaps
@@ -35,10 +34,10 @@ class Seen(NamedTuple):
 class Carriers(NamedTuple):
     """Points of a pair that carry.
 
-    realization   the realization of each
-    places        (point, 3), nominal, of the part that has not the surface which they touch
+    realization   the realization of each point
+    places        (point, 3), nominal, of the part that does not have the surface which they touch
     on_moving     whether that is the moving part
-    spacing       their usual distance [mm]; of round faces how far they may stand beside a wall
+    spacing       the usual distance of the points [mm]; for round faces how far they may stand beside a wall
     """
 
     realization: Int[Array, " point"]
@@ -55,62 +54,64 @@ class Candidates:
         self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
         self._standing, self._spans = group.program.standing, group.program.spans
         self._varying = [k for k, points in enumerate(self._standing) if points is None]
-        self._every: list[Scan] = []
-        self._some: list[Scan] = []
+        self._all_scans: list[Scan] = []
+        self._carrying_scans: list[Scan] = []
         for position, index in enumerate(group.group.pairs):
             pair, gaps = program.nominal.pairs[index], program.gaps[index]
             tables = [side.table for side in group.group.sides if side.pair == position]
             if gaps is None:
-                of_round = RoundScan(tuple(tables), pair.P_m, pair.offsets, program.round_gaps[index])
-                self._every.append(of_round)
-                self._some.append(of_round)
+                round_scan = RoundScan(tuple(tables), pair.P_m, pair.offsets, program.round_gaps[index])
+                self._all_scans.append(round_scan)
+                self._carrying_scans.append(round_scan)
                 continue
-            self._every.append(pair_scan(pair, gaps, tables, CLUSTERS))
+            self._all_scans.append(pair_scan(pair, gaps, tables, MAX_CLUSTERS))
             # If the paper's set of points may carry, those between the corners count, too.
             corners = self._method.corners_suffice
-            self._some.append(pair_scan(pair, gaps, (), CLUSTERS, gaps.corners) if corners else self._every[-1])
+            self._carrying_scans.append(
+                pair_scan(pair, gaps, (), MAX_CLUSTERS, gaps.corners) if corners else self._all_scans[-1]
+            )
         is_iterated = self._method.is_iterated
         self.curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
-        again = [k for k, pair in enumerate(self._pairs) if pair.round is None] if is_iterated else self.curved
-        self._reaches = {k: reach(fixed(self._every[k])) for k in again}
+        projected = [k for k, pair in enumerate(self._pairs) if pair.round is None] if is_iterated else self.curved
+        self._margins = {k: half_spacing(fixed(self._all_scans[k])) for k in projected}
 
-    def scans(self, relative: Float[Array, "realization pair 12"], *, anew: bool = False) -> list[Scan]:
-        """Scans of the points that may carry; projected again if the method requires it.
+    def scans(self, relative: Float[Array, "realization pair 12"], *, projected: bool = False) -> list[Scan]:
+        """Return scans of the points that may carry, projected again if the method requires it.
 
-        `anew`: those against curved faces are projected again in any case.
+        With `projected`, points against curved faces are projected again in any case.
         """
-        scans = list(self._some)
-        if anew or self._method.is_iterated:
-            for k in self._reaches:
+        scans = list(self._carrying_scans)
+        if projected or self._method.is_iterated:
+            for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
         return scans
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
-        """A scan of the points of pair k, projected again at X_RM (realization, 12)."""
-        return project(fixed(self._some[k]), self._pairs[k].reference_face, relative, self._reaches[k])
+        """Return a scan of the points of pair k, projected again at X_RM (realization, 12)."""
+        return project(fixed(self._carrying_scans[k]), self._pairs[k].reference_face, relative, self._margins[k])
 
     def survey(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
-    ) -> Seen:
-        """What is seen of raw states, for deviations (realization, contributor)."""
+    ) -> RawSurvey:
+        """Return the survey of raw states, for deviations (realization, contributor)."""
         scans = self.scans(relative)
-        surveyed = scans if self._method.is_iterated else self._every
-        found = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
-        return Seen(
+        surveyed = scans if self._method.is_iterated else self._all_scans
+        surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
+        return RawSurvey(
             scans=scans,
             least=least_gaps(scans, relative, deviations),
-            active=np.stack([each.active for each in found], axis=1),
-            moments=np.concatenate([self._counted(k, each.moments) for k, each in enumerate(found)], axis=1),
+            active=np.stack([survey.active for survey in surveys], axis=1),
+            moments=np.concatenate([self._counted(k, survey.moments) for k, survey in enumerate(surveys)], axis=1),
         )
 
     def _counted(self, k: int, active: np.ndarray) -> np.ndarray:
-        """Moments (realization, side, moment) of the points that count in the objective, given those of active points."""
+        """Return moments (realization, side, moment) of points that count in the objective, given those of active points."""
         if self._pairs[k].is_supports:  # they are not among the paper's contact points
             return np.zeros_like(active)
         if not self._method.minimizes.counts_all:
             return active
-        every = np.array([table.sum(axis=1) for table in self._every[k].tables]).reshape(active.shape[1:])
-        return np.broadcast_to(every, active.shape)
+        total = np.array([table.sum(axis=1) for table in self._all_scans[k].tables]).reshape(active.shape[1:])
+        return np.broadcast_to(total, active.shape)
 
     def may_carry(
         self,
@@ -118,7 +119,7 @@ class Candidates:
         relative: Float[Array, "realization pair 12"],
         deviations: Float[Array, "realization contributor"],
     ) -> list[Bool[Array, "realization _"] | None]:
-        """Which points (realization, point) may carry: in the paper's set those that are active in the raw state."""
+        """Return which points (realization, point) may carry; in the paper's set those that are active in the raw state."""
         if self._method.is_closed:
             return [None for _ in scans]
         return [
@@ -127,17 +128,18 @@ class Candidates:
         ]
 
     def carriers(self, k: int, state: State) -> Carriers:
-        """The points of pair k that carry."""
+        """Return the points of pair k that carry."""
         loaded, standing, pair = state.loaded[:, self._spans[k]], self._standing[k], self._pairs[k]
         if pair.round:
-            of = pair.round.points
-            realization, column = np.nonzero(loaded & ~of["cut"].any(axis=1))  # where a wall ends a shaft may go on
-            return Carriers(realization, of["centre"][column], of["on_moving"][column], BESIDE * float(of["radius"].max()))
+            points = pair.round.points
+            realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # where a wall ends a shaft may go on
+            spacing = OVERHANG_SHARE * float(points["radius"].max())
+            return Carriers(realization, points["centre"][column], points["on_moving"][column], spacing)
         if standing is None:
             slots = state.slots[self._varying.index(k)]
             realization, column = np.nonzero(loaded & slots.filled)
-            places = self._some[k].P_m[slots.points[realization, column]]
+            places = self._carrying_scans[k].P_m[slots.points[realization, column]]
         else:
             realization, column = np.nonzero(loaded)
             places = pair.P_m[standing[column]]
-        return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * reach(fixed(self._every[k])))
+        return Carriers(realization, places, np.ones(len(places), dtype=bool), 2 * half_spacing(fixed(self._all_scans[k])))

@@ -1,7 +1,8 @@
-"""Iterated search: linear steps, each about contact points that were projected anew, until the poses stay.
+"""Iterated search: linear steps, each about contact points that were projected again, until the poses stay.
 
 More than one step about the same points would let a round part roll on the planes that represent its counterpart. Linear
-rows do not know how the surfaces curve: steps that neither shrink nor gain are taken with more caution.
+rows do not know how the surfaces curve: steps that neither shrink nor gain are repeated with more caution, a weight on the
+step itself.
 """
 
 from collections.abc import Callable
@@ -9,22 +10,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from tolcontact.contact.acceptance import Doubt
+from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import least_gaps, undone
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task, Unsettled
 
-MOST_STEPS = 100
-SHRINKS, CAUTION = 0.7, 10.0  # of the step before, or of the foreseen gain: what good steps reach; what others cost
-UNWORTHY = 1e-6  # mm, in the norm of the objective: its square is what a step gains
-SETTLED = 1e-8  # mm: a smaller step is the last one
+MAX_STEPS = 100
+GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the foreseen gain
+CAUTION_FACTOR = 10.0  # by which caution grows after a step that stalls, and falls after one that gains
+MIN_SCALED_STEP = 1e-6  # mm, in the norm of the objective: its square is what a step gains
+STEP_TOLERANCE = 1e-8  # mm: a smaller step is the last one
 
 
 def search(
     step: LinearStep,
-    doubt: Doubt,
+    limits: Limits,
     candidates: Candidates,
     energy_of: Callable[[Task, State], np.ndarray],
     task: Task,
@@ -32,31 +34,47 @@ def search(
     stride: float,
     caution: float,
 ) -> None:
-    """Take the steps of `state` to their end, from a certain `caution` on; `energy_of` is the objective (n,)."""
-    left, wary = Unsettled(task, state), np.full(len(task), caution)
-    before, energy = np.full(len(task), np.inf), energy_of(task, state)
-    for _ in range(MOST_STEPS):
-        for slots in left.state.slots:  # what carried before may now be beyond the rim
-            slots.put(np.arange(len(left)), Slots.empty(*slots.points.shape))
-        size, scaled = step.take(left.task, left.state, stride=stride, caution=wary)
-        now = energy_of(left.task, left.state)
-        share = (energy - now) / np.maximum(scaled**2 / 2, 1e-300)  # of the gain that the QP foresaw
-        scans = candidates.scans(left.state.relative, anew=True)
-        least = least_gaps(scans, left.state.relative, left.task.deviations)
-        inside = undone(scans, least, left.state.relative, left.task.deviations, left.task.may_carry, left.state.slack).max(
-            axis=1
-        )
-        sinks = inside > np.maximum((1 - SHRINKS) * np.minimum(size, scaled), SETTLED)  # what it gains is what it lost before
-        idle = (size > SHRINKS * before) & (share < 1 - SHRINKS) | sinks
-        wary = np.where(idle, np.maximum(CAUTION * wary, 1), np.where(share > SHRINKS, wary / CAUTION, wary))
-        on = (size > SETTLED) & ~(idle & (scaled < UNWORTHY))
-        lost = on & doubt.is_lost(left.task, left.state)
-        left.state.residual[lost] = np.inf
-        on &= ~lost
-        left.settle(~on)
-        wary, before, energy = wary[on], size[on], now[on]
-        if not len(left):
+    """Take the steps of `state` to their end, from the given `caution` on; `energy_of` returns the objective (n,)."""
+    unsettled, cautions = Unsettled(task, state), np.full(len(task), caution)
+    last_size, last_energy = np.full(len(task), np.inf), energy_of(task, state)
+    for _ in range(MAX_STEPS):
+        _empty_slots(unsettled.state)
+        size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, caution=cautions)
+        energy = energy_of(unsettled.task, unsettled.state)
+        gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # to the gain that the QP foresaw
+        scans = candidates.scans(unsettled.state.relative, projected=True)
+        # A step whose points lie deeper inside afterwards gains only what it loses again.
+        sinks = _depth_left(scans, unsettled) > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), STEP_TOLERANCE)
+        stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks
+        cautions = _adapted(cautions, stalls, gain_ratio)
+        moves = (size > STEP_TOLERANCE) & ~(stalls & (scaled < MIN_SCALED_STEP))
+        lost = moves & limits.is_lost(unsettled.task, unsettled.state)
+        unsettled.state.kkt_residual[lost] = np.inf
+        moves &= ~lost
+        unsettled.settle(~moves)
+        cautions, last_size, last_energy = cautions[moves], size[moves], energy[moves]
+        if not len(unsettled):
             return
-        left.task = replace(left.task, scans=[scan.take(np.flatnonzero(on)) for scan in scans])
-    left.state.residual[:] = np.maximum(left.state.residual, before)
-    left.settle(np.ones(len(left), dtype=bool))
+        unsettled.task = replace(unsettled.task, scans=[scan.take(np.flatnonzero(moves)) for scan in scans])
+    residual = unsettled.state.kkt_residual
+    residual[:] = np.maximum(residual, last_size)
+    unsettled.settle(np.ones(len(unsettled), dtype=bool))
+
+
+def _empty_slots(state: State) -> None:
+    """Empty all slots: the points that carried before may now be beyond the rim."""
+    for slots in state.slots:
+        slots.put(np.arange(len(state)), Slots.empty(*slots.points.shape))
+
+
+def _depth_left(scans: list, unsettled: Unsettled) -> np.ndarray:
+    """Return by how much points are deeper inside than the slack (n,) [mm], among points projected at the poses reached."""
+    task, state = unsettled.task, unsettled.state
+    least = least_gaps(scans, state.relative, task.deviations)
+    return undone(scans, least, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)
+
+
+def _adapted(cautions: np.ndarray, stalls: np.ndarray, gain_ratio: np.ndarray) -> np.ndarray:
+    """Return the cautions (n,) of the next step: more where a step stalled, less where it gained what was foreseen."""
+    relaxed = np.where(gain_ratio > GOOD_RATIO, cautions / CAUTION_FACTOR, cautions)
+    return np.where(stalls, np.maximum(CAUTION_FACTOR * cautions, 1), relaxed)

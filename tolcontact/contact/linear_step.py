@@ -14,13 +14,13 @@ import numpy as np
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.scan import Deepest, PairScan, fixed
-from tolcontact.contact.slots import NOTHING, Slots
+from tolcontact.contact.slots import NEGLIGIBLE_SHARE, Slots
 from tolcontact.contact.state import State, Task
 from tolcontact.mechanics import ENTRIES
 
-ROUNDS = 60
+MAX_ROUNDS = 60
 PENETRATION = 1e-10  # mm: less than this is no penetration
-USABLE = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
+MAX_RESIDUAL = 1e-3  # of the group's length: a larger KKT residual [mm] is no answer
 
 
 class Step(NamedTuple):
@@ -36,17 +36,17 @@ class LinearStep:
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self._solve = group.solve
         self._remembers = program.plugin.remembers
-        self._usable = USABLE * group.group.length
+        self._max_residual = MAX_RESIDUAL * group.group.length
         self.spans = group.program.spans
         self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
         # The curvature of walls around round faces counts in every step, not in Newton's alone.
         self.knows_walls = any(program.nominal.pairs[pair].round for pair in group.group.pairs)
 
     def twin(self) -> "LinearStep":
-        """The same for another thread."""
-        other = copy.copy(self)
-        other._solve = self._solve.twin()
-        return other
+        """Return the same step for another thread."""
+        twin = copy.copy(self)
+        twin._solve = self._solve.twin()
+        return twin
 
     def start_over(self) -> None:
         """Forget all problems solved before, if the solver starts from the last one."""
@@ -54,7 +54,7 @@ class LinearStep:
             self._solve.start_over()
 
     def start(self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"]) -> State:
-        """The state at poses (n, part, 12), with X_RM (n, pair, 12), before any step."""
+        """Return the state at poses (n, part, 12), with X_RM (n, pair, 12), before the first step."""
         return State.start(poses, relative, self.spans[-1].stop, len(self.varying))
 
     def take(
@@ -67,100 +67,108 @@ class LinearStep:
         firmness: float = 1.0,
         newton: bool = False,
     ) -> Step:
-        """One linear step: the QP in which every point has its row. Its answer is written into `state`.
+        """Take one linear step, with the QP in which every point has its row; write its answer into `state`.
 
-        `newton` counts the curvature of objective and gaps, `firmness` multiplies the regularization, of the step no more is
-        taken than turns a part by `stride` [rad], and `caution` (n,) makes steps smaller, but not their end.
+        stride     the largest turn of a part [rad] of which the step is taken
+        caution    (n,): makes steps smaller, but does not change where they end
+        firmness   multiplies the regularization
+        newton     whether the curvature of objective and gaps counts
         """
-        before = [slots.copy() for slots in state.slots]
-        inputs = self._inputs(task, state, before, newton)
+        start_slots = [slots.copy() for slots in state.slots]
+        inputs = self._inputs(task, state, start_slots, newton)
         for name, value in {"stride": stride, "caution": caution, "firmness": firmness, "newton": float(newton)}.items():
             inputs[name] = np.broadcast_to(value, len(task))
         size = np.zeros((2, len(task)))
-        left, part, part_inputs = np.arange(len(task)), (task, state), inputs
-        slots, deepest = before, self._deepest(task, state.relative)
-        for number in range(ROUNDS):
-            filled = [own.with_deepest(*found, PENETRATION) for own, found in zip(slots, deepest, strict=True)]
-            slots = [own for own, _ in filled]
-            more = np.logical_or.reduce([np.full(len(left), number == 0), *(grown for _, grown in filled)])
-            if not more.any():
+        rows, part, part_inputs = np.arange(len(task)), (task, state), inputs
+        slots, deepest = start_slots, self._deepest(task, state.relative)
+        for number in range(MAX_ROUNDS):
+            extended = [old.with_deepest(*points, PENETRATION) for old, points in zip(slots, deepest, strict=True)]
+            slots = [new for new, _ in extended]
+            enters = np.logical_or.reduce([np.full(len(rows), number == 0), *(grows for _, grows in extended)])
+            if not enters.any():
                 break
-            if not more.all():
-                left, slots = left[more], [own.take(more) for own in slots]
-                part, part_inputs = (task.take(left), state.take(left)), {name: of[left] for name, of in inputs.items()}
+            if not enters.all():
+                rows, slots = rows[enters], [new.take(enters) for new in slots]
+                part = (task.take(rows), state.take(rows))
+                part_inputs = {name: values[rows] for name, values in inputs.items()}
             if newton:
-                self._carry_over(part_inputs, [own.take(left) for own in before], slots)
-            deepest, size[:, left] = self._solve_round(*part, part_inputs, slots)
+                self._set_reactions(part_inputs, [old.take(rows) for old in start_slots], slots)
+            deepest, size[:, rows] = self._solve_round(*part, part_inputs, slots)
             slots = part[1].slots
             if part[1] is not state:
-                state.put(left, part[1])
-        state.iterations += 1
+                state.put(rows, part[1])
+        state.iterations[:] += 1
         return Step(*size)
 
-    def _inputs(self, task: Task, state: State, before: Sequence[Slots], newton: bool) -> dict[str, np.ndarray]:
-        """What the QPs of all rounds are about: the poses and reactions before the step."""
+    def _inputs(self, task: Task, state: State, slots: Sequence[Slots], newton: bool) -> dict[str, np.ndarray]:
+        """Return the inputs that the QPs of all rounds share: the poses and reactions before the step, and its slots."""
         inputs = {name: getattr(task, name) for name in ("raw", "moments", "deviations")}
         inputs |= {"poses": state.poses.copy(), "reactions": state.multipliers.copy()}
-        bends = [np.zeros((len(task), 0)), *(np.zeros((len(task), ENTRIES)) for _ in before)]
+        bends = [np.zeros((len(task), 0)), *(np.zeros((len(task), ENTRIES)) for _ in slots)]
         if newton:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
-            bends[1:] = [_bend(fixed(task.scans[k]), own, task.deviations) for k, own in zip(self.varying, before, strict=True)]
+            bends[1:] = [_bend(fixed(task.scans[k]), old, task.deviations) for k, old in zip(self.varying, slots, strict=True)]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
 
-    def _carry_over(self, inputs: dict[str, np.ndarray], before: Sequence[Slots], slots: Sequence[Slots]) -> None:
-        """Give the points that now have slots the reactions that they had before the step."""
+    def _set_reactions(self, inputs: dict[str, np.ndarray], start_slots: Sequence[Slots], slots: Sequence[Slots]) -> None:
+        """Set the reactions of the points in the slots to those that they had at the start of the step."""
         inputs["reactions"] = inputs["reactions"].copy()
-        for k, old, new in zip(self.varying, before, slots, strict=True):
+        for k, old, new in zip(self.varying, start_slots, slots, strict=True):
             inputs["reactions"][:, self.spans[k]] = old.reactions_of(new.points)
 
     def _solve_round(
         self, task: Task, state: State, inputs: Mapping[str, np.ndarray], slots: Sequence[Slots]
     ) -> tuple[list[Deepest], np.ndarray]:
-        """Solve the QPs with some points in their slots; the answers go into `state`.
+        """Solve the QPs with some points in their slots, and write the answers into `state`.
 
-        Returns for the varying pairs the deepest points, and by how much they are deeper than the slack; and step sizes (2, n).
+        Returns the deepest points of the varying pairs, with the depth by which they exceed the slack; and step sizes (2, n).
         """
         count = len(task)
-        points = [fixed(task.scans[k]).rows(own.points, task.deviations) for k, own in zip(self.varying, slots, strict=True)]
-        P_m, P_r, n_r = (np.concatenate([np.zeros((count, 0, 3)), *(each[i] for each in points)], axis=1) for i in range(3))
-        filled = np.concatenate([np.zeros((count, 0)), *(own.filled for own in slots)], axis=1)
+        points = [
+            fixed(task.scans[k]).rows(of_pair.points, task.deviations) for k, of_pair in zip(self.varying, slots, strict=True)
+        ]
+        P_m, P_r, n_r = (
+            np.concatenate([np.zeros((count, 0, 3)), *vectors], axis=1)
+            for vectors in ([row[i] for row in points] for i in range(3))
+        )
+        filled = np.concatenate([np.zeros((count, 0)), *(slot.filled for slot in slots)], axis=1)
         answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled)
         slack, residual = np.maximum(answer["slack"], 0), answer["residual"][:, 0]
-        solved = residual <= self._usable  # what no solver could solve moves nothing
+        solved = residual <= self._max_residual  # what no solver could solve moves nothing
         deepest = self._deepest(task, answer["linearized"].reshape(state.relative.shape))
         # With the rows in conflict the points that carry stay inside by the slack; only what exceeds it is left undone.
-        deepest = [Deepest(found.points, found.depth - slack[:, [k]]) for k, found in zip(self.varying, deepest, strict=True)]
-        for found in deepest:
-            residual = np.maximum(residual, found.depth.max(axis=1))
-        state.residual[:] = np.where(solved, residual, np.inf)
-        state.second_answers += answer["second"][:, 0].astype(int)
+        deepest = [Deepest(points, depth - slack[:, [k]]) for k, (points, depth) in zip(self.varying, deepest, strict=True)]
+        for _, depth in deepest:
+            residual = np.maximum(residual, depth.max(axis=1))
+        state.kkt_residual[:] = np.where(solved, residual, np.inf)
+        state.second_answers[:] += answer["second"][:, 0].astype(int)
         multipliers = np.maximum(answer["multipliers"], 0)
-        found_by_name = {
+        results = {
             "poses": answer["corrected"].reshape(state.poses.shape),
             "relative": answer["relative"].reshape(state.relative.shape),
             "slack": slack,
             "astray": answer["astray"][:, 0],
             "multipliers": multipliers,
         }
-        for name, values in found_by_name.items():
+        for name, values in results.items():
             getattr(state, name)[solved] = values[solved]
-        state.slots = [own.kept(multipliers[:, self.spans[k]]) for k, own in zip(self.varying, slots, strict=True)]
-        deepest = [Deepest(found.points, np.where(solved[:, None], found.depth, -np.inf)) for found in deepest]
+        state.slots[:] = [slot.carrying(multipliers[:, self.spans[k]]) for k, slot in zip(self.varying, slots, strict=True)]
+        deepest = [Deepest(points, np.where(solved[:, None], depth, -np.inf)) for points, depth in deepest]
         return deepest, np.where(solved, answer["step"].T, 0.0)
 
     def _deepest(self, task: Task, relative: np.ndarray) -> list[Deepest]:
-        """Of varying pairs the deepest points that may carry, at X_RM (n, pair, 12)."""
+        """Return the deepest points of the varying pairs that may carry, at X_RM (n, pair, 12)."""
         return [fixed(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
-    """Multipliers (n, row of the QP), zero if they are negligible beside the largest of their pair."""
+    """Return multipliers (n, row of the QP), zero if they are negligible beside the largest of their pair."""
     of_pairs = (multipliers[:, span] for span in spans)
-    return np.concatenate([np.where(m > NOTHING * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
+    return np.concatenate([np.where(m > NEGLIGIBLE_SHARE * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 
 
 def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
-    """The reactions' sum of the gaps' gradients by the entries of X_RM, (n, 12)."""
+    """Return the sum of reaction times the gap's gradient by the entries of X_RM, (n, 12)."""
     P_m, _, n_r = scan.rows(slots.points, deviations)
     weighted = slots.reactions[..., None] * n_r
     turning = (weighted[..., :, None] * P_m[..., None, :]).sum(axis=1)

@@ -12,7 +12,7 @@ from tolcontact.geometry.surface import Surface
 
 
 @dataclass(frozen=True, eq=False)
-class FoundScan(PairScan):
+class ProjectedScan(PairScan):
     """A scan in which every realization has feet of its own.
 
     feet, normals    (realization, point, 3): P^r and n^r, nominal
@@ -23,13 +23,13 @@ class FoundScan(PairScan):
     normals: Float[Array, "realization point 3"]
     over: Bool[Array, "realization point"]
 
-    def take(self, some: np.ndarray) -> "FoundScan":
-        return replace(self, feet=self.feet[some], normals=self.normals[some], over=self.over[some])
+    def take(self, rows: np.ndarray) -> "ProjectedScan":
+        return replace(self, feet=self.feet[rows], normals=self.normals[rows], over=self.over[rows])
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        apart = pose.apply(relative, self.P_m) - self.feet
+        offset = pose.apply(relative, self.P_m) - self.feet
         n = self.normals
-        gaps = n[..., 0] * apart[..., 0] + n[..., 1] * apart[..., 1] + n[..., 2] * apart[..., 2]
+        gaps = n[..., 0] * offset[..., 0] + n[..., 1] * offset[..., 1] + n[..., 2] * offset[..., 2]
         if self.columns.size:
             gaps -= self.offsets.heights(deviations, np.broadcast_to(np.arange(len(self.P_m)), gaps.shape))
         return np.where(self.over, gaps, np.inf)
@@ -41,8 +41,8 @@ class FoundScan(PairScan):
         return self.P_m[points], feet, normals
 
 
-def reach(scan: PairScan) -> float:
-    """How far a contact point represents its surroundings [mm]: half the usual distance of two of them."""
+def half_spacing(scan: PairScan) -> float:
+    """Return half the usual distance of two contact points [mm]: how far each represents its surroundings."""
     if len(scan.P_m) < 2:
         return 0.0
     distance, _ = KDTree(scan.P_m).query(scan.P_m, k=2)
@@ -50,15 +50,15 @@ def reach(scan: PairScan) -> float:
 
 
 def project(scan: PairScan, surface: Surface | None, relative: Float[Array, "realization 12"], margin: float) -> PairScan:
-    """The scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
+    """Return the scan with every contact point projected again at X_RM (realization, 12). Supports stay as they are.
 
-    Points that overhang the rim by up to `margin` [mm] still count: else those at the rim would come and go with every step.
+    Points that overhang the rim by up to `margin` [mm] still count: else points at the rim would come and go with every step.
     """
     if surface is None:
         return scan
     shape = (len(relative), len(scan.P_m), 3)
     feet, normals, over = surface.project(pose.apply(relative, scan.P_m).reshape(-1, 3), margin=margin)
-    return FoundScan(
+    return ProjectedScan(
         **{name: getattr(scan, name) for name in PairScan.__dataclass_fields__},
         feet=feet.reshape(shape),
         normals=normals.reshape(shape),

@@ -1,24 +1,25 @@
 """The exact resolution: linear steps about the poses reached, with their true gaps, until these stay.
 
-The first steps are like the paper's. What has not come to rest by then has freedoms that next to nothing holds, while the
-curvature of gaps and objective counts: it goes on with Newton steps, and holds those freedoms firmly first.
+The first steps are like the paper's. Realizations that still move then have freedoms that next to nothing holds, while the
+curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.contact.acceptance import Doubt
+from tolcontact.arrays import Array, Float
+from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.scan import least_gaps
 from tolcontact.contact.state import State, Task, Unsettled
 
-AT_REST = 1e-9  # mm: a smaller step is the last one
-NOISE = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
-PRICE = 1e3  # of a locator that does not hold, beside penetration
+STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
+ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
+ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
 
 
-class Kind(NamedTuple):
+class StepKind(NamedTuple):
     """How firmly a step holds what the objective leaves open, and whether it counts curvature."""
 
     firmness: float
@@ -26,52 +27,58 @@ class Kind(NamedTuple):
 
 
 STEPS = (
-    *[Kind(1.0, newton=False)] * 8,
-    *[Kind(1e4, newton=True)] * 6,
-    *[Kind(1e2, newton=True)] * 6,
-    *[Kind(1.0, newton=True)] * 80,
+    *[StepKind(1.0, newton=False)] * 8,
+    *[StepKind(1e4, newton=True)] * 6,
+    *[StepKind(1e2, newton=True)] * 6,
+    *[StepKind(1.0, newton=True)] * 80,
 )
 
 
-def repeat(step: LinearStep, doubt: Doubt, task: Task, state: State, stride: float) -> None:
+def repeat(step: LinearStep, limits: Limits, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
-    left, best = Unsettled(task, state), None
+    unsettled, best = Unsettled(task, state), None
     for kind in STEPS:
-        last = step.take(left.task, left.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+        size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
         knows_curvature = kind.newton or step.knows_walls
-        moves = (kind.firmness > 1) | ((last.size > AT_REST) & ((last.scaled > NOISE) | (not knows_curvature)))
+        moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not knows_curvature)))
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
-        unrest = np.minimum(last.size, last.scaled)
-        residual = left.state.residual
+        unrest = np.minimum(size, scaled)
+        residual = unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
-        lost = moves & doubt.is_lost(left.task, left.state)
+        lost = moves & limits.is_lost(unsettled.task, unsettled.state)
         residual[lost] = np.inf
-        on = moves & ~lost
-        left.settle(~on)
-        unrest, best = unrest[on], None if best is None else best.take(on)
-        if not len(left):
+        moves &= ~lost
+        unsettled.settle(~moves)
+        unrest, best = unrest[moves], None if best is None else best.take(moves)
+        if not len(unsettled):
             return
         if kind.newton:
-            best = _better(best, left.task, left.state)
-    now = left.state
+            best = better_state(best, unsettled.state, true_penetration(unsettled.task, unsettled.state))
+    final = unsettled.state
     if best is not None:
-        stuck = np.flatnonzero((now.slack > PENETRATION).any(axis=1))
-        now.put_answer(stuck, best.take(stuck))
-    now.residual[:] = np.maximum(now.residual, np.where(now.in_conflict, 0, unrest))
-    left.settle(np.ones(len(left), dtype=bool))
+        stuck = np.flatnonzero((final.slack > PENETRATION).any(axis=1))
+        final.put_answer(stuck, best.take(stuck))
+    final.kkt_residual[:] = np.maximum(final.kkt_residual, np.where(final.in_conflict, 0, unrest))
+    unsettled.settle(np.ones(len(unsettled), dtype=bool))
 
 
-def _better(best: State | None, task: Task, state: State) -> State:
-    """The better of two states, realization by realization; `slack` is the true penetration of each pair in what it returns."""
-    here = state.take(np.arange(len(task)))
-    here.slack[:] = np.maximum(-least_gaps(task.scans, state.relative, task.deviations), 0)
+def true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:
+    """Return the penetration of each pair at the poses reached (n, pair) [mm]."""
+    return np.maximum(-least_gaps(task.scans, state.relative, task.deviations), 0)
+
+
+def better_state(best: State | None, state: State, penetration: Float[Array, "n pair"]) -> State:
+    """Return the better of two states, realization by realization; its `slack` is the true `penetration` of each pair."""
+    candidate = state.take(np.arange(len(state)))
+    candidate.slack[:] = penetration
     if best is None:
-        return here
-    better = np.flatnonzero(_wrong(here) < _wrong(best))
-    best.put(better, here.take(better))
+        return candidate
+    better = np.flatnonzero(_violation(candidate) < _violation(best))
+    best.put(better, candidate.take(better))
     return best
 
 
-def _wrong(state: State) -> np.ndarray:
-    return np.asarray(state.slack.max(axis=1) + PRICE * state.astray)
+def _violation(state: State) -> np.ndarray:
+    """Return the penetration of the worst pair, and how far locators are astray, as one number (n,) [mm]."""
+    return state.slack.max(axis=1) + ASTRAY_WEIGHT * state.astray

@@ -1,4 +1,4 @@
-"""Gaps of the contact points of a pair, what is active, and which points deserve a row of the QP.
+"""Scans: gaps of the contact points of a pair, the active points, and the points that deserve a row of the QP.
 
 Sums run over points in a fixed order, one realization independent of the others, so that results do not depend on
 how realizations are grouped into blocks. (A BLAS product would be faster and would not keep that.)
@@ -13,16 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation import NamedFunction
 from tolcontact.contact import kernel
 from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics import MOMENTS, GapMap
 
-SLACKNESS = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
-BEYOND = 1e300  # where no point is
+BOUND_TOLERANCE = 1e-12  # of the largest coordinate: bounds of leaves are that much wider, for rounding
+OUTSIDE = 1e300  # a coordinate that no point has
 
 
 class Survey(NamedTuple):
-    """How many points of a pair are active (realization,), and their moments (realization, side, moment)."""
+    """The number of active points of a pair (realization,), and their moments (realization, side, moment)."""
 
     active: Int[Array, " realization"]
     moments: Float[Array, "realization side moment"]
@@ -48,20 +49,20 @@ class Scan:
     P_m: Float[Array, "point 3"]
     offsets: Offsets
 
-    def take(self, some: np.ndarray) -> "Scan":
-        """The scan for some of the realizations: here all have the same contact points."""
+    def take(self, rows: np.ndarray) -> "Scan":
+        """Return the scan of some realizations: the same one if all have the same contact points."""
         return self
 
     def gaps(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, "realization point"]:
-        """Gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
+        """Return gaps (realization, point) [mm] for X_RM (realization, 12) and deviations (realization, contributor)."""
         raise NotImplementedError
 
     def survey(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"], activity: float
     ) -> "Survey":
-        """The points whose gap is below `activity`."""
+        """Return number and moments of the points whose gap is below `activity` [mm]."""
         active = self.gaps(relative, deviations) < activity
         sums = [[np.where(active, row, 0.0).sum(axis=1) for row in table] for table in self.tables]
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
@@ -70,8 +71,8 @@ class Scan:
     def least(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
-        """The least gap of all points (realization,) [mm]."""
-        return np.asarray(self.gaps(relative, deviations).min(axis=1))
+        """Return the least gap of all points (realization,) [mm]."""
+        return self.gaps(relative, deviations).min(axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +113,16 @@ class PairScan(Scan):
     def rows(
         self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
     ) -> tuple[Float[Array, "realization slot 3"], Float[Array, "realization slot 3"], Float[Array, "realization slot 3"]]:
-        """P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot): what their rows of the QP need."""
+        """Return P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot), which their rows of the QP need."""
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
         if self.columns.size:
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        """The deepest point of each cluster; depth 0 if none is inside.
+        """Return the deepest point of each cluster; its depth is 0 if no point is inside.
 
-        Only points for which `may_carry` (realization, point) holds are considered, if it is given.
+        may_carry   (realization, point): the points to look at; all if it is None
         """
         gaps = np.minimum(self.gaps(relative, deviations), 0)
         if may_carry is not None:
@@ -131,8 +132,21 @@ class PairScan(Scan):
         return Deepest(points, -np.take_along_axis(gaps, points, axis=1))
 
 
+@dataclass(frozen=True, eq=False)
+class RoundScan(Scan):
+    """The points of round faces, which follow from every pose. They always have a row of the QP; no row is searched for.
+
+    gaps_at    X_RM, deviations -> gaps (realization, point)
+    """
+
+    gaps_at: NamedFunction
+
+    def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        return self.gaps_at(X_RM=relative, deviations=deviations)["gaps"]
+
+
 def fixed(scan: Scan) -> PairScan:
-    """The scan of a pair that is not one of round faces."""
+    """Return a scan, which must not be one of round faces."""
     assert isinstance(scan, PairScan)
     return scan
 
@@ -160,21 +174,21 @@ class CompiledScan(PairScan):
         return Deepest(points, -gaps)
 
     def _deepest(
-        self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, below: float
+        self, clusters: np.ndarray, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None, limit: float
     ) -> tuple[np.ndarray, np.ndarray]:
         points = np.empty((len(relative), len(clusters) - 1), dtype=np.int64)
         gaps = np.empty(points.shape)
         poses, heights = np.ascontiguousarray(relative), np.ascontiguousarray(deviations)
         mask = np.empty((len(relative), 0), dtype=bool) if may_carry is None else np.ascontiguousarray(may_carry)
-        kernel.deepest(self._points, clusters, poses, heights, mask, below, points, gaps)
+        kernel.deepest(self._points, clusters, poses, heights, mask, limit, points, gaps)
         return points, gaps
 
     @cached_property
     def _points(self) -> kernel.Points:
-        rounding = SLACKNESS * np.abs(self.coordinates[1:]).max(initial=0)
+        rounding = BOUND_TOLERANCE * np.abs(self.coordinates[1:]).max(initial=0)
         boxes = []
-        for first in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
-            low, high = (extreme.reduceat(self.coordinates[1:], first, axis=1) for extreme in (np.minimum, np.maximum))
+        for starts in (self.leaves[:-1], self.leaves[self.branches[:-1]]):
+            low, high = (extreme.reduceat(self.coordinates[1:], starts, axis=1) for extreme in (np.minimum, np.maximum))
             boxes.append(np.stack([(low + high) / 2, (high - low) / 2 + rounding]))
         return kernel.Points(self.basis, self.columns, self.coordinates, self.leaves, self.branches, *boxes)
 
@@ -191,20 +205,21 @@ class CompiledScan(PairScan):
 
 
 def pair_scan(
-    pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, chosen: np.ndarray | None = None
+    pair: ContactPoints, gaps: GapMap, tables: Sequence[np.ndarray], clusters: int, points: np.ndarray | None = None
 ) -> PairScan:
-    """Sort the points of a pair, or some `chosen` ones, into clusters of neighbours, at most so many; and those into
-    branches and leaves.
+    """Sort the points of a pair into at most `clusters` clusters of neighbours, and each cluster into branches and leaves.
 
-    Supports have a cluster each.
+    Each support has a cluster of its own.
+
+    points   numbers of the points (point,) that the scan has; all if it is None
     """
-    chosen = np.arange(len(pair.P_m)) if chosen is None else chosen
-    label = _cluster(pair.P_m[chosen], len(chosen) if pair.is_supports else clusters)
+    points = np.arange(len(pair.P_m)) if points is None else points
+    label = _cluster(pair.P_m[points], len(points) if pair.is_supports else clusters)
     along = np.roll(gaps.coordinates, -1, axis=0)  # largest extents first, the constant last
-    found = [_leaves(chosen[label == one], along) for one in range(label.max() + 1)]
-    leaves = [leaf for cluster in found for leaf in cluster]
+    leaves_of_clusters = [_leaves(points[label == number], along) for number in range(label.max() + 1)]
+    leaves = [leaf for cluster in leaves_of_clusters for leaf in cluster]
     order = np.concatenate(leaves)
-    ends = np.cumsum([0, *map(len, found)])
+    ends = np.cumsum([0, *map(len, leaves_of_clusters)])
     firsts = [np.arange(begin, end, kernel.BRANCH) for begin, end in itertools.pairwise(ends)]
     return CompiledScan(
         basis=gaps.basis,
@@ -224,23 +239,23 @@ def pair_scan(
 def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
     """Halve `points` across their longest extent until no part has more than LEAF of them; neighbours stay together.
 
-    All leaves but one are full: what is missing to a power of two stands beyond all points, and is left out in the end.
+    All leaves but one are full: points are filled up to a power of two by points OUTSIDE, which are removed in the end.
     """
     count, size = len(points), kernel.LEAF
     while size < count:
         size *= 2
-    padded = np.concatenate([coordinates[:, points], np.full((len(coordinates), size - count), BEYOND)], axis=1)
+    padded = np.concatenate([coordinates[:, points], np.full((len(coordinates), size - count), OUTSIDE)], axis=1)
     parts = np.arange(size).reshape(1, size)
     while parts.shape[1] > kernel.LEAF:
-        of = padded.take(parts, axis=1)
-        widest = (of.max(axis=2) - of.min(axis=2)).argmax(axis=0)
-        order = np.argpartition(of[widest, np.arange(len(parts))], parts.shape[1] // 2, axis=1)
+        values = padded.take(parts, axis=1)
+        widest = (values.max(axis=2) - values.min(axis=2)).argmax(axis=0)
+        order = np.argpartition(values[widest, np.arange(len(parts))], parts.shape[1] // 2, axis=1)
         parts = np.take_along_axis(parts, order, axis=1).reshape(2 * len(parts), -1)
     return [points[leaf[leaf < count]] for leaf in parts[(parts < count).any(axis=1)]]
 
 
 def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
-    """Each point joins the nearest of `clusters` points that lie as far apart as possible."""
+    """Return the cluster of each point: the nearest of `clusters` points that lie as far apart as possible."""
     if len(points) <= clusters:
         return np.arange(len(points))
     label = np.zeros(len(points), dtype=int)
@@ -260,19 +275,20 @@ def undone(
     may_carry: Sequence[Bool[Array, "realization _"] | None],
     slack: Float[Array, "realization pair"],
 ) -> Float[Array, "realization pair"]:
-    """By how much points that may carry (realization, point) are deeper inside than the slack (realization, pair) [mm].
+    """Return by how much points that may carry are deeper inside than the slack (realization, pair) [mm].
 
-    `least` are the least gaps (realization, pair) of all points.
+    least       (realization, pair) [mm]: the least gaps of all points
+    may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
         -least[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
         for k, (scan, may) in enumerate(zip(scans, may_carry, strict=True))
     ]
-    return np.asarray(np.stack(depths, axis=1) - slack)
+    return np.stack(depths, axis=1) - slack
 
 
 def least_gaps(
     scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
 ) -> Float[Array, "realization pair"]:
-    """Least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
+    """Return the least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
     return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

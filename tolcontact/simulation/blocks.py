@@ -1,4 +1,4 @@
-"""Deviations to corrected poses and measures: one block of realizations."""
+"""The simulation of one block of realizations: from deviations to corrected poses and measures."""
 
 import enum
 
@@ -7,13 +7,14 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver, Resolved
+from tolcontact.contact.record import join_groups
 from tolcontact.mechanics import ENTRIES
 from tolcontact.simulation.block import Block
 from tolcontact.vocabulary import CORRECTED, Status
 
 
 class Outcome(enum.IntEnum):
-    """What became of a realization in one group, the worse the higher: the worst of all groups is its status."""
+    """The outcome of a realization in one group, the worse the higher: the worst of all groups decides its status."""
 
     UNTOUCHED = 0
     RESOLVED = 1
@@ -29,7 +30,7 @@ def simulate_block(
     start: int = 0,
     resolvers: list[ContactResolver] | None = None,
 ) -> Block:
-    """Raw and corrected states for given deviations (realization, contributor), in mm or the units of the contributor."""
+    """Return raw and corrected states for deviations (realization, contributor), in mm or the units of the contributor."""
     if resolvers is None:
         resolvers = [ContactResolver(program, group).twin() for group in program.groups]
     placed = program.place(deviations=deviations)["poses"]
@@ -38,9 +39,9 @@ def simulate_block(
     block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs))
     worst = np.zeros(len(block), dtype=np.int8)
     for resolver in resolvers:
-        found = resolver.resolve(raw, relative, deviations)
-        _put(block, resolver, found)
-        worst[found.touched] = np.maximum(worst[found.touched], _outcome(found))
+        resolved = resolver.resolve(raw, relative, deviations)
+        _put(block, resolver, resolved)
+        worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
     unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
     worst[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf
     touched = worst > Outcome.UNTOUCHED
@@ -49,32 +50,25 @@ def simulate_block(
     return block
 
 
-def _put(block: Block, resolver: ContactResolver, found: Resolved) -> None:
-    """Note what a group found."""
-    touched, state = found.touched, found.state
-    of_pairs = np.ix_(touched, resolver.pairs)
+def _put(block: Block, resolver: ContactResolver, resolved: Resolved) -> None:
+    """Write the results of a group into the block."""
+    touched, state, pairs = resolved.touched, resolved.state, resolver.pairs
     block.poses[touched[:, None], CORRECTED, resolver.parts] = state.poses
-    block.gap_min[:, :, resolver.pairs], block.active[:, resolver.pairs] = found.gap_min, found.active
-    block.carrying[of_pairs], block.reaction[of_pairs] = found.carrying(resolver.spans), found.reactions(resolver.spans)
-    for largest, own in (
-        (block.kkt_residual, state.residual),
-        (block.iterations, state.iterations),
-        (block.starts, found.starts),
-        (block.searched, state.searched),
-    ):
-        largest[touched] = np.maximum(largest[touched], own)
-    block.second_answers[touched] += state.second_answers
+    block.gap_min[:, :, pairs], block.active[:, pairs] = resolved.gap_min, resolved.active
+    block.carrying[np.ix_(touched, pairs)] = resolved.carrying(resolver.spans)
+    block.reaction[np.ix_(touched, pairs)] = resolved.reactions(resolver.spans)
+    join_groups(block, touched, state)
 
 
-def _outcome(found: Resolved) -> Int[Array, " n"]:
-    """(n,), Outcome."""
-    state = found.state
+def _outcome(resolved: Resolved) -> Int[Array, " n"]:
+    """Return the Outcome of each touched realization (n,)."""
+    state = resolved.state
     answered = np.where(state.doubtful, Outcome.DOUBTFUL, np.where(state.in_conflict, Outcome.IN_CONFLICT, Outcome.RESOLVED))
     return np.where(state.solved, answered, Outcome.UNSOLVED)
 
 
 def _statuses(is_exact: bool) -> np.ndarray:
-    """The Status for each Outcome. Only repeated steps can tell that no pose is free of penetration."""
+    """Return the Status for each Outcome. Only repeated steps can tell that no pose is free of penetration."""
     conflict = Status.NOT_ASSEMBLABLE if is_exact else Status.NOT_CONVERGED
     return np.array([Status.UNTOUCHED, Status.RESOLVED, conflict, Status.DOUBTFUL, Status.NOT_CONVERGED], dtype=np.int8)
 
@@ -82,6 +76,6 @@ def _statuses(is_exact: bool) -> np.ndarray:
 def _observe(
     program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]
 ) -> tuple[Float[Array, "n measure"], Float[Array, "n pair 12"]]:
-    """Measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12), for deviations."""
-    seen = program.observe(poses=poses, deviations=deviations)
-    return seen["measured"], seen["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)
+    """Return measures (realization, measure) and X_RM (realization, pair, 12) at poses (realization, part, 12)."""
+    results = program.observe(poses=poses, deviations=deviations)
+    return results["measured"], results["relative"].reshape(len(poses), len(program.nominal.pairs), ENTRIES)

@@ -116,7 +116,7 @@ ROWS = (
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)
-ADDED = (STARTS, SECOND_ANSWERS, SEARCHED)  # that archives of before do not have; nor have they the group `surface`
+ADDED = ROWS[ROWS.index(STARTS) : -1]  # that archives of format 1 do not have; nor have they the group `surface`
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
