@@ -143,33 +143,33 @@ def proportion_of(k: float, n: float) -> Estimate:
     return Estimate(k / n, float(lower), float(upper))
 
 
-def variance_ratio(after: np.ndarray | Sample, before: np.ndarray | Sample) -> Estimate:
-    """Return the variance of `after` over that of `before`, from the same realizations (paired, on the log scale)."""
-    after, before = Sample.of(after), Sample.of(before)
-    variance_after, variance_before = after.moments[0], before.moments[0]
-    if is_constant(after) or is_constant(before):
+def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -> Estimate:
+    """Return the variance of `sample` over that of `baseline`, from the same realizations (paired, on the log scale)."""
+    sample, baseline = Sample.of(sample), Sample.of(baseline)
+    variance_sample, variance_baseline = sample.moments[0], baseline.moments[0]
+    if is_constant(sample) or is_constant(baseline):
         return UNDEFINED
     # The influence of each realization on the logarithm of the ratio; their sum is zero.
     influence = Sample(lambda: (
-        (a - after.mean) ** 2 / variance_after - (b - before.mean) ** 2 / variance_before
-        for a, b in zip(after.pieces(), before.pieces(), strict=True)
-    ), after.replicate)  # fmt: skip
+        (a - sample.mean) ** 2 / variance_sample - (b - baseline.mean) ** 2 / variance_baseline
+        for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)
+    ), sample.replicate)  # fmt: skip
     squares = sum((piece**2).sum() for piece in influence.pieces())
     # The correction for small samples is Bonett's for one variance.
-    n = after.count
+    n = sample.count
     factor = np.exp(influence.widening * _Z * n / (n - _Z) * np.sqrt((squares / n + 3 / n) / (n - 1)))
-    ratio = variance_after / variance_before
+    ratio = variance_sample / variance_baseline
     return Estimate(ratio, float(ratio / factor), float(ratio * factor))
 
 
-def variance_from_moments(count: int, second: ArrayLike, fourth: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return `variance` from the second and the fourth central moment of samples, arrays of any shape."""
-    second, fourth = np.asarray(second), np.asarray(fourth)
+    moment2, moment4 = np.asarray(moment2), np.asarray(moment4)
     with np.errstate(invalid="ignore", divide="ignore"):
-        kurtosis = np.where(second > 0, fourth / second**2, 1.0)
+        kurtosis = np.where(moment2 > 0, moment4 / moment2**2, 1.0)
     correction = count / (count - _Z)
     error = correction * np.sqrt(np.maximum(kurtosis - 1 + 3 / count, 0) / (count - 1))
-    estimate = second * count / (count - 1)
+    estimate = moment2 * count / (count - 1)
     middle = correction * estimate
     return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
 

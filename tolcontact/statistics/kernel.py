@@ -4,14 +4,14 @@ import numpy as np
 
 from tolcontact.compiled import compiled
 
-CHUNK = 256  # points that are summed up together
+CHUNK_POINTS = 256  # summed up in one pass over the realizations
 
 
 @compiled
 def affine_parts(poses, centre, A):  # type: ignore[no-untyped-def]
-    """A (n, 3, 4) of the displacements u = A (x - centre, 1) of points x at poses (n, 12).
+    """Write A (n, 3, 4) of the displacements u = A (x - centre, 1) of points x at poses (n, 12).
 
-    Turning about the part's middle keeps the sums free of cancellation.
+    Rotation about the part's centre avoids cancellation in the sums.
     """
     for k in range(A.shape[0]):
         for i in range(3):
@@ -30,7 +30,7 @@ def add_scatter(A, mean, scatter):  # type: ignore[no-untyped-def]
         for k in range(n):
             x, y, z, t = x + A[k, i, 0], y + A[k, i, 1], z + A[k, i, 2], t + A[k, i, 3]
         x, y, z, t = x / n, y / n, z / n, t / n
-        # Sums in names of their own stay in the processor's registers.
+        # Separate scalars keep the sums in the processor's registers.
         xx = xy = xz = xt = yy = yz = yt = zz = zt = tt = 0.0
         for k in range(n):
             a, b, c, d = A[k, i, 0] - x, A[k, i, 1] - y, A[k, i, 2] - z, A[k, i, 3] - t
@@ -49,19 +49,19 @@ def add_magnitudes(A, points, shift, powers):  # type: ignore[no-untyped-def]
 
     u = A @ (x, y, z, 1) for A (n, 3, 4), points (3, point), shift (point,).
     """
-    for first in range(0, shift.size, CHUNK):
-        last = min(first + CHUNK, shift.size)
-        x, y, z, less = points[0, first:last], points[1, first:last], points[2, first:last], shift[first:last]
-        sum1, sum2, sum3, sum4 = powers[0, first:last], powers[1, first:last], powers[2, first:last], powers[3, first:last]
+    for start in range(0, shift.size, CHUNK_POINTS):
+        stop = min(start + CHUNK_POINTS, shift.size)
+        x, y, z, offset = points[0, start:stop], points[1, start:stop], points[2, start:stop], shift[start:stop]
+        sum1, sum2, sum3, sum4 = powers[0, start:stop], powers[1, start:stop], powers[2, start:stop], powers[3, start:stop]
         for k in range(A.shape[0]):
             a, b, c = A[k, 0], A[k, 1], A[k, 2]
             for v in range(x.size):
                 u = a[0] * x[v] + a[1] * y[v] + a[2] * z[v] + a[3]
                 w = b[0] * x[v] + b[1] * y[v] + b[2] * z[v] + b[3]
                 t = c[0] * x[v] + c[1] * y[v] + c[2] * z[v] + c[3]
-                one = np.sqrt(u * u + w * w + t * t) - less[v]
-                two = one * one
-                sum1[v] += one
-                sum2[v] += two
-                sum3[v] += two * one
-                sum4[v] += two * two
+                power1 = np.sqrt(u * u + w * w + t * t) - offset[v]
+                power2 = power1 * power1
+                sum1[v] += power1
+                sum2[v] += power2
+                sum3[v] += power2 * power1
+                sum4[v] += power2 * power2

@@ -16,47 +16,47 @@ from tolcontact.statistics.sample import Sample
 _Z = float(special.ndtri(0.5 + intervals.CONFIDENCE / 2))
 
 
-def shift(after: Sample, before: Sample, *, paired: bool) -> Estimate:
+def shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     """Return the difference of the means: Student's t of paired differences, or Welch's interval."""
     if paired:
-        return intervals.mean(after - before)
-    squared_errors = [x.moments[0] / (x.count - 1) for x in (after, before)]
-    difference, total = after.mean - before.mean, sum(squared_errors)
+        return intervals.mean(sample - baseline)
+    squared_errors = [x.moments[0] / (x.count - 1) for x in (sample, baseline)]
+    difference, total = sample.mean - baseline.mean, sum(squared_errors)
     if not total > 0:
         return Estimate(difference, difference, difference) if math.isfinite(difference) else UNDEFINED
-    freedom = total**2 / sum(error**2 / (x.count - 1) for error, x in zip(squared_errors, (after, before), strict=True))
+    freedom = total**2 / sum(error**2 / (x.count - 1) for error, x in zip(squared_errors, (sample, baseline), strict=True))
     half = intervals.student(freedom) * math.sqrt(total)
     return Estimate(difference, difference - half, difference + half)
 
 
-def variance_ratio(after: Sample, before: Sample, *, paired: bool) -> Estimate:
+def variance_ratio(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     """Return the ratio of the variances on the log scale; if not paired, with Bonett's standard errors of both."""
     if paired:
-        return intervals.variance_ratio(after, before)
-    if intervals.is_constant(after) or intervals.is_constant(before):
+        return intervals.variance_ratio(sample, baseline)
+    if intervals.is_constant(sample) or intervals.is_constant(baseline):
         return UNDEFINED
-    variances = [intervals.variance(x) for x in (after, before)]
+    variances = [intervals.variance(x) for x in (sample, baseline)]
     # On the log scale the bounds of each variance are at equal distances from their middle.
     halves = [math.log(variance.upper / variance.lower) / 2 for variance in variances]
     ratio, factor = variances[0].value / variances[1].value, math.exp(math.hypot(*halves))
     return Estimate(ratio, ratio / factor, ratio * factor)
 
 
-def share_shift(after: Sample, before: Sample, *, paired: bool) -> Estimate:
+def share_shift(sample: Sample, baseline: Sample, *, paired: bool) -> Estimate:
     """Return the difference of two shares, from samples of booleans.
 
     The interval is Wald's after small additions to the counts: half a realization for each kind of pair if the samples are
     paired (Agresti and Min, 2005), one hit and one miss in each sample if not (Agresti and Caffo, 2000).
     """
     if paired:
-        n = after.count
-        pairs = [(int((a & ~b).sum()), int((b & ~a).sum())) for a, b in zip(after.pieces(), before.pieces(), strict=True)]
+        n = sample.count
+        pairs = [(int((a & ~b).sum()), int((b & ~a).sum())) for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)]
         gained, lost = (sum(counts) for counts in zip(*pairs, strict=True))
         middle, change = (gained - lost) / (n + 2), gained + lost + 1
         error = math.sqrt(max(change / (n + 2) - middle**2, 0) / (n + 2))
         return _bounded((gained - lost) / n, middle, error)
-    hits = [sum(int(piece.sum()) for piece in x.pieces()) for x in (after, before)]
-    counts = [after.count, before.count]
+    hits = [sum(int(piece.sum()) for piece in x.pieces()) for x in (sample, baseline)]
+    counts = [sample.count, baseline.count]
     shares = [(k + 1) / (n + 2) for k, n in zip(hits, counts, strict=True)]
     error = math.sqrt(sum(p * (1 - p) / (n + 2) for p, n in zip(shares, counts, strict=True)))
     return _bounded(hits[0] / counts[0] - hits[1] / counts[1], shares[0] - shares[1], error)
