@@ -158,7 +158,7 @@ def test_a_study_is_one_graph_over_designs():
 
 def test_studies_that_cannot_be():
     for models, options, said in (
-        ([], {}, "models are none; name at least one"),
+        ([], {}, "models is empty; name at least one"),
         ([cases.ra1(), cases.ra1()], {}, 'several models are called "RA1"'),
         ([cases.ra1()], {"seeds": [1, 1]}, 'the design "RA1, seed 1" is given twice'),
         ([cases.ra1()], {"methods": "exact"}, "method is 'exact'; expected a tc.Method, or some of its choices"),

@@ -18,7 +18,7 @@ from tolcontact.errors import OptionError
 from tolcontact.simulation import outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.intervals import Estimate, mean
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 NARROWEST, WIDEST = 0.1, 3.0  # times the present range
 STEP = 0.1  # of ranges: differences

@@ -18,7 +18,8 @@ from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.run import Choice, Model, Progress, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
+from tolcontact.workflow.run import Progress
 
 SOME = 1 << 14  # realizations that spreads are estimated from
 

@@ -23,7 +23,7 @@ from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.sample import Sample
-from tolcontact.workflow.run import DEFAULT_SOLVER, Choice, Model, check_counts, chosen, declared
+from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model, assembly_of, check_counts, method_of
 
 FIRST = {1: 9, 2: 5, 3: 4}  # places tried along each side, by the number of sides
 TRIALS = 40  # more of them, from the best
@@ -66,8 +66,8 @@ def relocate(
     Raises ModelError, ArchiveError, OptionError for a locator, a region or a measure that there is not.
     """
     check_counts(samples=samples, seed=seed)
-    assembly, blocks = declared(model), mapping(client)
-    engine = _Engine(assembly, blocks, locator, least, solver, chosen(assembly, method), samples, seed)
+    assembly, blocks = assembly_of(model), mapping(client)
+    engine = _Engine(assembly, blocks, locator, least, solver, method_of(assembly, method), samples, seed)
     if into is not None:
         check_room_for(into, terms.OF_RELOCATION, engine.program)
     lower, upper = _corners(between)

@@ -18,7 +18,7 @@ from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 STEP = 0.01  # of a contributor's standard deviation
 KINK = 0.1  # of a derivative: if both sides differ by more, it is not one

@@ -16,7 +16,7 @@ from tolcontact.simulation import outcomes
 from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.rare_events import Score, tail_probability
 from tolcontact.variation import GivenDraws
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 LEAST = 4000  # realizations for an event
 INFLATIONS = 1.3 ** np.arange(7)  # of all deviations, up to 4.8: from which on do parts not go together?

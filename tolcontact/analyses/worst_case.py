@@ -19,7 +19,7 @@ from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.cluster import mapping
 from tolcontact.variation import GivenDraws
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 BEST, OTHERS = 4, 12  # searches for each value: from the best combinations, and from others at random
 SAME = 1e-4  # of a measure's spread: ends that differ by less are one

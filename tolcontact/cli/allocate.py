@@ -32,7 +32,7 @@ from tolcontact.errors import OptionError
 from tolcontact.report import allocation_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.run import DEFAULT_SOLVER
+from tolcontact.workflow.models import DEFAULT_SOLVER
 
 
 @app.command(

@@ -14,8 +14,8 @@ from tolcontact.declaration.script import load_model
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, shown
 from tolcontact.report import population_text, write_view
+from tolcontact.workflow.models import DEFAULT_SOLVER, build
 from tolcontact.workflow.population_check import check_population
-from tolcontact.workflow.run import DEFAULT_SOLVER, build
 
 
 @app.command(epilog=examples("check model.py", "check model.py --view", "check model.py --population 1000"))

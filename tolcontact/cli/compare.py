@@ -16,8 +16,8 @@ from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text, runs_text, write_comparison
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.run import DEFAULT_SOLVER
-from tolcontact.workflow.run_comparison import compare_runs, named
+from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.run_comparison import compare_runs, named_archives
 from tolcontact.workflow.solver_comparison import compare as compare_solvers
 
 _ONE_OR_MORE = "One or more of {}. Default: the model's."
@@ -86,7 +86,7 @@ def compare(
 
 def _of_archives(files: Sequence[Path], report: Path | None) -> xr.Dataset:
     with contextlib.ExitStack() as stack:
-        runs = {name: stack.enter_context(open_archive(path)) for name, path in named(files).items()}
+        runs = {name: stack.enter_context(open_archive(path)) for name, path in named_archives(files).items()}
         found = compare_runs(runs)
         if report is not None:
             write_comparison(runs, found, report)

@@ -30,7 +30,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.report import contributions_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import GROUPED_BY
-from tolcontact.workflow.run import DEFAULT_SOLVER
+from tolcontact.workflow.models import DEFAULT_SOLVER
 
 
 @app.command(

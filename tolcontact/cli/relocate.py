@@ -29,7 +29,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.report import relocation_text
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.run import DEFAULT_SOLVER
+from tolcontact.workflow.models import DEFAULT_SOLVER
 
 CORNER = "X,Y,Z"
 

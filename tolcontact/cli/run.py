@@ -28,7 +28,8 @@ from tolcontact.errors import OptionError, shown
 from tolcontact.report import write_page
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
-from tolcontact.workflow.run import DEFAULT_SOLVER, SURFACES, summarize
+from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.run import SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
 
 

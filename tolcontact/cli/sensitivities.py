@@ -28,7 +28,7 @@ from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
 from tolcontact.report import sensitivities_text
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.run import DEFAULT_SOLVER
+from tolcontact.workflow.models import DEFAULT_SOLVER
 
 
 @app.command(epilog=examples("sensitivities model.py", "sensitivities model.py --samples 200 --csv > slopes.csv"))

@@ -1,4 +1,4 @@
-"""`results.tolcontact`: what a person asks of results, whether they come from `tc.run`, `tc.open_archive` or xarray itself."""
+"""The accessor `results.tolcontact` of results from `tc.run`, `tc.open_archive` or xarray itself."""
 
 from functools import cached_property
 from typing import Any
@@ -16,58 +16,62 @@ from tolcontact.workflow.run import summarize
 
 
 class Plots:
-    """`tc.plot` of these results (see tolcontact.plot)."""
+    """The pictures of `tc.plot` for these results (see tolcontact.plot)."""
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
 
     def histogram(self, measure: str | None = None, **options: Any) -> Any:
-        """See tc.plot.histogram."""
+        """Draw a histogram (see tc.plot.histogram)."""
         return plot.histogram(self._results, measure, **options)
 
     def field(self, statistic: str = "6 sigma", **options: Any) -> Any:
-        """See tc.plot.field."""
+        """Draw a displacement field (see tc.plot.field)."""
         return plot.field(self._results, statistic, **options)
 
     def assembly(self, **options: Any) -> Any:
-        """See tc.plot.assembly."""
+        """Draw the assembly (see tc.plot.assembly)."""
         return plot.assembly(self._results, **options)
 
 
 @xr.register_datatree_accessor("tolcontact")  # type: ignore[no-untyped-call]
 class Results:
-    """What is asked of results. In a notebook it shows itself: figures, and the report to turn."""
+    """The verbs of results. A notebook shows them as figures and a report."""
 
     def __init__(self, results: xr.DataTree) -> None:
         self._results = results
 
     @cached_property
     def plot(self) -> Plots:
-        """Pictures."""
+        """The pictures of these results."""
         return Plots(self._results)
 
     def summary(self) -> Summary:
-        """Statistics with their intervals (see tc.summarize)."""
+        """Return the statistics with their intervals (see tc.summarize)."""
         return summarize(self._results)
 
     def field(self, part: str) -> xr.Dataset:
-        """The displacement field of a part by its name, whatever its group is called (see tolcontact.statistics)."""
+        """Return the displacement field of a part by the name of the part (see tolcontact.statistics)."""
         names = [str(name) for name in self._results.to_dataset()[terms.PART].values]
         if part not in names:
             raise OptionError(f'part is "{part}"; expected one of: {", ".join(names)}')
-        whole = self._results["field"].children[terms.group_of(part)].to_dataset(inherit=True)
-        kept = [name for name, of in whole.data_vars.items() if terms.CHECKPOINT not in of.dims and name != terms.CHECKSUM]
-        used = {dim for name in kept for dim in whole[name].dims}
-        found = whole[kept]
-        return found.drop_vars([name for name in found.coords if name not in used])
+        group = self._results["field"].children[terms.group_of(part)].to_dataset(inherit=True)
+        names = [
+            str(name)
+            for name, values in group.data_vars.items()
+            if terms.CHECKPOINT not in values.dims and name != terms.CHECKSUM
+        ]
+        dimensions = {dim for name in names for dim in group[name].dims}
+        field = group[names]
+        return field.drop_vars([name for name in field.coords if name not in dimensions])
 
     def realization(self, number: int) -> xr.Dataset:
-        """Everything that is kept of one realization: measures, poses, gaps, status, deviations."""
-        done = finished(self._results)
-        if not 0 <= number < done:
-            raise OptionError(f"realization is {number}; expected 0 to {done - 1}")
+        """Return all values of one realization: measures, poses, gaps, status, deviations."""
+        count = finished(self._results)
+        if not 0 <= number < count:
+            raise OptionError(f"realization is {number}; expected 0 to {count - 1}")
         rows = self._results.to_dataset()
-        row = rows[[name for name, of in rows.data_vars.items() if terms.REALIZATION in of.dims]].isel(
+        row = rows[[name for name, values in rows.data_vars.items() if terms.REALIZATION in values.dims]].isel(
             {terms.REALIZATION: number}
         )
         sample = self._results["sample"].to_dataset()
@@ -76,15 +80,15 @@ class Results:
         return row.assign_coords({terms.STATUS_MEANING: terms.STATUS_MEANINGS[int(row[terms.STATUS.name])]})
 
     def where_status(self, status: str | terms.Status) -> xr.DataTree:
-        """The results of the realizations with a status, such as "not_assemblable", with their numbers."""
-        names = {each.name.lower(): each for each in terms.Status}
+        """Return the results of the realizations with a status, such as "not_assemblable"; they keep their numbers."""
+        names = {meaning.name.lower(): meaning for meaning in terms.Status}
         if str(status) not in names and status not in list(terms.Status):
             raise OptionError(f"status is {status!r}; expected one of: {', '.join(names)}")
         rows = np.flatnonzero(self._results[terms.STATUS.name].values == int(names.get(str(status), status)))
         return self._results.isel({terms.REALIZATION: rows})
 
     def touching(self) -> xr.Dataset:
-        """Where contact points touch, and how often (see tolcontact.statistics.touching)."""
+        """Return the places of contact points and how often they touch (see tolcontact.statistics.touching)."""
         return touching(self._results)
 
     def __repr__(self) -> str:

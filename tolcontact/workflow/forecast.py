@@ -1,4 +1,4 @@
-"""What a run will take, announced before it begins: size, time, memory, disk."""
+"""Forecasts: the time, memory and disk space of a long run, announced before it begins."""
 
 import logging
 import time
@@ -9,19 +9,20 @@ from tolcontact.compilation import Program
 from tolcontact.simulation import block_rows, simulate_blocks
 from tolcontact.vocabulary import BLOCK_ROWS
 
-TRIAL, ENOUGH = 4, 0.25  # realizations of the first trial, and s of the last: what begins takes milliseconds
-MANY = 1_000_000
-LONG = 60.0  # s: what takes less is not announced
+FIRST_TRIAL_ROWS = 4
+MIN_TRIAL_SECONDS = 0.25  # a shorter trial measures the start of a block
+MIN_ANNOUNCED_ROWS = 1_000_000
+MIN_ANNOUNCED_SECONDS = 60.0
 
 log = logging.getLogger(__name__)
 
 
 def announce(program: Program, *, samples: int, seed: int, keep: str, threads: int) -> None:
-    """Log, as a warning, what `samples` more realizations will take on so many threads, if that is long: from a trial here."""
-    if samples < MANY and block_rows(program) == BLOCK_ROWS:
+    """Log a warning with the time and space that `samples` more realizations need on `threads` threads, if that is much."""
+    if samples < MIN_ANNOUNCED_ROWS and block_rows(program) == BLOCK_ROWS:
         return
-    seconds = _of_one(program, seed) * samples / threads
-    if samples >= MANY or seconds > LONG:
+    seconds = _seconds_per_realization(program, seed) * samples / threads
+    if samples >= MIN_ANNOUNCED_ROWS or seconds > MIN_ANNOUNCED_SECONDS:
         nominal = program.nominal
         points = sum(len(pair.P_m) for pair in nominal.pairs)
         peak = peak_memory()
@@ -33,21 +34,21 @@ def announce(program: Program, *, samples: int, seed: int, keep: str, threads: i
         )  # fmt: skip
 
 
-def _of_one(program: Program, seed: int) -> float:
-    """How long a realization takes [s]: of more and more, up to a block, until they take long enough."""
-    trial = TRIAL
-    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # what is loaded first takes longer than a block
+def _seconds_per_realization(program: Program, seed: int) -> float:
+    """Return the time of a realization [s], from trials of growing size, at most a block."""
+    trial = FIRST_TRIAL_ROWS
+    list(simulate_blocks(program, samples=trial, seed=seed, threads=1))  # loading takes longer than a block
     while True:
         started = time.perf_counter()
         list(simulate_blocks(program, samples=trial, seed=seed, threads=1))
-        took = time.perf_counter() - started
-        if took > ENOUGH or trial >= block_rows(program):
-            return took / trial
+        seconds = time.perf_counter() - started
+        if seconds > MIN_TRIAL_SECONDS or trial >= block_rows(program):
+            return seconds / trial
         trial *= 8
 
 
 def duration(seconds: float) -> str:
-    """A time in words."""
+    """Return a time in words."""
     for size, unit in ((86_400, "days"), (3600, "h"), (60, "min")):
         if seconds >= 2 * size:
             return f"{seconds / size:.0f} {unit}"

@@ -1,4 +1,4 @@
-"""Drawn features measured back: is the share inside their zones what the rules state?"""
+"""A check of populations: the share of drawn features inside their zones, beside the share that the rules state."""
 
 import numpy as np
 import xarray as xr
@@ -8,20 +8,22 @@ from tolcontact.discretization import discretize
 from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
 from tolcontact.variation.measured_population import measured_population
-from tolcontact.workflow.run import Model, check_counts, declared
+from tolcontact.workflow.models import Model, assembly_of, check_counts
 
 
 def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> xr.Dataset:
     """Draw `samples` of every feature, and measure them as a coordinate measuring machine would.
 
-    One zone for each size and tolerance, with
+    The result has one zone for each size and each tolerance:
+
         share_inside  (zone, interval)  estimate, and its exact 95 % interval
-        stated_share  (zone)            what the rule from zone to spread states; NaN if it states none
+        stated_share  (zone)            share that the rule from zone to spread states; NaN if it states none
         needed_width  (zone) [mm]       width of the zone that 99.73 % of the features need
-    Tolerances that are nested, or fill a bonus, may have a larger share inside than stated.
+
+    Nested tolerances, and tolerances that fill a bonus, may have a larger share inside than stated.
     """
     check_counts(samples=samples, seed=seed)
-    nominal = discretize(declared(model))
+    nominal = discretize(assembly_of(model))
     zones = list(measured_population(nominal, Draws(nominal), seed=seed, count=samples))
     values = {
         terms.ZONE_FEATURE: [zone.feature for zone in zones],
@@ -32,9 +34,9 @@ def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> x
         ),
         terms.NEEDED_WIDTH: [zone.needed for zone in zones],
     }
-    found = xr.Dataset(
-        {v.name: (v.dims, np.array(of, dtype=v.kind), v.all_attributes) for v, of in values.items()},
+    population = xr.Dataset(
+        {v.name: (v.dims, np.array(column, dtype=v.kind), v.all_attributes) for v, column in values.items()},
         coords={terms.INTERVAL: list(terms.ESTIMATE)},
         attrs={"title": f"population of {nominal.assembly.name}", "realizations": samples, "seed": seed},
     )
-    return found.set_coords([terms.ZONE_FEATURE.name, terms.ZONE_TOLERANCE.name])
+    return population.set_coords([terms.ZONE_FEATURE.name, terms.ZONE_TOLERANCE.name])

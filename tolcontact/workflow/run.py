@@ -1,94 +1,28 @@
-"""From a declared assembly to an archive: the whole flow in one call."""
+"""Runs: from a declared assembly to an archive in one call, and the statistics of its results."""
 
 import tempfile
-from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, opened, taken
-from tolcontact.compilation import Program, compile_program
-from tolcontact.declaration import Assembly
-from tolcontact.declaration.script import load_model
-from tolcontact.discretization import discretize
-from tolcontact.errors import ModelError, OptionError
-from tolcontact.method import Method
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import Summary
-from tolcontact.statistics import summarize as statistics_of
+from tolcontact.statistics import summarize as summary_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.forecast import announce
+from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
 from tolcontact.workflow.run_sums import RunSums
 from tolcontact.workflow.until import Target
 
-DEFAULT_SOLVER = "qpoases"
 SURFACES = 64
-Model = Assembly | Callable[[], Assembly] | str | Path
 Progress = Callable[[int], None]
-Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the others are the model's
-
-
-def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
-    """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
-
-    `method` is used instead of the model's own; a mapping, such as {"resolution": "exact"}, replaces single choices.
-    Raises ModelError with all its faults, OptionError for a solver or a method that cannot be used.
-    """
-    assembly = declared(model)
-    return compile_program(discretize(assembly), solver, chosen(assembly, method))
-
-
-def program_of(model: Model | Program, solver: str | None, method: Choice | None) -> Program:
-    """The program of a model (see `build`), or the one that is given, which has its solver and method already."""
-    check_program(model, solver, method)
-    return model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
-
-
-def check_program(model: Model | Program, solver: str | None, method: Choice | None) -> None:
-    """Raise OptionError for a program with a solver or a method beside it: they could not act."""
-    if isinstance(model, Program) and not (solver is None and method is None):
-        raise OptionError(
-            "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
-        )
-
-
-def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
-    """Every fault of a model; none if it can be built (see `build`)."""
-    try:
-        build(model, solver=solver, method=method)
-    except ModelError as error:
-        return error.faults
-    return ()
-
-
-def chosen(assembly: Assembly, method: Choice | None) -> Method:
-    """The method that an assembly is resolved with. Raises OptionError for a choice that no method has."""
-    own = assembly.method or Method()
-    if method is None or isinstance(method, Method):
-        return method or own
-    if not isinstance(method, Mapping):
-        raise OptionError(f'method is {method!r}; expected a tc.Method, or some of its choices: {{"resolution": "exact"}}')
-    known = [field.name for field in fields(Method)]
-    for word in method:
-        if word not in known:
-            raise OptionError(f"a method has no choice {word!r}; expected some of: {', '.join(known)}")
-    return replace(own, **method)
-
-
-def declared(model: Model) -> Assembly:
-    """The assembly of a model, however it is given."""
-    if isinstance(model, str | Path):
-        return load_model(Path(model))
-    if not isinstance(model, Assembly) and callable(model):
-        model = model()
-    if not isinstance(model, Assembly):
-        raise OptionError(
-            f"the model is a {type(model).__name__}; expected a tc.Assembly, a function that returns one, or a script's path"
-        )
-    return model
 
 
 def run(
@@ -111,22 +45,23 @@ def run(
 ) -> xr.DataTree:
     """Simulate `samples` realizations, raw and corrected, into the archive `out`, and open it.
 
-    `model` is what `build` takes, or what it gives: a Program, which has its solver and method (else qpoases, and the
-    model's own method).
-    Without `out` the results are kept in memory only. `keep` states what is kept of each realization: "measures" (with gaps,
-    status and residuals), also "poses", or "all" (also the deviations of the locators); fields come from all realizations.
-    `fields` is the number of realizations, the first ones, that the magnitudes of displacement fields cover, "all", "none", or
-    "some": 16 384, and fewer where a part has many vertices. Their components are always exact, over all realizations.
-    `plan` is how contributors are drawn: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two
-    draw 256 realizations together; from 16 such replicates on, intervals are theirs, and narrower.
-    `until` says how narrow an interval has to become, such as "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm
-    +-20 %", of corrected measures: `samples` are the first ones, and as many more follow as it takes.
-    `client` of dask.distributed, if there is one: its workers simulate, this process writes; the results are the same to the
+    `model` is anything that `build` takes or returns. A Program has its solver and method already; the default solver is
+    qpoases, and the default method is the model's own.
+    `out` is the path of the archive. Without it, the results stay in memory.
+    `keep` states what the archive stores of each realization: "measures" (with gaps, status and residuals), "poses" (these as
+    well), or "all" (also the deviations). Displacement fields always come from all realizations.
+    `fields` is the number of realizations that the magnitudes of displacement fields cover, starting from the first: a number,
+    "all", "none", or "some" (16 384, or fewer where a part has many vertices). The components x, y, z are always exact.
+    `plan` is the sampling plan: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two draw
+    replicates of 256 realizations; from 16 replicates on, intervals come from the replicates and are narrower.
+    `until` states how narrow the 95 % interval of a corrected measure must become, for example "corner height: 6 sigma +-1 %",
+    "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until it is.
+    `client` is a client of dask.distributed. Its workers simulate, this process writes, and the results are the same to the
     last bit (see tolcontact.simulation).
-    `surfaces` of the certified realizations are checked, in the end, against the surfaces themselves, between contact points.
-    To `resume` is to go on to as many as the archive was begun for, or to `samples` if that is more.
+    `surfaces` is the number of certified realizations that are checked against the surfaces between contact points at the end.
+    With `resume`, continue an interrupted run up to the number of samples it was started with, or `samples` if larger.
     `progress` is called with the number of finished realizations. An interrupted run (Ctrl-C) leaves an archive that can be
-    read, with fields of what is finished, and resumed.
+    read and resumed; its fields cover the finished realizations.
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written; ClusterError if workers fail.
     """
     check_counts(samples=samples, seed=seed, surfaces=surfaces)
@@ -145,23 +80,25 @@ def run(
         if target:
             target.check(program)
         blocks = mapping(client)
-        asked, goes_on = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
+        settings, is_resumed = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
         while True:
-            sums = RunSums(program, asked)
+            sums = RunSums(program, settings)
             with (
-                ArchiveWriter.resume(path, program, asked) if goes_on else ArchiveWriter(path, program, asked, sums.sizes)
+                ArchiveWriter.resume(path, program, settings)
+                if is_resumed
+                else ArchiveWriter(path, program, settings, sums.sizes)
             ) as writer:
                 announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep, threads=threads_of(client))
                 _simulate(program, writer, sums, seed, blocks, progress)
-            more = target.next(path, program) if target else None
-            if more is None:
+            enlarged = target.next(path, program) if target else None
+            if enlarged is None:
                 return
-            asked, goes_on = asked._replace(samples=more), True
+            settings, is_resumed = settings._replace(samples=enlarged), True
 
     if out is None:
-        for word, value in {"overwrite": overwrite, "resume": resume}.items():
-            if value:
-                raise OptionError(f"{word} needs an archive, and none is named; name one: out=...")
+        for option, is_set in {"overwrite": overwrite, "resume": resume}.items():
+            if is_set:
+                raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "results.nc"
             write(path)
@@ -175,6 +112,7 @@ def run(
 def _simulate(
     program: Program, writer: ArchiveWriter, sums: RunSums, seed: int, blocks: MapBlocks, progress: Progress | None
 ) -> None:
+    """Simulate the rows that an archive lacks, write them with their sums, and check some against the surfaces."""
     sums.start_from(writer)
     is_summed = bool(writer.rows)
     try:
@@ -192,23 +130,23 @@ def _simulate(
     except KeyboardInterrupt:
         if is_summed and writer.is_between_blocks:
             writer.write_checkpoint(sums.numbers)
-        elif not is_summed:  # it came at whatever instant: only the sums of the last checkpoint are sure
+        elif not is_summed:  # the interrupt may have come within a sum: only those of the last checkpoint are sure
             is_summed = sums.start_from(writer)
         if is_summed:
             sums.write_to(writer)
         raise
-    chosen_rows = writer.chosen(seed)
-    if chosen_rows.size:
-        kept = writer.poses(chosen_rows)
-        deviations = program.draws.rows(chosen_rows, seed=seed)
-        poses = simulated_poses(program, deviations) if kept is None else kept
-        writer.write_checked(chosen_rows, *check_surfaces(program, poses, deviations))
+    rows_to_check = writer.chosen(seed)
+    if rows_to_check.size:
+        stored_poses = writer.poses(rows_to_check)
+        deviations = program.draws.rows(rows_to_check, seed=seed)
+        poses = simulated_poses(program, deviations) if stored_poses is None else stored_poses
+        writer.write_checked(rows_to_check, *check_surfaces(program, poses, deviations))
 
 
 def summarize(results: xr.DataTree | str | Path) -> Summary:
-    """Statistics of a run, or of the archive of that name (see tolcontact.statistics.summarize).
+    """Return the statistics of results, or of the archive at a path (see tolcontact.statistics.summarize).
 
-    Raises ArchiveError if realizations are not what was written, or if fewer than two are finished.
+    Raises ArchiveError if realizations differ from what was written, or if fewer than two are finished.
     """
     if isinstance(results, str | Path):
         with open_archive(results) as tree:
@@ -218,12 +156,4 @@ def summarize(results: xr.DataTree | str | Path) -> Summary:
             f"results are a {type(results).__name__}; expected what tc.run or tc.open_archive returns, or an archive's path"
         )
     check_rows(results)
-    return statistics_of(results)
-
-
-def check_counts(**counts: int) -> None:
-    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed and surfaces 0)."""
-    for word, value in counts.items():
-        least = {"samples": 2, "seed": 0, "surfaces": 0}[word]
-        if isinstance(value, bool) or not isinstance(value, int) or not least <= value < 2**63:
-            raise OptionError(f"{word} is {value!r}; expected a whole number, at least {least} and below 2^63")
+    return summary_of(results)

@@ -25,10 +25,10 @@ ReducedBlock = tuple[StoredBlock, tuple[BlockSums, TouchingCounts]]
 
 @dataclass(frozen=True, eq=False)
 class _BlockReduction:
-    """What is made of a block where it is simulated: rows as they are stored, and sums.
+    """Reduction of a block, where it is simulated, to the rows that are stored and to sums.
 
-    kept      names of the variables that are stored
-    counted   in how many realizations, the first ones of the run, touching points are counted
+    kept      names of the stored variables
+    counted   number of realizations, from the first of the run, in which touching points are counted
     """
 
     kept: tuple[str, ...]
@@ -54,12 +54,12 @@ class RunSums:
 
     @property
     def sizes(self) -> list[int]:
-        """How many numbers the sums of each part's field are, in one state."""
+        """The number of sums for the field of each part, in one state."""
         return self._fields.sizes
 
     @property
     def numbers(self) -> list[np.ndarray]:
-        """The sums of the fields, for each part (state, number): what a checkpoint holds."""
+        """The sums of the fields, for each part (state, number), as a checkpoint holds them."""
         return self._fields.numbers
 
     def start_from(self, writer: ArchiveWriter) -> bool:

@@ -1,4 +1,4 @@
-"""Realizations as a lazy dataset: simulated by dask, chunk by chunk, when they are asked for."""
+"""Lazy realizations: a dataset whose chunks dask simulates when they are needed."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -12,9 +12,9 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import Block
 from tolcontact.simulation.lazy import chunk_rows, dask_arrays, lazy_draws, lazy_realizations
-from tolcontact.workflow.run import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
-OF_ARCHIVES = ("kept", "fields")  # settings of a run that are not of its realizations
+ARCHIVE_SETTINGS = ("kept", "fields")  # settings of a run that do not concern its realizations
 
 
 def simulate(
@@ -25,21 +25,21 @@ def simulate(
     solver: str | None = None,
     method: Choice | None = None,
 ) -> xr.Dataset:
-    """The realizations of `run`, with the variables that archives have of them, but nothing is simulated yet.
+    """Return the realizations of a run as a lazy dataset with the variables of archives; nothing is simulated yet.
 
-    `samples` is their number; or it is their deviations (realization, contributor) themselves, for which the `seed` does not
-    matter: an xarray of the user's own, with labels of contributors or in the order of the model, in memory or chunked.
-    Labels of its realizations stay.
-    Each variable is a dask array whose chunks are simulated when they are asked for, and forgotten then: by threads here, or on
-    the workers of the client of dask.distributed that was made last. `to_netcdf` and `to_zarr` stream, and so does what xarray
-    computes, such as `.measured.mean("realization")`; what is asked for in two computations is simulated twice.
-    Drawn realizations are those of a run to the last bit, whatever dask makes of them.
-    Raises ModelError, OptionError for options or deviations that cannot be used, or if dask is not installed.
+    `samples` is the number of realizations, or an xarray.DataArray of deviations (realization, contributor), in memory or
+    chunked. Contributors of that array are labelled, or stand in the order of the model; labels of realizations are kept. The
+    `seed` has no effect on it.
+    Each variable is a dask array. Its chunks are simulated when a computation needs them, and are not stored: by threads of
+    this process, or by the workers of the latest client of dask.distributed. `to_netcdf`, `to_zarr` and reductions such as
+    `.measured.mean("realization")` stream. Two computations simulate twice.
+    Drawn realizations equal those of `run` to the last bit, however dask schedules them.
+    Raises ModelError, and OptionError for options or deviations that cannot be used, or if dask is not installed.
     """
     program = program_of(model, solver, method)
     check_counts(seed=seed)
     if isinstance(samples, xr.DataArray):
-        deviations = _given(samples, program)
+        deviations = _user_deviations(samples, program)
     elif not isinstance(samples, int):
         raise OptionError(
             f"samples is a {type(samples).__name__}; expected a number of realizations, or their deviations as an "
@@ -48,21 +48,23 @@ def simulate(
     else:
         check_counts(samples=samples)
         deviations = lazy_draws(program, samples, seed)
-    variables = [of for of in terms.BY_REALIZATION if of is not terms.DEVIATION]
+    variables = [variable for variable in terms.BY_REALIZATION if variable is not terms.DEVIATION]
     sizes = sizes_of_rows(program.nominal)
-    records = _Records(tuple((of.name, of.kind, tuple(sizes[dim] for dim in of.dims[1:])) for of in variables))
-    found = lazy_realizations(program, deviations, records, records.kind)
+    records = _Records(
+        tuple((variable.name, variable.kind, tuple(sizes[dim] for dim in variable.dims[1:])) for variable in variables)
+    )
+    arrays = lazy_realizations(program, deviations, records, records.kind)
     settings = run_settings(program, Run(seed, len(deviations), "", 0, ""))
     if isinstance(samples, xr.DataArray):
         settings |= {"sampler": "given"}
         del settings["seed"]
     rows = labelled(
         program,
-        {of: found[of.name] for of in variables} | {terms.DEVIATION: deviations},
+        {variable: arrays[variable.name] for variable in variables} | {terms.DEVIATION: deviations},
         {
             "Conventions": terms.CONVENTIONS,
             "title": f"realizations of {program.nominal.assembly.name}",
-            **{name: value for name, value in settings.items() if name not in OF_ARCHIVES},
+            **{name: value for name, value in settings.items() if name not in ARCHIVE_SETTINGS},
         },
     )
     if isinstance(samples, xr.DataArray) and terms.REALIZATION in samples.coords:
@@ -72,7 +74,7 @@ def simulate(
 
 @dataclass(frozen=True)
 class _Records:
-    """A block as records (realization,) of some fields: name, kind, shape."""
+    """Conversion of a block to records (realization,) with fields of a name, kind and shape."""
 
     fields: tuple[tuple[str, str, tuple[int, ...]], ...]
 
@@ -81,36 +83,39 @@ class _Records:
         return np.dtype(list(self.fields))
 
     def __call__(self, block: Block) -> np.ndarray:
-        found = np.empty(len(block), self.kind)
+        records = np.empty(len(block), self.kind)
         for name, values in row_values(block, [name for name, *_ in self.fields]).items():
-            found[name] = values
-        return found
+            records[name] = values
+        return records
 
 
-def _given(deviations: xr.DataArray, program: Program) -> Any:
-    """Deviations of the user's own as an array (realization, contributor) in chunks."""
-    known = list(program.nominal.contributors)
+def _user_deviations(deviations: xr.DataArray, program: Program) -> Any:
+    """Return the deviations of a user as a dask array (realization, contributor).
+
+    Raises OptionError for other dimensions, contributors or kinds of values.
+    """
+    labels = list(program.nominal.contributors)
     if set(deviations.dims) != {terms.REALIZATION, terms.CONTRIBUTOR}:
         raise OptionError(
             f"deviations have the dimensions {', '.join(map(str, deviations.dims)) or 'none'}; "
             f"expected {terms.REALIZATION} and {terms.CONTRIBUTOR}"
         )
     if terms.CONTRIBUTOR in deviations.coords:
-        labels = deviations[terms.CONTRIBUTOR].values.tolist()
-        wrong = sorted(set(map(str, labels)) ^ set(known)) or sorted({label for label in labels if labels.count(label) > 1})
+        columns = deviations[terms.CONTRIBUTOR].values.tolist()
+        wrong = sorted(set(map(str, columns)) ^ set(labels)) or sorted({label for label in columns if columns.count(label) > 1})
         if wrong:
             raise OptionError(
-                f'deviations of "{wrong[0]}" are missing, unknown, or given twice; expected one of each: {", ".join(known)}'
+                f'deviations of "{wrong[0]}" are missing, unknown, or given twice; expected one of each: {", ".join(labels)}'
             )
-        deviations = deviations.sel({terms.CONTRIBUTOR: known})
-    elif deviations.sizes[terms.CONTRIBUTOR] != len(known):
+        deviations = deviations.sel({terms.CONTRIBUTOR: labels})
+    elif deviations.sizes[terms.CONTRIBUTOR] != len(labels):
         raise OptionError(
-            f"deviations are of {deviations.sizes[terms.CONTRIBUTOR]} contributors; expected {len(known)}: {', '.join(known)}"
+            f"deviations have {deviations.sizes[terms.CONTRIBUTOR]} contributors; expected {len(labels)}: {', '.join(labels)}"
         )
     if not deviations.sizes[terms.REALIZATION]:
-        raise OptionError("deviations are of no realization; expected one or more")
+        raise OptionError("deviations have no realizations; expected at least one")
     if deviations.dtype.kind not in "fiu":
         raise OptionError(f"deviations are {deviations.dtype}; expected numbers")
-    found, array = deviations.transpose(terms.REALIZATION, terms.CONTRIBUTOR).astype(float).data, dask_arrays()
-    chunked = found if isinstance(found, array.Array) else array.from_array(found, chunks=(chunk_rows(program), -1))
+    values, array = deviations.transpose(terms.REALIZATION, terms.CONTRIBUTOR).astype(float).data, dask_arrays()
+    chunked = values if isinstance(values, array.Array) else array.from_array(values, chunks=(chunk_rows(program), -1))
     return chunked.rechunk({1: -1})

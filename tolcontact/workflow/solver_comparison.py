@@ -1,4 +1,4 @@
-"""Several solvers, resolutions or objectives on the same draws: do they agree, do they fail, how long do they take?"""
+"""Comparison of solvers, resolutions or objectives on the same draws: agreement, failures, time."""
 
 import itertools
 import time
@@ -18,10 +18,10 @@ from tolcontact.method import Method
 from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, Workers, mapping
 from tolcontact.vocabulary import CORRECTED
-from tolcontact.workflow.run import Choice, Model, check_counts, chosen, declared
+from tolcontact.workflow.models import Choice, Model, assembly_of, check_counts, method_of
 
-WARM_UP = 64  # realizations before the clock runs
-SPEAKS = ("resolution", "objective")  # choices whose values are clear by themselves
+WARM_UP_ROWS = 64  # realizations before the clock starts
+SELF_EXPLANATORY = ("resolution", "objective")  # choices whose values need no name beside them
 QUANTILES = {"median": 0.5, "largest": 1.0}
 
 
@@ -36,9 +36,8 @@ def compare(
 ) -> xr.Dataset:
     """Simulate the same realizations of a model (see `build`) with each solver and method.
 
-    Differences are from the first one, in the corrected state.
-
-    Labels along the dimension `solver` name the solver, and what the methods differ in.
+    Differences are taken from the first one, in the corrected state. Labels along the dimension `solver` name the solver and
+    the choices in which the methods differ.
 
         seconds            (solver)                   wall time of all realizations, from draws to measures [s]
         by_status          (solver, status_meaning)   number of realizations
@@ -50,33 +49,33 @@ def compare(
 
     With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); all but `seconds` is the same to the
     last bit.
-    Raises OptionError for a solver that cannot be used or is named twice, ModelError for a wrong model.
+    Raises OptionError for a solver that cannot be used or is named twice, and ModelError for a model with faults.
     """
     check_counts(samples=samples, seed=seed)
-    assembly = declared(model)
+    assembly = assembly_of(model)
     solvers = [solvers] if isinstance(solvers, str) else solvers
-    resolved_by = [chosen(assembly, each) for each in (methods if isinstance(methods, Sequence) else [methods])]
-    for word, named in {"solvers": solvers, "methods": resolved_by}.items():
-        if not named or len(set(named)) < len(named):
-            raise OptionError(f"{word} are {', '.join(map(str, named)) or 'none'}; name at least one, and each once")
+    resolved_by = [method_of(assembly, method) for method in (methods if isinstance(methods, Sequence) else [methods])]
+    for option, names in {"solvers": solvers, "methods": resolved_by}.items():
+        if not names or len(set(names)) < len(names):
+            raise OptionError(f"{option}: {', '.join(map(str, names)) or 'none'}; name at least one, and each once")
     nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
-    programs = [compile_program(nominal, *each) for each in contestants]
+    programs = [compile_program(nominal, solver, method) for solver, method in contestants]
     corners = np.stack([_corners(part.vertices) for part in nominal.parts])
-    first = _simulated(programs[0], blocks, samples, seed)
+    reference = _timed_results(programs[0], blocks, samples, seed)
     rows = [
-        _row(first, first, corners),
-        *(_row(_simulated(each, blocks, samples, seed), first, corners) for each in programs[1:]),
+        _row(reference, reference, corners),
+        *(_row(_timed_results(program, blocks, samples, seed), reference, corners) for program in programs[1:]),
     ]
     labels = {
-        terms.SOLVER: [" ".join([solver, *told_apart(method, resolved_by)]) for solver, method in contestants],
+        terms.SOLVER: [" ".join([solver, *distinctions(method, resolved_by)]) for solver, method in contestants],
         terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
         terms.EXTENT: list(QUANTILES),
     }
     return xr.Dataset(
-        {of.name: (of.dims, np.array([row[of.name] for row in rows]), of.all_attributes) for of in terms.COMPARED},
+        {v.name: (v.dims, np.array([row[v.name] for row in rows]), v.all_attributes) for v in terms.COMPARED},
         coords={
-            **{of.name: (of.dims, labels[of.name], of.all_attributes) for of in terms.COMPARED_LABELS},
+            **{v.name: (v.dims, labels[v.name], v.all_attributes) for v in terms.COMPARED_LABELS},
             terms.MEASURE: [measure.name for measure in nominal.measures],
         },
         attrs={
@@ -90,16 +89,16 @@ def compare(
     )
 
 
-def _simulated(program: Program, blocks: MapBlocks, samples: int, seed: int) -> dict[str, Any]:
-    """How long it took [s], and of each realization what is compared, in the corrected state."""
+def _timed_results(program: Program, blocks: MapBlocks, samples: int, seed: int) -> dict[str, Any]:
+    """Return the wall time [s] and the compared arrays of all realizations, in the corrected state."""
     if isinstance(blocks, Workers):
         blocks.get_ready(_compared, program)
-    list(blocks(len, program, samples=WARM_UP, seed=seed))
+    list(blocks(len, program, samples=WARM_UP_ROWS, seed=seed))
     start = time.perf_counter()
-    found = list(blocks(_compared, program, samples=samples, seed=seed))
+    results = list(blocks(_compared, program, samples=samples, seed=seed))
     seconds = time.perf_counter() - start
     names = ("status", "kkt_residual", "poses", "measured", "gap_min")
-    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*found, strict=True)), strict=True))}
+    return {"seconds": seconds, **dict(zip(names, map(np.concatenate, zip(*results, strict=True)), strict=True))}
 
 
 def _compared(block: Block) -> tuple[np.ndarray, ...]:
@@ -107,23 +106,24 @@ def _compared(block: Block) -> tuple[np.ndarray, ...]:
     return block.status, block.kkt_residual, *(values[:, CORRECTED].copy() for values in states)
 
 
-def told_apart(method: Method, methods: Sequence[Method]) -> list[str]:
-    """What distinguishes a method from the others."""
-    names = [field.name for field in fields(Method) if len({getattr(each, field.name) for each in methods}) > 1]
-    return [_said(name, getattr(method, name)) for name in names]
+def distinctions(method: Method, methods: Sequence[Method]) -> list[str]:
+    """Return the choices of a method in which `methods` differ, in words."""
+    values = {
+        field.name: getattr(method, field.name)
+        for field in fields(Method)
+        if len({getattr(alternative, field.name) for alternative in methods}) > 1
+    }
+    return [value if name in SELF_EXPLANATORY else f"{name} {value}" for name, value in values.items()]
 
 
-def _said(name: str, value: object) -> str:
-    return value if isinstance(value, str) and name in SPEAKS else f"{name} {value}"
-
-
-def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
+def _row(run: dict, reference: dict, corners: np.ndarray) -> dict:
+    """Return the values of a run in the comparison with a reference run. `corners` (part, 8, 3) [mm]."""
     resolved = np.isin(run["status"], terms.CERTIFIED)
-    both = resolved & np.isin(first["status"], terms.CERTIFIED)
-    poses, others = (each["poses"][both] for each in (run, first))
-    apart = pose.apply(poses - others, corners)  # which is linear in the pose
-    distance = np.linalg.norm(apart, axis=3).max(axis=(1, 2), initial=0)
-    measured = np.abs(run["measured"] - first["measured"])[both]
+    both_resolved = resolved & np.isin(reference["status"], terms.CERTIFIED)
+    poses, reference_poses = (results["poses"][both_resolved] for results in (run, reference))
+    offsets = pose.apply(poses - reference_poses, corners)  # apply is linear in the pose
+    distance = np.linalg.norm(offsets, axis=3).max(axis=(1, 2), initial=0)
+    measured = np.abs(run["measured"] - reference["measured"])[both_resolved]
     return {
         "seconds": run["seconds"],
         "by_status": np.bincount(run["status"], minlength=len(terms.STATUS_MEANINGS)),
@@ -131,18 +131,18 @@ def _row(run: dict, first: dict, corners: np.ndarray) -> dict:
         "penetration": max(0.0, -float(run["gap_min"].min(initial=0))),
         "pose_difference": _extent(distance),
         "measure_difference": _extent(measured),
-        "both_resolved": int(both.sum()),
+        "both_resolved": int(both_resolved.sum()),
     }
 
 
 def _extent(values: np.ndarray) -> np.ndarray:
-    """Median and largest value along the first dimension; NaN if there is none."""
+    """Return the median and the largest value along the first dimension; NaN without values."""
     if not len(values):
         return np.full((len(QUANTILES), *values.shape[1:]), np.nan)
-    return np.asarray(np.quantile(values, list(QUANTILES.values()), axis=0))
+    return np.quantile(values, list(QUANTILES.values()), axis=0)
 
 
 def _corners(vertices: np.ndarray) -> np.ndarray:
-    """The corners (8, 3) of a part's bounding box: no point of the part moves further than the furthest of them."""
+    """Return the corners (8, 3) of a part's bounding box: one of them moves at least as far as any point of the part."""
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     return np.array(list(itertools.product(*zip(low, high, strict=True))))

@@ -9,9 +9,9 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.workflow.run import Choice, Model, declared, program_of
+from tolcontact.workflow.models import Choice, Model, assembly_of, program_of
 from tolcontact.workflow.simulate import simulate
-from tolcontact.workflow.solver_comparison import told_apart
+from tolcontact.workflow.solver_comparison import distinctions
 
 
 def study(
@@ -22,57 +22,60 @@ def study(
     solver: str | None = None,
     methods: Choice | Sequence[Choice] | None = None,
 ) -> xr.Dataset:
-    """The realizations of every model with every seed and every method (see `simulate`), along the dimension `design`.
+    """Return the realizations of every model with every seed and method (see `simulate`), along the dimension `design`.
 
-    `models` are named, or called as their assemblies are. Variables are lazy: what is computed of all designs is one graph of
-    dask, from which it simulates no more than it needs, design beside design.
-    Along `design`, coordinates say the `model`, the `seed`, and the `resolution`, `objective` and `solver`. What a design does
-    not have, such as a pair of another one, is not a number there; of whole numbers, 0.
-    Raises ModelError, OptionError for options that cannot be used, or for models of the same name.
+    `models` maps names to models; without names, the names of the assemblies are used. Variables are lazy: a computation over
+    all designs is one dask graph, which simulates only the chunks that it needs.
+    The coordinates `model`, `seed`, `resolution`, `objective` and `solver` describe each design. Where a design lacks a label,
+    such as a pair of another design, its values are NaN; whole numbers are 0.
+    Raises ModelError, and OptionError for options that cannot be used or models of the same name.
     """
-    chosen = methods if isinstance(methods, Sequence) and not isinstance(methods, str) else [methods]
-    drawn = [seeds] if isinstance(seeds, int) else seeds
-    for word, given in {"models": models, "seeds": drawn, "methods": chosen}.items():
-        if not len(given):
-            raise OptionError(f"{word} are none; name at least one")
-    programs = [(name, program_of(model, solver, method)) for name, model in _named(models).items() for method in chosen]
+    method_list = methods if isinstance(methods, Sequence) and not isinstance(methods, str) else [methods]
+    seed_list = [seeds] if isinstance(seeds, int) else seeds
+    for option, values in {"models": models, "seeds": seed_list, "methods": method_list}.items():
+        if not len(values):
+            raise OptionError(f"{option} is empty; name at least one")
+    programs = [
+        (name, program_of(model, solver, choice)) for name, model in _named_models(models).items() for choice in method_list
+    ]
     resolved_by = [program.method for _, program in programs]
     designs, labels = [], []
-    for (name, program), seed in itertools.product(programs, drawn):
+    for (name, program), seed in itertools.product(programs, seed_list):
         designs.append(simulate(program, samples, seed=seed))
-        several = [f"seed {seed}"] if len(drawn) > 1 else []
-        labels.append(", ".join([name, *told_apart(program.method, resolved_by), *several]))
+        seed_label = [f"seed {seed}"] if len(seed_list) > 1 else []
+        labels.append(", ".join([name, *distinctions(program.method, resolved_by), *seed_label]))
     if len(set(labels)) < len(labels):
-        twice = next(label for label in labels if labels.count(label) > 1)
-        raise OptionError(f'the design "{twice}" is given twice; name each seed and each method once')
-    every = [_with_all_labels(each, designs) for each in designs]
-    own = {
-        "model": [name for name, _ in programs for _ in drawn],
-        "seed": [seed for _ in programs for seed in drawn],
-        **{word: [each.attrs[word] for each in designs] for word in ("resolution", "objective", "solver")},
+        duplicate = next(label for label in labels if labels.count(label) > 1)
+        raise OptionError(f'the design "{duplicate}" is given twice; name each seed and each method once')
+    aligned = [_with_all_labels(design, designs) for design in designs]
+    coordinates = {
+        "model": [name for name, _ in programs for _ in seed_list],
+        "seed": [seed for _ in programs for seed in seed_list],
+        **{name: [design.attrs[name] for design in designs] for name in ("resolution", "objective", "solver")},
     }
-    found = xr.concat(
-        every, xr.Variable(terms.DESIGN, np.array(labels, dtype=object)), join="exact", combine_attrs="drop_conflicts"
+    dataset = xr.concat(
+        aligned, xr.Variable(terms.DESIGN, np.array(labels, dtype=object)), join="exact", combine_attrs="drop_conflicts"
     )
-    return found.assign_coords({word: (terms.DESIGN, values) for word, values in own.items()})
+    return dataset.assign_coords({name: (terms.DESIGN, values) for name, values in coordinates.items()})
 
 
-def _named(models: Mapping[str, Model | Program] | Sequence[Model | Program]) -> dict[str, Model | Program]:
+def _named_models(models: Mapping[str, Model | Program] | Sequence[Model | Program]) -> dict[str, Model | Program]:
+    """Return models by name. Raises OptionError for two of the same name."""
     if isinstance(models, Mapping):
         return dict(models)
-    every = [model if isinstance(model, Program) else declared(model) for model in models]
-    names = [(model.nominal.assembly if isinstance(model, Program) else model).name for model in every]
+    declared_models = [model if isinstance(model, Program) else assembly_of(model) for model in models]
+    names = [(model.nominal.assembly if isinstance(model, Program) else model).name for model in declared_models]
     if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise OptionError(f'several models are called "{twice}"; name them: {{"thin": ..., "thick": ...}}')
-    return dict(zip(names, every, strict=True))
+        duplicate = next(name for name in names if names.count(name) > 1)
+        raise OptionError(f'several models are called "{duplicate}"; name them: {{"thin": ..., "thick": ...}}')
+    return dict(zip(names, declared_models, strict=True))
 
 
 def _with_all_labels(design: xr.Dataset, designs: Sequence[xr.Dataset]) -> xr.Dataset:
-    """A design with the parts, pairs, measures and contributors of all."""
+    """Return a design with the parts, pairs, measures and contributors of all designs."""
     labels = {
-        dim: list(dict.fromkeys(label for each in designs for label in each[dim].values.tolist()))
+        dim: list(dict.fromkeys(label for dataset in designs for label in dataset[dim].values.tolist()))
         for dim in (terms.PART, terms.PAIR, terms.MEASURE, terms.CONTRIBUTOR)
     }
-    nothing = {name: np.nan if of.dtype.kind == "f" else 0 for name, of in design.data_vars.items()}
-    return design.reindex(labels, fill_value=nothing)
+    fill_values = {name: np.nan if variable.dtype.kind == "f" else 0 for name, variable in design.data_vars.items()}
+    return design.reindex(labels, fill_value=fill_values)

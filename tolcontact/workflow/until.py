@@ -1,4 +1,4 @@
-"""How long to go on: until the interval of an estimate is narrow enough."""
+"""Stopping rules: a run continues until the interval of an estimate is narrow enough."""
 
 import logging
 import math
@@ -15,16 +15,21 @@ from tolcontact.vocabulary import OUTSIDE, PPM
 
 log = logging.getLogger(__name__)
 
-LEAST_GROWTH, MOST_GROWTH = 1.25, 16.0
-SPARE = 1.05  # more realizations than the interval seems to need
-MOST = 100_000_000
-_FORM = re.compile(r"(?P<measure>.+): *(?P<statistic>.+?) *(?:\+-|±) *(?P<half>[0-9.]+(?:[eE][+-]?[0-9]+)?) *(?P<of>%)?")
-_WORDS = {PPM: OUTSIDE}
+MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
+MARGIN = 1.05  # times the realizations that the interval seems to need
+MAX_REALIZATIONS = 100_000_000
+_PATTERN = re.compile(
+    r"(?P<measure>.+): *(?P<statistic>.+?) *(?:\+-|±) *(?P<half>[0-9.]+(?:[eE][+-]?[0-9]+)?) *(?P<percent>%)?"
+)
+_STATISTIC_NAMES = {PPM: OUTSIDE}
 
 
 @dataclass(frozen=True)
 class Target:
-    """Half the width that the 95 % interval of a corrected measure's statistic may have: of the estimate, if relative."""
+    """The half-width that the 95 % interval of a corrected measure's statistic may have at most.
+
+    half  in the units of the measure, or as a fraction of the estimate if `is_relative`
+    """
 
     measure: str
     statistic: str
@@ -33,29 +38,35 @@ class Target:
 
     @classmethod
     def of(cls, text: str) -> "Target":
-        """Of "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm +-20 %". Raises OptionError for other texts."""
-        found = _FORM.fullmatch(text.strip()) if isinstance(text, str) else None
-        if found is None or not float(found["half"]) > 0:
+        """Parse "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm +-20 %".
+
+        Raises OptionError for other texts.
+        """
+        match = _PATTERN.fullmatch(text.strip()) if isinstance(text, str) else None
+        if match is None or not float(match["half"]) > 0:
             raise OptionError(
                 f'until is {text!r}; expected a text such as "corner height: 6 sigma +-1 %" or "gap: mean +-0.001"'
             )
-        statistic = _WORDS.get(found["statistic"], found["statistic"])
+        statistic = _STATISTIC_NAMES.get(match["statistic"], match["statistic"])
         if statistic not in STATISTICS:
-            known = ", ".join([PPM, *STATISTICS])
-            raise OptionError(f'until has "{found["statistic"]}"; expected one of: {known}')
-        half = float(found["half"])
-        if found["of"]:
-            return cls(found["measure"], statistic, half / 100, True)
-        return cls(found["measure"], statistic, half * (1e-6 if found["statistic"] == PPM else 1.0), False)
+            names = ", ".join([PPM, *STATISTICS])
+            raise OptionError(f'until has "{match["statistic"]}"; expected one of: {names}')
+        half = float(match["half"])
+        if match["percent"]:
+            return cls(match["measure"], statistic, half / 100, True)
+        return cls(match["measure"], statistic, half * (1e-6 if match["statistic"] == PPM else 1.0), False)
 
     def check(self, program: Program) -> None:
         """Raise OptionError if the model has no such measure."""
-        known = [measure.name for measure in program.nominal.measures]
-        if self.measure not in known:
-            raise OptionError(f'until has the measure "{self.measure}"; expected one of: {", ".join(known)}')
+        measures = [measure.name for measure in program.nominal.measures]
+        if self.measure not in measures:
+            raise OptionError(f'until has the measure "{self.measure}"; expected one of: {", ".join(measures)}')
 
     def next(self, path: Path, program: Program) -> int | None:
-        """How many realizations an archive should have next; None if the interval is narrow enough, or cannot become so."""
+        """Return the number of realizations that the archive should have next.
+
+        None means that the interval is narrow enough, or cannot become narrow enough.
+        """
         with opened(path) as results:
             samples = int(results.attrs["samples"])
             estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
@@ -64,15 +75,15 @@ class Target:
                 "%s of %s has no value (are there limits?); no more realizations are added", self.statistic, self.measure
             )
             return None
-        half, wanted = (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
-        if half <= wanted:
+        half, target_half = (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
+        if half <= target_half:
             return None
-        grows = SPARE * (half / wanted) ** 2 if wanted > 0 and math.isfinite(half) else MOST_GROWTH
-        if not samples * grows <= MOST:
+        growth = MARGIN * (half / target_half) ** 2 if target_half > 0 and math.isfinite(half) else MAX_GROWTH
+        if not samples * growth <= MAX_REALIZATIONS:
             log.warning(
-                "stopped at %d realizations: %s of %s is %.6g +- %.2g; until +- %.2g it takes more than %d",
-                samples, self.statistic, self.measure, estimate, half, wanted, MOST,
+                "stopped at %d realizations: %s of %s is %.6g +- %.2g; an interval of +- %.2g needs more than %d",
+                samples, self.statistic, self.measure, estimate, half, target_half, MAX_REALIZATIONS,
             )  # fmt: skip
             return None
         rows = block_rows(program)
-        return -(-int(samples * min(max(grows, LEAST_GROWTH), MOST_GROWTH)) // rows) * rows
+        return -(-int(samples * min(max(growth, MIN_GROWTH), MAX_GROWTH)) // rows) * rows

@@ -1,0 +1,98 @@
+"""Models: what `run` and the analyses take, from a script's path to the compiled program."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+from tolcontact.compilation import Program, compile_program
+from tolcontact.declaration import Assembly
+from tolcontact.declaration.json_model import write_json
+from tolcontact.declaration.script import load_model
+from tolcontact.discretization import discretize
+from tolcontact.errors import ModelError, OptionError
+from tolcontact.method import Method
+
+DEFAULT_SOLVER = "qpoases"
+Model = Assembly | Callable[[], Assembly] | str | Path
+Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others
+
+
+def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
+    """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
+
+    `method` replaces the model's own; a mapping, such as {"resolution": "exact"}, replaces single choices.
+    Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
+    """
+    assembly = assembly_of(model)
+    return compile_program(discretize(assembly), solver, method_of(assembly, method))
+
+
+def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
+    """Return every fault of a model; the tuple is empty if the model can be built (see `build`)."""
+    try:
+        build(model, solver=solver, method=method)
+    except ModelError as error:
+        return error.faults
+    return ()
+
+
+def write_model(model: Model, path: str | Path) -> None:
+    """Write a model as JSON to `path`: its declarations (see tolcontact.declaration).
+
+    Shapes are named as files, relative to the folder of `path` if they lie in it. Faces that a function picks become
+    triangles, and functions of poses become the steps of their expressions.
+    Raises ModelError for a model with faults, and ScriptError for a mesh that is no file.
+    """
+    assembly = assembly_of(model)
+    program = build(assembly)
+    write_json(assembly, Path(path), program.nominal.triangles, program.tapes)
+
+
+def program_of(model: Model | Program, solver: str | None, method: Choice | None) -> Program:
+    """Return the program of a model (see `build`). A Program is returned as it is: it has its solver and method already."""
+    check_program(model, solver, method)
+    return model if isinstance(model, Program) else build(model, solver=solver or DEFAULT_SOLVER, method=method)
+
+
+def check_program(model: Model | Program, solver: str | None, method: Choice | None) -> None:
+    """Raise OptionError for a Program with a solver or a method beside it, which would have no effect."""
+    if isinstance(model, Program) and not (solver is None and method is None):
+        raise OptionError(
+            "a Program has its solver and method; leave them out, or build it with them: tc.build(..., solver=..., method=...)"
+        )
+
+
+def assembly_of(model: Model) -> Assembly:
+    """Return the assembly that a model declares. Raises OptionError for what is no model."""
+    if isinstance(model, str | Path):
+        return load_model(Path(model))
+    if not isinstance(model, Assembly) and callable(model):
+        model = model()
+    if not isinstance(model, Assembly):
+        raise OptionError(
+            f"the model is a {type(model).__name__}; expected a tc.Assembly, a function that returns one, or a script's path"
+        )
+    return model
+
+
+def method_of(assembly: Assembly, method: Choice | None) -> Method:
+    """Return the method that resolves an assembly. Raises OptionError for a choice that no method has."""
+    default = assembly.method or Method()
+    if method is None or isinstance(method, Method):
+        return method or default
+    if not isinstance(method, Mapping):
+        raise OptionError(f'method is {method!r}; expected a tc.Method, or some of its choices: {{"resolution": "exact"}}')
+    names = [field.name for field in fields(Method)]
+    for name in method:
+        if name not in names:
+            raise OptionError(f"a method has no choice {name!r}; expected some of: {', '.join(names)}")
+    return replace(default, **method)
+
+
+def check_counts(**counts: int) -> None:
+    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed and surfaces 0)."""
+    for option, value in counts.items():
+        minimum = {"samples": 2, "seed": 0, "surfaces": 0}[option]
+        if isinstance(value, bool) or not isinstance(value, int) or not minimum <= value < 2**63:
+            raise OptionError(f"{option} is {value!r}; expected a whole number, at least {minimum} and below 2^63")
