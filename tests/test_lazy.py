@@ -77,9 +77,9 @@ def test_deviations_of_ones_own():
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        (np.zeros((5, 3)), "deviations are of 3 contributors; expected 12: base.A1, base.A2"),
+        (np.zeros((5, 3)), "deviations have 3 contributors; expected 12: base.A1, base.A2"),
         (np.full((5, 12), "x"), "deviations are <U1; expected numbers"),
-        (np.zeros((0, 12)), "deviations are of no realization"),
+        (np.zeros((0, 12)), "deviations have no realizations"),
         (np.zeros((5, 12, 1)), "deviations have the dimensions realization, contributor, other; expected realization and"),
     ],
 )
