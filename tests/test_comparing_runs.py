@@ -129,7 +129,7 @@ def test_the_command_compares_archives(archive, tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["{}"], "two runs or more"),
+        (["{}"], "at least two runs"),
         (["{}", "{}"], "name each once"),
         (["{}", "model.py"], "not one model, nor archives"),
         (["{}", "other.nc"], "does not exist"),
@@ -173,7 +173,7 @@ def test_archives_of_before_are_compared_with_those_of_today(runs, tmp_path):
 
 
 def test_what_is_no_run_is_refused(runs, archive):
-    with pytest.raises(tc.OptionError, match="two runs or more"):
+    with pytest.raises(tc.OptionError, match="at least two runs"):
         tc.compare_runs(archive)
     with pytest.raises(tc.OptionError, match='run "b" is a int'):
         tc.compare_runs({"a": runs["one"], "b": 3})
