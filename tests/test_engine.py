@@ -26,7 +26,7 @@ from tolcontact.mechanics.groups import contact_groups
 from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_blocks, threads
 from tolcontact.simulation.blocks import _observe, simulate_block
-from tolcontact.simulation.threads import LEAST_ROWS, block_rows
+from tolcontact.simulation.threads import MIN_ROWS, block_rows
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import RAW, Status
 
@@ -212,7 +212,7 @@ def test_a_block_does_not_depend_on_those_before_it(solver):
 
 @pytest.mark.parametrize(
     ("bodies", "rows"),
-    [(0, 4096), (1, 4096), (24, 4096), (25, 2048), (48, 512), (100, 32), (1000, LEAST_ROWS)],
+    [(0, 4096), (1, 4096), (24, 4096), (25, 2048), (48, 512), (100, 32), (1000, MIN_ROWS)],
 )
 def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
     """What a block takes, its rows times the cube of its bodies, is at most that of 4096 rows of 24 bodies."""
@@ -220,7 +220,7 @@ def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
     program = SimpleNamespace(groups=[group] if bodies else [], method=SimpleNamespace(is_exact=False))
     found = inspect.unwrap(block_rows)(program)
     assert found == rows
-    assert found * bodies**3 <= 4096 * 24**3 or found == LEAST_ROWS
+    assert found * bodies**3 <= 4096 * 24**3 or found == MIN_ROWS
 
 
 def test_one_curved_group_is_enough_for_small_blocks(monkeypatch):

@@ -37,7 +37,7 @@ NOT_IN = {
 }  # fmt: skip
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.
 LAZY = {
-    "cloudpickle": ("simulation/cluster.py",),
+    "cloudpickle": ("simulation/packing.py",),
     "dask": ("simulation/cluster.py", "simulation/lazy.py"),
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),

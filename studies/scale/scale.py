@@ -23,7 +23,7 @@ import xarray as xr
 
 import tolcontact as tc
 from models import cells, ra1, ra2
-from tolcontact.simulation.cluster import AHEAD, MOST_ROWS, local_cluster
+from tolcontact.simulation.cluster import MAX_SHARD_ROWS, SHARDS_AHEAD, local_cluster
 
 VARYING = ("summed_rows", "sums", "sums_checksum")
 TASK = 1e-3  # s that a scheduler takes for a task, of dask's own documentation: 200 us to 1 ms
@@ -122,20 +122,20 @@ def large(costs, samples=1_000_000_000):
 
 def simulated(workers, writers, samples, of_worker, of_writer, size):
     """Hours of one of the archives, which each have workers and a writer of their own, and share scheduler and network."""
-    count, own = samples // MOST_ROWS // writers, workers // writers
+    count, own = samples // MAX_SHARD_ROWS // writers, workers // writers
     lot, free = np.random.default_rng(1), [0.0] * own
     ready, written = [], []
     scheduler = wire = 0.0
     for shard in range(count):
-        while len(ready) < min(count, shard + AHEAD * own):
-            begun = len(ready) - AHEAD * own
+        while len(ready) < min(count, shard + SHARDS_AHEAD * own):
+            begun = len(ready) - SHARDS_AHEAD * own
             scheduler = max(scheduler, written[begun] if begun >= 0 else 0.0) + TASK * writers
             start = max(heapq.heappop(free), scheduler)
-            ready.append(start + MOST_ROWS * of_worker * lot.uniform(0.9, 1.1))
+            ready.append(start + MAX_SHARD_ROWS * of_worker * lot.uniform(0.9, 1.1))
             heapq.heappush(free, ready[-1])
-        wire = max(wire, ready[shard]) + MOST_ROWS * size * writers / NETWORK
-        written.append(max(written[-1] if written else 0.0, wire) + MOST_ROWS * of_writer)
-    rows = count * MOST_ROWS
+        wire = max(wire, ready[shard]) + MAX_SHARD_ROWS * size * writers / NETWORK
+        written.append(max(written[-1] if written else 0.0, wire) + MAX_SHARD_ROWS * of_writer)
+    rows = count * MAX_SHARD_ROWS
     busy = {
         "workers": rows * of_worker / own,
         "writer": rows * of_writer,

@@ -1,90 +1,51 @@
-"""Blocks of realizations on the workers of a dask cluster, in order: the same to the last bit as those of this process.
+"""Blocks of realizations on the workers of a dask cluster, in order, and the same to the last bit as in one process.
 
-A worker gets a model as discretized numbers, once, and compiles it itself. It simulates shards: some blocks, that take it about
-a second. A bounded number of shards is under way, so memory does not grow with the number of realizations. Shards of workers
-that are lost are simulated again by others, as dask has it; what a scheduler forgot that was started anew is sent again.
+A worker gets a model as discretized numbers, once, and compiles it itself. It simulates shards: some blocks, which take about a
+second. A bounded number of shards is under way, so memory does not grow with the number of realizations. Shards of workers
+that are lost are simulated again by others, as dask has it. Shards that a restarted scheduler does not know are sent again.
 """
 
-import functools
-import hashlib
 import logging
-import os
-import pickle
-import platform
-import sys
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import version
 from importlib.util import find_spec
-from types import FunctionType
 from typing import Any, TypeVar
 
 import lazy_loader
 
-from tolcontact.compilation import Program, compile_program
-from tolcontact.discretization import Nominal
+from tolcontact.compilation import Program
 from tolcontact.errors import ClusterError, OptionError
 from tolcontact.simulation.block import Block
+from tolcontact.simulation.packing import (
+    MISSING_VERSION,
+    Packed,
+    check_version,
+    pack_model,
+    prepare_worker,
+    simulate_shard,
+    versions,
+)
 from tolcontact.simulation.threads import Sampler, block_rows, map_blocks, processors
 
 dask = lazy_loader.load("dask", error_on_import=False)
-cloudpickle = lazy_loader.load("cloudpickle", error_on_import=False)
 distributed = lazy_loader.load("distributed", error_on_import=False)
 log = logging.getLogger(__name__)
 
-LIBRARIES = ("tolcontact", "casadi", "numba", "numpy", "scipy")
-AHEAD = 4  # shards under way for each thread of a worker
-SECONDS, MOST_ROWS = 1.0, 1 << 15  # of a shard
-PATIENCE, ANSWER = 60.0, 5.0  # s: how long a lost connection, or the first worker, is waited for; and a scheduler
-NOWHERE = "not installed"
-KEPT = 8  # models and jobs that a worker keeps
+SHARDS_AHEAD = 4  # under way for each thread of a worker
+SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
+WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
+SCHEDULER_TIMEOUT = 5.0  # s: for an answer of the scheduler
 
 T = TypeVar("T")
-MapBlocks = Callable[..., Iterator[Any]]  # `map_blocks`, or what does the same elsewhere
-
-
-@dataclass(frozen=True, eq=False)
-class Packed:
-    """Something as bytes, which workers can read that do not have the script of the model; and what they keep it by."""
-
-    data: bytes
-    token: str
-    versions: dict[str, str]
-
-    @classmethod
-    def of(cls, thing: Any, nominal: Nominal) -> "Packed":
-        try:
-            with _scripts_by_value(nominal):
-                data = bytes(cloudpickle.dumps(thing))
-        except (pickle.PicklingError, TypeError, AttributeError) as error:
-            raise ClusterError(
-                f'model "{nominal.assembly.name}" cannot be sent to workers: {error}; '
-                "let its measures use nothing but numbers and functions"
-            ) from error
-        return cls(data, hashlib.blake2b(data).hexdigest(), versions())
-
-
-@contextmanager
-def _scripts_by_value(nominal: Nominal) -> Iterator[None]:
-    """Users' functions are sent whole: a worker cannot import the script that declares them."""
-    names = {measure.of.__module__ for measure in nominal.measures if isinstance(measure.of, FunctionType)}
-    modules = [sys.modules[name] for name in names if name in sys.modules and not name.startswith("tolcontact")]
-    for module in modules:
-        cloudpickle.register_pickle_by_value(module)
-    try:
-        yield
-    finally:
-        for module in modules:
-            cloudpickle.unregister_pickle_by_value(module)
+MapBlocks = Callable[..., Iterator[Any]]  # `map_blocks`, or the same on workers
 
 
 @contextmanager
 def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
-    """The client of new processes on this machine, or of a running scheduler; None if neither is asked for."""
+    """Open the client of new processes on this machine, or of a running scheduler; None if there is neither."""
     if workers is not None and scheduler is not None:
         raise OptionError("workers are started here, a scheduler has its own; choose one of --workers and --scheduler")
     if workers is not None:
@@ -99,7 +60,7 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
 @contextmanager
 def local_cluster(workers: int) -> Iterator[Any]:
-    """The client of so many new processes on this machine, with one thread each; they end with it, however it ends."""
+    """Open the client of new processes on this machine, with one thread each; they end with it, however it ends."""
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise OptionError(f"workers is {workers!r}; expected a whole number, at least 1")
     with needs_dask():
@@ -107,7 +68,9 @@ def local_cluster(workers: int) -> Iterator[Any]:
         usual = dask.config.get("distributed.nanny.pre-spawn-environ")
     settings = {
         # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
-        "distributed.nanny.pre-spawn-environ": {name: of for name, of in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"},
+        "distributed.nanny.pre-spawn-environ": {
+            name: value for name, value in usual.items() if name != "MALLOC_TRIM_THRESHOLD_"
+        },
         # It gives up a worker for good that is lost and 15 s later is lost again; here all are begun again, however often.
         "distributed.deploy.lost-worker-timeout": "1000 days",
         "distributed.worker.profile.enabled": False,  # which takes a twentieth of their time
@@ -129,10 +92,10 @@ def _say_where(client: Any) -> None:
 
 @contextmanager
 def running_cluster(address: str) -> Iterator[Any]:
-    """The client of the scheduler at an address, such as tcp://10.0.0.1:8786."""
+    """Open the client of the scheduler at an address, for example tcp://10.0.0.1:8786."""
     with needs_dask():
         try:
-            client = distributed.Client(address, timeout=ANSWER, set_as_default=False)
+            client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
         except (OSError, ValueError) as error:
             raise ClusterError(f'no dask scheduler answers at "{address}": {error}; start one with: dask scheduler') from error
     with client:
@@ -142,7 +105,7 @@ def running_cluster(address: str) -> Iterator[Any]:
 
 @contextmanager
 def needs_dask() -> Iterator[None]:
-    """Raise OptionError where it turns out not to be installed."""
+    """Raise OptionError if dask turns out not to be installed."""
     try:
         yield
     except ImportError as error:
@@ -150,12 +113,12 @@ def needs_dask() -> Iterator[None]:
 
 
 def mapping(client: Any) -> MapBlocks:
-    """`map_blocks`, or the same on the workers of a client. Raises ClusterError if they cannot be used."""
+    """Return `map_blocks`, or the same on the workers of a client. Raises ClusterError if they cannot be used."""
     return map_blocks if client is None else Workers(client)
 
 
 def threads_of(client: Any) -> int:
-    """How many blocks are simulated at once: by this process, or by the workers of a client."""
+    """Return how many blocks are simulated together: by this process, or by the workers of a client."""
     return processors() if client is None else max(1, sum(map(int, client.nthreads().values())))
 
 
@@ -181,22 +144,22 @@ class Workers:
         start: int = 0,
         draws: Sampler | None = None,
     ) -> Iterator[T]:
-        """What `function` makes of each block of `simulate_blocks` where it was simulated; in order."""
+        """Yield what `function` makes of each block of `simulate_blocks` where it is simulated; in order."""
         job = Packed.of((draws or program.draws, function), program.nominal)
         shards = _Shards(self._client, self._sent(program), job, seed, samples, block_rows(program))
         try:
-            first = start
-            while first < samples or shards:
-                while first < samples and len(shards) < AHEAD * shards.threads:
-                    first = shards.begin(first)
+            begin = start
+            while begin < samples or shards:
+                while begin < samples and len(shards) < SHARDS_AHEAD * shards.threads:
+                    begin = shards.begin(begin)
                 yield from shards.finish()
         finally:
             shards.cancel()
 
     def get_ready(self, function: Callable[[Block], Any], program: Program) -> None:
-        """Have all workers that are there import and compile what they need, which else takes their first shard longer."""
+        """Make all present workers import and compile what they need; otherwise their first shard takes longer."""
         model, job = self._sent(program).packed, Packed.of(function, program.nominal)
-        self._client.run(_get_ready, model, job.data)
+        self._client.run(prepare_worker, model, job.data)
 
     def _sent(self, program: Program) -> "_Model":
         if self._model is None or self._model.program is not program:
@@ -205,7 +168,7 @@ class Workers:
 
 
 class _Model:
-    """A program that workers compile: what they need for it is a result that they pass on to each other."""
+    """A program that workers compile; what they need for it is a result that they pass on to each other."""
 
     def __init__(self, client: Any, program: Program) -> None:
         self._client, self.program = client, program
@@ -213,43 +176,26 @@ class _Model:
         self.send()
 
     def send(self) -> None:
+        """Send the packed model to the workers."""
         self.sent = self._client.submit(bytes, self.packed.data, pure=False)
-
-
-@functools.lru_cache(maxsize=KEPT)
-def pack_model(program: Program) -> Packed:
-    """What a program can be compiled from; of the last ones, once."""
-    return Packed.of((program.nominal, program.plugin.name, program.method), program.nominal)
 
 
 def check_workers(client: Any) -> None:
     """Raise ClusterError unless there are workers, all of them with the versions of this process."""
     try:
-        client.wait_for_workers(1, timeout=PATIENCE)
+        client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
     except TimeoutError as error:
         raise ClusterError(
-            f"no worker came within {PATIENCE:.0f} s; start some with: dask worker {client.scheduler.address} --nthreads 1"
+            f"no worker came within {WORKER_TIMEOUT:.0f} s; start some with: dask worker {client.scheduler.address} "
+            "--nthreads 1"
         ) from error
     for library, expected in versions().items():
-        for worker, found in client.run(version, library, on_error="return").items():
-            _refuse(worker, library, found if isinstance(found, str) else NOWHERE, expected)
-
-
-def versions() -> dict[str, str]:
-    """Of what decides about the last bit, here."""
-    return {library: version(library) for library in LIBRARIES}
-
-
-def _refuse(worker: str, library: str, found: str, expected: str) -> None:
-    if found != expected:
-        raise ClusterError(
-            f"worker {worker} has {library} {found}, and this process {expected}; results would differ: "
-            "give all of them the same versions"
-        )
+        for worker, actual in client.run(version, library, on_error="return").items():
+            check_version(worker, library, actual if isinstance(actual, str) else MISSING_VERSION, expected)
 
 
 class _Shards:
-    """Shards that are under way, the first one first."""
+    """Shards that are under way, in their order."""
 
     def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int) -> None:
         self._client, self._model, self._job = client, model, job
@@ -263,51 +209,51 @@ class _Shards:
 
     @property
     def threads(self) -> int:
-        """How many shards can be simulated at once."""
+        """The number of shards that can be simulated together."""
         return threads_of(self._client)
 
-    def begin(self, first: int) -> int:
-        """Begin the shard from a realization on; where the next one begins."""
-        stop = min(first + self._blocks * self._block, self._samples)
-        self._begun.append((first, stop, self._submitted(first, stop)))
+    def begin(self, start: int) -> int:
+        """Submit the shard from the realization `start` on; return where the next one begins."""
+        stop = min(start + self._blocks * self._block, self._samples)
+        self._begun.append((start, stop, self._submitted(start, stop)))
         return stop
 
     def finish(self) -> list[Any]:
-        """What the first shard gave, when it is finished."""
+        """Wait for the first shard, and return its results."""
         while True:
-            first, stop, future = self._begun[0]
+            start, stop, future = self._begun[0]
             try:
-                seconds, found = self._result(future)
+                seconds, results = self._result(future)
             except distributed.KilledWorker as error:
                 raise ClusterError(
-                    f"realizations {first} to {stop - 1} ended the workers that simulated them: {error}"
+                    f"realizations {start} to {stop - 1} ended the workers that simulated them: {error}"
                 ) from error
             except (distributed.client.FutureCancelledError, distributed.comm.CommClosedError):
                 self._begin_again()
             else:
                 self._begun.popleft()
-                most = MOST_ROWS // self._block
-                self._blocks = max(1, min(int(SECONDS * len(found) / max(seconds, 1e-3)), most, 2 * self._blocks))
-                return list(found)
+                limit = MAX_SHARD_ROWS // self._block
+                self._blocks = max(1, min(int(SHARD_SECONDS * len(results) / max(seconds, 1e-3)), limit, 2 * self._blocks))
+                return list(results)
 
     def _result(self, future: Any) -> Any:
-        """Of a shard, as long as there are workers."""
-        seen = time.monotonic()
+        """Return the result of a shard; wait for it as long as there are workers."""
+        last_contact = time.monotonic()
         while True:
             try:
-                return future.result(timeout=ANSWER)
+                return future.result(timeout=SCHEDULER_TIMEOUT)
             except TimeoutError:
                 if future.status == "error":
                     return future.result()  # which raises what the shard raised
                 if self._client.nthreads():
-                    seen = time.monotonic()
-                elif time.monotonic() > seen + PATIENCE:
+                    last_contact = time.monotonic()
+                elif time.monotonic() > last_contact + WORKER_TIMEOUT:
                     raise ClusterError(
-                        f"all workers are gone, and none came within {PATIENCE:.0f} s; resume the run later"
+                        f"all workers are gone, and none came within {WORKER_TIMEOUT:.0f} s; resume the run later"
                     ) from None
 
     def cancel(self) -> None:
-        """Let go of all shards."""
+        """Cancel all shards."""
         if self._begun and self._client.status == "running":
             self._client.cancel([future for _, _, future in self._begun], force=True)
         self._begun.clear()
@@ -315,7 +261,7 @@ class _Shards:
     def _send_job(self) -> None:
         self._sent = self._client.submit(bytes, self._job.data, pure=False)
 
-    def _submitted(self, first: int, stop: int) -> Any:
+    def _submitted(self, start: int, stop: int) -> Any:
         return self._client.submit(
             simulate_shard,
             self._model.sent,
@@ -323,62 +269,21 @@ class _Shards:
             (self._model.packed.token, self._job.token),
             self._model.packed.versions,
             self._seed,
-            first,
+            start,
             stop,
             pure=False,
         )
 
     def _begin_again(self) -> None:
-        """The scheduler has forgotten what was under way: wait for it, and send that again."""
+        """Wait for a scheduler that has forgotten the shards under way, and send them again."""
         log.warning("the scheduler was lost; waiting for it")
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + WORKER_TIMEOUT
         while self._client.status != "running" or not self._client.nthreads():
             if time.monotonic() > until:
                 raise ClusterError(
-                    f"the scheduler was lost, and did not come back within {PATIENCE:.0f} s; resume the run later"
+                    f"the scheduler was lost, and did not come back within {WORKER_TIMEOUT:.0f} s; resume the run later"
                 )
             time.sleep(0.2)
         self._model.send()
         self._send_job()
-        self._begun = deque((first, stop, self._submitted(first, stop)) for first, stop, _ in self._begun)
-
-
-_ready: dict[str, Any] = {}
-_making = threading.Lock()
-
-
-def _made(token: str, make: Callable[[], Any]) -> Any:
-    """What a worker keeps of the last models and jobs."""
-    with _making:
-        if token not in _ready:
-            _ready[token] = make()
-            while len(_ready) > KEPT:
-                del _ready[next(iter(_ready))]
-        return _ready[token]
-
-
-def packed_program(model: Packed, make: Callable[[], Program] | None = None) -> Program:
-    """Compiled, or made otherwise, once in each process. Raises ClusterError if that has other versions than who packed it."""
-    for library, expected in model.versions.items():
-        try:
-            here = version(library)
-        except PackageNotFoundError:
-            here = NOWHERE
-        _refuse(f"on {platform.node()}, process {os.getpid()},", library, here, expected)
-    return _made(model.token, make or (lambda: compile_program(*pickle.loads(model.data))))  # type: ignore[no-any-return]
-
-
-def _get_ready(model: Packed, job: bytes) -> None:
-    packed_program(model)
-    pickle.loads(job)
-
-
-def simulate_shard(
-    model: bytes, job: bytes, tokens: tuple[str, str], versions: dict[str, str], seed: int, start: int, stop: int
-) -> tuple[float, list[Any]]:
-    """On a worker: how long a shard took [s], and what became of its blocks."""
-    program = packed_program(Packed(model, tokens[0], versions))
-    draws, function = _made(tokens[1], lambda: pickle.loads(job))
-    began = time.perf_counter()
-    found = list(map_blocks(function, program, samples=stop, seed=seed, start=start, threads=1, draws=draws))
-    return time.perf_counter() - began, found
+        self._begun = deque((start, stop, self._submitted(start, stop)) for start, stop, _ in self._begun)

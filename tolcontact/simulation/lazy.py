@@ -9,28 +9,29 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.simulation.block import Block
-from tolcontact.simulation.cluster import Packed, needs_dask, pack_model, packed_program
+from tolcontact.simulation.cluster import needs_dask
+from tolcontact.simulation.packing import Packed, pack_model, packed_program
 from tolcontact.simulation.threads import block_rows, map_blocks
 from tolcontact.variation import GivenDraws
 
 dask = lazy_loader.load("dask", error_on_import=False)
 
-TOGETHER = 8  # blocks of a chunk
+CHUNK_BLOCKS = 8
 
 
 def dask_arrays() -> Any:
-    """The module. Raises OptionError if it is not installed."""
+    """Return the module of dask arrays. Raises OptionError if it is not installed."""
     with needs_dask():
         return import_module("dask.array")
 
 
 def chunk_rows(program: Program) -> int:
-    """Realizations of a chunk: whole blocks, so that results are those of a run."""
-    return TOGETHER * block_rows(program)
+    """Return the number of realizations of a chunk: whole blocks, so that results are those of a run."""
+    return CHUNK_BLOCKS * block_rows(program)
 
 
 def lazy_draws(program: Program, samples: int, seed: int) -> Any:
-    """The deviations (realization, contributor) of a run, as a lazy array."""
+    """Return the deviations (realization, contributor) of a run as a lazy array."""
     array = dask_arrays()
     contributors = len(program.nominal.contributors)
     chunks = array.core.normalize_chunks((chunk_rows(program), contributors), (samples, contributors))
@@ -38,14 +39,14 @@ def lazy_draws(program: Program, samples: int, seed: int) -> Any:
 
 
 def lazy_realizations(program: Program, deviations: Any, function: Callable[[Block], np.ndarray], kind: np.dtype) -> Any:
-    """What `function` makes of blocks, records (realization,) of a kind, at deviations (realization, contributor): lazy."""
+    """Return, as a lazy array, what `function` makes of blocks at deviations (realization, contributor): records of a kind."""
     return dask_arrays().map_blocks(
         _simulated, deviations, dtype=kind, drop_axis=1, meta=np.empty(0, kind), model=_sent(program), function=function
     )
 
 
 def _sent(program: Program) -> Any:
-    """What workers compile the program from. In this process it is there."""
+    """Return what workers compile the program from; this process has it compiled already."""
     packed = pack_model(program)
     packed_program(packed, lambda: program)
     return dask.delayed(packed, name=f"model-{packed.token}", pure=True)

@@ -1,4 +1,4 @@
-"""Certified answers against the surfaces themselves: what contact points do not see."""
+"""The check of certified answers against the surfaces themselves, between contact points."""
 
 from typing import NamedTuple
 
@@ -10,40 +10,40 @@ from tolcontact.compilation import Program
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.vocabulary import CORRECTED
 
-TOUCHES = 1e-6  # mm: a contact point with a smaller gap stands on its plane
+TOUCHING_GAP = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 
 
 class Surfaces(NamedTuple):
-    """What was found at some poses, both (row, pair) [mm]; NaN for pairs that are not faces.
+    """Results of the check at some poses, both (row, pair) [mm]; NaN for pairs that are not faces.
 
     penetration   largest depth of one face in the other's body, seen at many points of both
-    beside        how far contact points that touch stand beside the rim of the reference face, which is not there
+    overhang      how far contact points that touch stand beside the rim of the reference face, which is not there
     """
 
     penetration: Float[Array, "n pair"]
-    beside: Float[Array, "n pair"]
+    overhang: Float[Array, "n pair"]
 
 
 def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviations: Float[Array, "n contributor"]) -> Surfaces:
-    """Look at the faces of every pair at corrected poses (row, part, 12), for deviations (row, contributor)."""
+    """Return the check of every pair's faces at corrected poses (row, part, 12), for deviations (row, contributor)."""
     nominal, fixed = program.nominal, not program.method.is_iterated
-    found = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
+    surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None:
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
-        found.penetration[:, k] = faces.depth(X_RM, heights)
+        surfaces.penetration[:, k] = faces.depth(X_RM, heights)
         if fixed and not pair.round:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
-            row, point = np.nonzero(gaps < TOUCHES + heights[:, None])
-            found.beside[:, k] = 0
-            np.maximum.at(found.beside[:, k], row, faces.reference.face.overhang(places[row, point]))
-    return found
+            row, point = np.nonzero(gaps < TOUCHING_GAP + heights[:, None])
+            surfaces.overhang[:, k] = 0
+            np.maximum.at(surfaces.overhang[:, k], row, faces.reference.face.overhang(places[row, point]))
+    return surfaces
 
 
 def simulated_poses(program: Program, deviations: Float[Array, "n contributor"]) -> Float[Array, "n part 12"]:
-    """Corrected poses (row, part, 12) of some realizations, simulated once more."""
+    """Return corrected poses (row, part, 12) of some realizations, simulated once more."""
     return simulate_block(program, deviations).poses[:, CORRECTED]

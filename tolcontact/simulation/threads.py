@@ -19,15 +19,15 @@ from tolcontact.simulation.block import Block
 from tolcontact.simulation.blocks import simulate_block
 from tolcontact.vocabulary import BLOCK_ROWS
 
-CURVED_ROWS, LEAST_ROWS = 512, 16
-LARGE = 24  # bodies that are coupled; a whole block of more would take longer than some ten seconds
+CURVED_ROWS, MIN_ROWS = 512, 16
+MAX_BODIES = 24  # that are coupled; a whole block of more bodies would take longer than some ten seconds
 
 T = TypeVar("T")
 
 
 @runtime_checkable
 class Sampler(Protocol):
-    """What gives deviations (realization, contributor) of realizations `start` to `stop`, as Draws do."""
+    """A source of deviations (realization, contributor) of realizations `start` to `stop`, as Draws are."""
 
     def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray: ...
 
@@ -51,11 +51,10 @@ def simulate_blocks(
     threads: int | None = None,
     draws: Sampler | None = None,
 ) -> Iterator[Block]:
-    """Realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
+    """Yield realizations `start` to `samples` in blocks (of `block_rows` by default), in order.
 
-    The realization k is the same in any run. `draws` gives its deviations, instead of those of the program.
-
-    At most two blocks for each of the `threads` (by default one for each processor) are in memory.
+    The realization k is the same in any run. Its deviations come from `draws`, by default those of the program. At most two
+    blocks for each of the `threads` (by default one for each processor) are in memory.
     """
     return map_blocks(
         lambda done: done, program, samples=samples, seed=seed, start=start, block=block, threads=threads, draws=draws
@@ -73,58 +72,58 @@ def map_blocks(
     threads: int | None = None,
     draws: Sampler | None = None,
 ) -> Iterator[T]:
-    """What `function` makes of each block of `simulate_blocks`, in the thread that simulated it; in order.
+    """Yield what `function` makes of each block of `simulate_blocks`, in the thread that simulates it; in order.
 
     A function that needs the program as well has `bound_to` (see BoundToProgram).
     """
     if isinstance(function, BoundToProgram):
         function = function.bound_to(program)
     threads, block = threads or processors(), block or block_rows(program)
-    firsts = range(start, samples, block)
+    starts = range(start, samples, block)
     originals = [ContactResolver(program, group) for group in program.groups]
-    idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(firsts)))]
-    begun: deque[tuple[Future[T], list[ContactResolver]]] = deque()
+    idle = [[resolver.twin() for resolver in originals] for _ in range(min(2 * threads, len(starts)))]
+    running: deque[tuple[Future[T], list[ContactResolver]]] = deque()
 
-    def simulate(first: int, resolvers: list[ContactResolver]) -> T:
-        deviations = (draws or program.draws)(seed=seed, start=first, stop=min(first + block, samples))
-        return function(simulate_block(program, deviations, start=first, resolvers=resolvers))
+    def simulate(begin: int, resolvers: list[ContactResolver]) -> T:
+        deviations = (draws or program.draws)(seed=seed, start=begin, stop=min(begin + block, samples))
+        return function(simulate_block(program, deviations, start=begin, resolvers=resolvers))
 
     def finish_one() -> T:
-        future, resolvers = begun.popleft()
+        future, resolvers = running.popleft()
         done = future.result()
         idle.append(resolvers)
         return done
 
     pool = ThreadPoolExecutor(threads)
     try:
-        for first in firsts:
+        for begin in starts:
             if not idle:
                 yield finish_one()
             resolvers = idle.pop()
             for resolver in resolvers:
                 resolver.start_over()  # here, where the threads do not wait for each other to make CasADi's objects
-            begun.append((pool.submit(simulate, first, resolvers), resolvers))
-        while begun:
+            running.append((pool.submit(simulate, begin, resolvers), resolvers))
+        while running:
             yield finish_one()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # if all went well none is left; a stopped run does not wait
 
 
 def block_rows(program: Program) -> int:
-    """Realizations that are simulated together: a power of two, and fewer if one of them takes long.
+    """Return how many realizations are simulated together: a power of two, and fewer if one of them takes long.
 
-    What it takes grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
+    Its time grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
     should end within seconds: then it is safe, and visible as progress.
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS
     if program.method.is_exact and any(curved_pairs(program.nominal, group.group) for group in program.groups):
         rows = CURVED_ROWS
-    while rows > LEAST_ROWS and rows * bodies**3 > BLOCK_ROWS * LARGE**3:
+    while rows > MIN_ROWS and rows * bodies**3 > BLOCK_ROWS * MAX_BODIES**3:
         rows //= 2
     return rows
 
 
 def processors() -> int:
-    """How many processors this process may use."""
+    """Return how many processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
