@@ -34,7 +34,7 @@ def assembly() -> tc.Assembly:
     model.contact("ring", moving=barrel, reference=bore)
     model.force("spring", at=roller.point(0, 0, 0), vector=(10, 0, 0))
 
-    def angle(poses: tc.Program) -> ca.SX:
+    def angle(poses) -> ca.SX:
         middle = poses.position(roller.point(0, 0, 0))
         return ca.atan2(middle[0], middle[1]) * 180 / ca.pi
 

@@ -42,6 +42,7 @@ def test_ranges_of_a_sum_are_those_of_lagrange():
     assert found.range.sel(group=names, stage="after").values == pytest.approx(widths * found.factor.sel(group=names).values)
 
 
+@pytest.mark.slow
 def test_effects_are_those_of_the_sum():
     widths = np.array([0.6, 0.3, 0.9])
     found = tc.allocate(pile(*widths), "top: Ppk 0.5", samples=16_384, solver="daqp")

@@ -71,11 +71,13 @@ def test_a_model_without_contact_can_be_asked_as_well():
     assert tc.tails(a, samples=4000, **FAST).sizes["event"] == 1
 
 
+@pytest.mark.slow
 def test_a_page_without_analyses_has_no_such_section(archive):
     with tc.open_archive(archive) as results:
         assert "What matters" not in page_of(results, tc.summarize(results))
 
 
+@pytest.mark.slow
 def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
     before = archive.read_bytes()
     with pytest.raises(tc.ArchiveError, match="another model"):
@@ -93,6 +95,7 @@ def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
     assert archive.read_bytes() == once and not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
 
+@pytest.mark.slow
 def test_numbers_that_were_changed_are_not_shown(archive):
     tc.contributions(cases.ra1(), samples=16, into=archive, **FAST)
     with netCDF4.Dataset(archive, "r+") as file:
@@ -107,6 +110,7 @@ def test_every_variable_of_analyses_has_one_kind():
         assert kinds.setdefault(variable.name, variable.kind) == variable.kind
 
 
+@pytest.mark.slow
 def test_the_command_keeps_it_too(tmp_path):
     model, out = cases.MODELS / "ra1.py", tmp_path / "a.nc"
     assert call(tmp_path, "run", model, "--samples", "64", "--solver", "daqp", "--out", out).returncode == 0

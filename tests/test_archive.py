@@ -25,6 +25,7 @@ def test_it_is_read_with_xarray_alone_and_recomputes_its_own_gaps(archive):
     assert_gaps_recompute(archive)
 
 
+@pytest.mark.slow
 def test_it_recomputes_its_own_measures(archive):
     root = xr.load_dataset(archive)
     corner = np.array([15.0, 15, 30])
@@ -72,6 +73,7 @@ def test_it_may_be_read_while_its_results_are_open(tmp_path):
     assert run(script("read_while_open", tmp_path / "open.nc")).returncode == 0
 
 
+@pytest.mark.slow
 def test_a_run_in_memory_is_the_same_as_its_archive(archive):
     assert_same_run(tc.run(cases.stack(), samples=300, seed=3, solver="daqp"), archive)
 
@@ -101,6 +103,7 @@ def test_what_is_kept_of_each_realization_can_be_chosen(keep, archive, tmp_path)
         tc.run(cases.stack(), samples=300, keep="everything")
 
 
+@pytest.mark.slow
 def test_a_model_without_contact_has_an_archive_too(tmp_path):
     a = tc.Assembly("alone")
     block = a.part("block", tc.Box(10, 20, 30))
@@ -114,6 +117,7 @@ def test_a_model_without_contact_has_an_archive_too(tmp_path):
         assert tree.sizes["realization"] == 60 and [part.name for part in tc.model_of(tree).parts] == ["block"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("keep", ["measures", "poses", "all"])
 def test_the_bytes_of_a_row_are_foreseen(keep, tmp_path):
     path = tmp_path / "run.nc"

@@ -53,6 +53,7 @@ def test_one_solver_and_one_method_need_no_list():
     assert list(found["solver"].values) == ["daqp"] and found.attrs["resolution"] == "exact"
 
 
+@pytest.mark.slow
 def test_results_may_be_given_as_a_tree_or_by_the_archives_name(program, tmp_path):
     with tc.run(program, samples=50, out=tmp_path / "out.nc") as results:
         expected = tc.summarize(results)

@@ -151,6 +151,7 @@ def test_bodies_of_an_assembly_have_names_places_and_sizes(file):
     assert shape(tc.Mesh(file, body=5)).mesh.vertices == pytest.approx(own.vertices)
 
 
+@pytest.mark.slow
 def test_an_assembly_is_declared_from_its_file_alone(file):
     model = tc.Assembly("stack")
     parts = tc.parts_from(model, file, ["use 0", "use 2"])
@@ -170,6 +171,7 @@ def test_an_assembly_is_declared_from_its_file_alone(file):
     assert len(tc.parts_from(tc.Assembly("all"), file)) == 5
 
 
+@pytest.mark.slow
 def test_what_a_file_does_not_hold_is_told(file, tmp_path):
     with pytest.raises(tc.ModelError, match=r'holds no body "use 9"; it holds "use 0", "use 1"'):
         tc.parts_from(tc.Assembly("stack"), file, ["use 9"])
@@ -229,6 +231,7 @@ def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(monkeypatch, caplog)
         triangles("+z")
 
 
+@pytest.mark.slow
 def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
     (tmp_path / "one.step").write_text(assembly(("pin", (7, 0, 0))))
     assert shape(tc.Mesh(tmp_path / "one.step")).mesh.bounds == pytest.approx(np.array([[7, 0, 0], [12, 5, 5]]))
@@ -237,6 +240,7 @@ def test_one_body_alone_stands_where_its_file_puts_it(tmp_path):
     assert tc.bodies_in(tmp_path / "block.step")[0].at == (0, 0, 0)
 
 
+@pytest.mark.slow
 def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
     path = tmp_path / "part.step"
     path.write_text(step_block())
@@ -260,6 +264,7 @@ def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
     assert place[:3, 3] == pytest.approx(1e3 * turned[:3, 3], abs=1e-4)
 
 
+@pytest.mark.slow
 def test_the_largest_round_face_is_along_an_axis_whichever_way_it_points():
     assert triangles(tc.Largest("cylinder", "+z")) == triangles(tc.Largest("cylinder", "-z")) == triangles(tc.Brep(11))
     with pytest.raises(GeometryFault, match="no such face"):

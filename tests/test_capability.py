@@ -63,6 +63,7 @@ def test_intervals_cover_the_truth_in_95_of_100(name):
         assert np.isnan(expected[word]) or 0.94 - 0.035 < count / 500 < (1.001 if exact else 0.96 + 0.03), (word, count)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_intervals_cover_the_truth_where_contact_cuts_a_distribution_off():
     """A block over a table, which holds it up: max(z, 0) of a normal z, with half of the realizations at 0."""
@@ -123,6 +124,7 @@ def stand(**limited):
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("absolute", "nominal", "quantities"),
     [
@@ -143,6 +145,7 @@ def test_measures_are_absolute_or_relative(absolute, nominal, quantities):
     assert summary["measure_upper"].values == pytest.approx(np.array(nominal) + 0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("absolute", [True, *nightly(False)])
 @pytest.mark.parametrize("sides", [(-0.25, 0.1), (None, 0.1), (-0.25, None)])
 def test_limits_are_compared_with_the_measure_as_it_is_said(absolute, sides):
@@ -184,6 +187,7 @@ def test_a_function_has_its_own_value():
     assert "absolute is for measures of points" in fault
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("limits", [(None, 0.5), (-0.25, 0.5), (-1, None)])
 def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
     a = stand(limits=limits, absolute=False)
@@ -196,6 +200,7 @@ def test_limits_come_back_from_an_archive_and_a_document(limits, tmp_path):
         assert [str(m) for m in model.measures] == [str(m) for m in a.measures]
 
 
+@pytest.mark.slow
 def test_summaries_are_printed_as_json_and_csv(tmp_path):
     path = tmp_path / "stand.nc"
     tc.run(stand(limits=(None, 0.1)), samples=100, seed=2, out=path).close()

@@ -45,6 +45,7 @@ def test_a_ring_closes_where_its_angles_leave_room(wedges, solver):
     assert (left <= excess[excess > 0] * 40 / 30 * 1.01 + 1e-4).all() and (left > 0).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("one_sided", [0, 1, 3])
 @pytest.mark.parametrize("width", [0.2, *nightly(0.02)])
 def test_a_block_that_its_locators_hold_in_a_wall_is_not_assemblable(width, one_sided):
@@ -97,6 +98,7 @@ def test_what_a_solver_misses_another_one_answers(monkeypatch):
     assert np.abs(alone["poses"][lost, CORRECTED] - alone["poses"][lost, RAW]).max() < 5  # and moves nothing far
 
 
+@pytest.mark.slow
 def test_far_answers_are_not_certified():
     """The limit is the method's: at half a degree hardly any answer of a tower is near."""
     strict = replace(ALL_POINTS, near_turn=np.radians(0.5))

@@ -43,6 +43,7 @@ def test_a_wrong_option_is_refused_before_the_run(mistake, tmp_path):
         assert words in done.stderr, done.stderr
 
 
+@pytest.mark.slow
 def test_an_existing_archive_is_not_overwritten_without_being_asked(tmp_path):
     model, out = write_model(tmp_path), ("--out", "out.nc", "--samples", "20")
     assert call(tmp_path, "run", model, *out).returncode == 0
@@ -54,6 +55,7 @@ def test_an_existing_archive_is_not_overwritten_without_being_asked(tmp_path):
     assert (tmp_path / "out.nc").read_bytes() != before
 
 
+@pytest.mark.slow
 def test_a_comment_in_the_script_does_not_make_another_model(tmp_path):
     model = write_model(tmp_path)
     run = ("run", model, "--samples", "50", "--out", "out.nc")
@@ -74,6 +76,7 @@ def test_a_file_that_is_no_archive_is_refused(tmp_path):
     assert (tmp_path / "notes.nc").read_text() == "these are notes\n"
 
 
+@pytest.mark.slow
 def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
     bracketed = HEADER.replace('"top"', '"top [red]"')  # which is no markup
     model = write_model(tmp_path, {"whole": bracketed + "".join(GOOD.values())})
@@ -86,6 +89,7 @@ def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
         assert words in told.stdout
 
 
+@pytest.mark.slow
 def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
     """A tab wider than its slot."""
     model = SCRIPTS / "model_tab.py"
@@ -108,6 +112,7 @@ def test_a_model_script_runs_by_itself(tmp_path):
     assert done.returncode == 0 and "height" in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fields", "said"), [("none", "not summed up"), ("50", "of at least the first 50 realizations"), ("all", None)]
 )
@@ -140,6 +145,7 @@ def test_tables_are_as_wide_as_the_terminal(archive):
     assert heights[1] < heights[0]
 
 
+@pytest.mark.slow
 def test_a_run_without_a_terminal_says_how_far_it_is(monkeypatch, tmp_path):
     monkeypatch.setattr(progress, "EVERY", 0.0)
     model, size = MODELS / "ra1.py", ("--samples", "20000", "--solver", "daqp", "--surfaces", "0")

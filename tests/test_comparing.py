@@ -24,6 +24,7 @@ def test_solvers_that_agree_are_said_to_agree():
     assert (found.seconds > 0).all()
 
 
+@pytest.mark.slow
 def test_the_difference_of_poses_is_that_of_the_furthest_surface_point():
     found = compare(cases.ra1(), ["daqp", "osqp"], samples=50)
     tree = {s: tc.run(cases.ra1(), samples=50, solver=s).sel(state="corrected") for s in ("daqp", "osqp")}
@@ -51,6 +52,7 @@ def test_the_command_prints_a_table_writes_a_file_and_speaks_json(tmp_path):
     assert said["coords"]["solver"]["data"] == ["daqp", "qpoases"]
 
 
+@pytest.mark.slow
 def test_resolutions_and_objectives_are_compared_too(tmp_path):
     options = ("compare", cases.MODELS / "channel.py", "--solvers", "daqp,qpoases", "--samples", "40")
     both = ("--resolution", "linearized,exact", "--objective", "active points,all points")

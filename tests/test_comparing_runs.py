@@ -34,6 +34,7 @@ def runs():
     return {name: tc.run(model, samples=n, seed=seed, solver="daqp", surfaces=0) for name, (model, n, seed) in made.items()}
 
 
+@pytest.mark.slow
 def test_a_known_shift_is_found_exactly_from_the_same_draws(runs):
     found = tc.compare_runs(runs)
     of = found.sel(run="higher", measure="thickness")
@@ -179,6 +180,7 @@ def test_what_is_no_run_is_refused(runs, archive):
         tc.compare_runs({"a": runs["one"], "b": 3})
 
 
+@pytest.mark.slow
 def test_one_limit_is_enough_to_be_outside():
     def limited(**limits):
         a = cases.stack()

@@ -10,6 +10,7 @@ from tolcontact.compilation import usable_plugins
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", [*nightly(cases.ra1), cases.stack], ids=["ra1", "stack"])
 @pytest.mark.parametrize("regularization", ["points", "identity"])
 @pytest.mark.parametrize("active_set", ["closed", "initial"])
@@ -188,6 +189,7 @@ class TestInvariance:
         assert np.abs(moved["measured"] - still["measured"]).max() > 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS, ids=lambda m: f"{m.resolution}-{m.objective}")
 def test_the_order_of_parts_and_pairs_changes_nothing(method):
     _, forward = simulate(cases.stack(), method=method)

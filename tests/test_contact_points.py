@@ -22,6 +22,7 @@ def tessellated(n):
     return trimesh.Trimesh(np.c_[x.ravel(), y.ravel(), np.zeros(x.size)], faces[:, ::-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1, 3, 10, 150])
 def test_contact_points_follow_the_spacing_and_not_the_tessellation(n):
     a = tc.Assembly("resampled")

@@ -123,6 +123,7 @@ def test_linear_percentages_name_the_wrong_contributor_of_ra1(of_ra1):
     assert int(of_ra1["by_status"].sum()) == 4096 * 14 == of_ra1.attrs["realizations"]
 
 
+@pytest.mark.slow
 def test_fixing_a_group_removes_its_share():
     """Total of all but base.A2, another way: the variance that is left when it is fixed, on average over where."""
     whole = tc.contributions(cases.model("ra1"), samples=2048, seed=5, solver="daqp")

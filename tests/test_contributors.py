@@ -75,6 +75,7 @@ def test_draws_do_not_depend_on_blocks():
             assert (values == whole[label][start:stop]).all(), label
 
 
+@pytest.mark.slow
 def test_a_shared_cause_drives_all_that_it_names():
     drawn, alone = draws_of(with_everything()), draws_of(toleranced.block_with("top", tc.Profile(0.3, "A", rule="uniform")))
     assert drawn["block.top.offset"] == pytest.approx(alone["block.top.offset"] + 0.002 * drawn["warmth"], abs=1e-15)

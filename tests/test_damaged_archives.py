@@ -85,6 +85,7 @@ def test_the_command_refuses_with_code_2(name, good, tmp_path):
         model_in(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [*range(6), *nightly(*range(6, 40))])
 @pytest.mark.usefixtures("once")
 def test_a_damaged_file_is_refused_or_says_what_it_said(seed, said, good, program, tmp_path):
@@ -124,6 +125,7 @@ def test_a_status_that_turned_to_unfinished_does_not_hide_what_comes_behind(good
         tc.summarize(path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [4900, *nightly(100)])
 def test_realizations_that_were_taken_from_an_archive_can_be_summarized(count, good, tmp_path):
     with tc.open_archive(good) as whole:
@@ -135,6 +137,7 @@ def test_realizations_that_were_taken_from_an_archive_can_be_summarized(count, g
     assert found.attrs["realizations"] == found.attrs["samples"] == count
 
 
+@pytest.mark.slow
 def test_archives_of_the_first_format_are_read_and_not_resumed(good, tmp_path):
     path = tmp_path / "first.nc"
     with tc.open_archive(good) as tree:

@@ -149,6 +149,7 @@ def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notice
     assert np.array_equal(first.poses, last.poses) and np.array_equal(first.kkt_residual, last.kkt_residual)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("activity", [0.3, *nightly(1e-9)])
 @pytest.mark.parametrize(
     "make",
@@ -200,6 +201,7 @@ def test_on_a_line_the_two_ends_can_be_the_deepest(coordinates, corners):
     assert _corners(np.array(coordinates)).tolist() == corners
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["daqp", "qpoases", *nightly("osqp", "highs", "piqp", "proxqp")])
 def test_a_block_does_not_depend_on_those_before_it(solver):
     """Whatever a solver remembers of the last problems."""

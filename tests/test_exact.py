@@ -84,6 +84,7 @@ def test_opposed_faces_without_clearance(solver):
     assert linear["gap_min"][:, CORRECTED].min() < -0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "daqp"])
 def test_a_tab_wider_than_its_slot_is_not_assemblable(solver):
     _, run = simulate(cases.tab(), samples=100, solver=solver, method=EXACT)
@@ -167,6 +168,7 @@ def test_the_linearized_resolution_leaves_penetration_that_the_exact_one_does_no
     assert (linear["iterations"] <= 1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["qpoases", "proxqp"])
 @pytest.mark.parametrize("make", [*nightly(cases.ra1, cases.stack), cases.jaws], ids=["ra1", "stack", "jaws"])
 def test_solvers_come_to_the_same_exact_poses(make, solver):

@@ -61,6 +61,7 @@ def test_a_file_without_names_says_so():
         discretize(model).triangles(cover.face(tc.Brep("hole")))
 
 
+@pytest.mark.slow
 def test_names_come_with_the_archive(tmp_path):
     model, block = one_block(tmp_path / "named.step", [f"to {way}" for way in DIRECTIONS])
     pin = model.part("pin", tc.Box(4, 4, 4), at=(3, 8, 30))
@@ -91,6 +92,7 @@ def names_in(path, text, *bodies):
     return [[face.name for face in tc.faces_in(path, number)] for number in bodies]
 
 
+@pytest.mark.slow
 def test_bodies_of_an_assembly_have_their_own_names(tmp_path):
     path, several = tmp_path / "stack.step", [[f"f{k}" for k in part] for part in (range(6), range(6, 12), range(12, 24))]
     assert names_in(path, counted(assembly(("set", (0, 0, 0)))), 1, 2, 3) == several
@@ -99,6 +101,7 @@ def test_bodies_of_an_assembly_have_their_own_names(tmp_path):
     assert names_in(path, counted(assembly(("pin", (0, 0, 0)), ("set", (100, 0, 0)))), 1, 4) == several[:1] + later
 
 
+@pytest.mark.slow
 def test_names_that_are_not_sure_are_left_out(tmp_path):
     """Of solids that are alike in their own frames, but not in their names; of a shell that has a face twice."""
     made, path = Step(), tmp_path / "unsure.step"
@@ -114,6 +117,7 @@ def test_names_that_are_not_sure_are_left_out(tmp_path):
     assert names_in(path, counted(str(twice)), 1) == [6 * [""]]  # the kernel moves it to the end
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("assigned", "size"), [("inch", 25.4), ("millimetre", 1.0)])
 def test_surfaces_are_compared_in_the_units_of_the_shapes(assigned, size, tmp_path):
     """Inches are defined by mm, and a file in mm may state other lengths in inches."""

@@ -244,6 +244,7 @@ def test_a_feature_follows_the_datums_that_it_refers_to():
     assert np.sign(top_slope * -side_slope) == np.sign(tilts * side_tilt)[0]  # outward of the side is -y
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hole", [tc.Brep((19.05, 15.0, 1)), tc.Cylinder(inner=True, radius=4.05)], ids=["B-rep", "kind"])
 def test_features_of_a_step_file_and_of_its_mesh_agree(hole):
     """The same deviations, whether the file states the cylinder or it is fitted to triangles."""
@@ -322,6 +323,7 @@ def test_the_spread_does_not_depend_on_how_a_shape_is_turned_in_its_part():
         assert [0.3 / each.spread for each in Draws(discretize(a)).contributors] == pytest.approx([11.77] * 3, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_regions_of_one_face_are_features_of_their_own():
     a = tc.Assembly("regions")
     base = a.part("base", tc.Box(100, 40, 10), fixed=True)

@@ -149,6 +149,7 @@ def test_a_part_that_nothing_holds_is_not_certified():
     assert (still.status == Status.UNTOUCHED).all() and np.abs(still.measured).max() == 0
 
 
+@pytest.mark.slow
 def test_locators_of_a_floating_part_move_it_as_little_as_they_can():
     """One of them shifts it, two turn it, in every frame alike; what is open stays nominal."""
     for frame in (floating.STILL, MOVED):

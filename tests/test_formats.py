@@ -67,6 +67,7 @@ def test_it_is_read_without_this_package(stored):
         assert file["measured"].dimensions == ("realization", "state", "measure") and file["measured"].units
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", range(1, FORMAT), indirect=True, ids=lambda number: f"format {number}")
 def test_an_earlier_format_is_not_resumed_and_the_file_is_left_alone(stored):
     model, before = model_in(stored), stored.read_bytes()

@@ -52,6 +52,7 @@ def program():
         return tc.build(hinge.assembly, solver="daqp")
 
 
+@pytest.mark.slow
 def test_a_hinge_hangs_on_its_lines(program):
     deviations = program.draws(seed=3, start=0, stop=40)
     labels = list(program.nominal.contributors)

@@ -53,6 +53,7 @@ def test_a_model_without_contact():
     assert found.sizes["pair"] == 0 and found.gap_min.shape == (50, 2, 0) and (found.status == tc.Status.UNTOUCHED).all()
 
 
+@pytest.mark.slow
 def test_deviations_of_ones_own():
     program = tc.build(cases.ra1(), solver="daqp")
     labels = list(program.nominal.contributors)

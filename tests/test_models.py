@@ -53,6 +53,7 @@ def test_bump_stops_push_a_door_outwards_and_leave_its_gaps():
             assert abs(sigma[CORRECTED] / sigma[RAW] - 1) < 0.02
 
 
+@pytest.mark.slow
 def test_cells_give_way_most_in_the_middle_and_their_pitch_varies_less():
     found = {name: sigma[CORRECTED] / sigma[RAW] for name, (_, sigma) in spreads("cells", 500).items()}
     assert found["first terminal"] < found["middle terminal"] < 0.8

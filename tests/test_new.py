@@ -6,6 +6,7 @@ import tolcontact as tc
 from tests.helpers import call
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bracket", "bracket.py", "été 2", "bracket.v2"])
 def test_it_is_checked_and_run_as_it_is(name, tmp_path):
     done = call(tmp_path, "new", name)

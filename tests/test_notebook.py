@@ -43,6 +43,7 @@ def test_a_model_with_faults_shows_them():
     assert "nowhere.stl" in shown and "<b>" not in shown.split("<iframe")[0] and len(scene_in(shown)["parts"]) == 3
 
 
+@pytest.mark.slow
 def test_results_show_figures_and_the_report(results):
     shown = results.tolcontact._repr_html_()
     assert shown.index("<table>") < shown.index("<iframe") and len(scene_in(shown)["realizations"]["names"]) == 200

@@ -59,6 +59,7 @@ THIRD = 2 / np.sqrt(2 * np.pi)  # E max(0, z)^3
 SKEW = (THIRD - 3 * MEAN * SECOND + 2 * MEAN**3) / SIGMA**3
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [STRATIFIED[0], *nightly(*STRATIFIED[1:])])
 def test_intervals_of_replicates_cover(name):
@@ -128,6 +129,7 @@ def test_a_run_goes_on_until_an_interval_is_narrow_enough(tmp_path):
     assert of_plan.sizes["realization"] <= results.sizes["realization"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_reached_is_said(tmp_path, caplog):
     options = {"samples": 64, "solver": "daqp", "fields": "none", "surfaces": 0}
     results = tc.run(cases.ra1(), until="corner height: mean +-1e-9", **options)

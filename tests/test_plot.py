@@ -33,6 +33,7 @@ def test_one_state_is_drawn_alone(results):
     assert [text.get_text() for text in axes.get_legend().get_texts()] == ["corrected", "normal, corrected"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("component", ["magnitude", "z"])
 @pytest.mark.parametrize("statistic", ["mean", "6 sigma"])
 def test_a_field_is_that_of_the_archive_on_one_scale_for_both_states(results, statistic, component, drawing):

@@ -20,6 +20,7 @@ def results(archive):
         return tree.load()
 
 
+@pytest.mark.slow
 def test_a_run_that_is_whole_passes(archive, results):
     assert_resolved(archive)
     assert_gaps_recompute(str(archive))

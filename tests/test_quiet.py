@@ -74,6 +74,7 @@ def test_it_runs_without_streams():
     assert run(script("run_without_streams")).returncode == 0
 
 
+@pytest.mark.slow
 def test_printing_goes_on_while_other_threads_come_and_go():
     done = run(script("print_while_muffled"))
     assert done.returncode == 0

@@ -62,6 +62,7 @@ def interval(values):
     return values.mean(), 3.3 * values.std() / np.sqrt(len(values))
 
 
+@pytest.mark.slow
 def test_raw_variance_is_the_closed_form_plus_the_second_order(many):
     ours, d = many
     predicted = SIGMA2 * (plane_weights(TOP, MEASURED) ** 2).sum()

@@ -32,6 +32,7 @@ def test_faces_of_step_files_are_rebuilt_without_the_files():
     assert (first["contact/moving_point"].values == second["contact/moving_point"].values).all()
 
 
+@pytest.mark.slow
 def test_forces_supports_and_stiffness_are_rebuilt_and_gaps_of_supports_recomputed(tmp_path):
     path, method = tmp_path / "table.nc", replace(SEATED, search="iterated")
     with tc.run(cases.table(), samples=100, seed=2, solver="daqp", method=method, out=path) as results:

@@ -70,6 +70,7 @@ def test_with_contact_and_a_scheme_on_faces():
     assert found["reached"].sel(stage="after", interval="estimate") <= 1.02 * estimate
 
 
+@pytest.mark.slow
 def test_locators_of_a_scheme_stand_on_the_same_features():
     a = tc.Assembly("datum")
     part = a.part("plate", tc.Box(100, 50, 10), at=(7, 3, 1), rotation=(0.1, 0.2, 0.3))
@@ -111,6 +112,7 @@ def test_what_cannot_be_is_refused(changed, said):
         tc.relocate(plate(), options.pop("locator"), **options)
 
 
+@pytest.mark.slow
 def test_the_command_prints_places_json_and_csv(tmp_path):
     script = tmp_path / "plate.py"
     script.write_text("from tests.test_relocate import plate as assembly\n")

@@ -52,6 +52,7 @@ def page(archive):
     return path
 
 
+@pytest.mark.slow
 def test_the_command_writes_a_page_that_says_what_the_summary_says(archive, tmp_path):
     done = call(tmp_path, "report", archive, "--out", tmp_path / "page.html")
     assert (done.returncode, done.stdout) == (0, f"report: {tmp_path / 'page.html'}\n"), done.stderr
@@ -107,6 +108,7 @@ def test_one_part_without_contact_is_a_page_too(tmp_path):
     assert found["scene"]["contacts"] == [] and found["charts"][0]["limits"] == [None, 0.2]
 
 
+@pytest.mark.slow
 def test_a_measure_that_is_no_number_leaves_its_chart_out(tmp_path):
     a = cases.ra1()
     a.measure("nothing", lambda poses: 0 * poses.translation(a.parts[0])[0] / 0)
@@ -251,6 +253,7 @@ def test_odd_names_are_texts(tmp_path, open_page):
     assert "quotes \" ' \\ & é 点 (mm)" in opened.locator("tbody").first.inner_text()
 
 
+@pytest.mark.slow
 def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
     monkeypatch.setattr(decimation, "TRIANGLES", 2000)
     monkeypatch.setattr(decimation, "LEAST", 100)
@@ -270,6 +273,7 @@ def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
     assert field.shape == (2, len(vertices), 4) and np.ptp(field[0, :, 2]) < 1e-5  # it does not turn: all points go alike
 
 
+@pytest.mark.slow
 def test_a_plate_with_finely_divided_holes_is_drawn_with_fewer_triangles():
     """Slivers between far corners and short edges, which the first simplification leaves as they are."""
     ring = trimesh.creation.annulus(20, 2000, 10, sections=8000)
@@ -290,6 +294,7 @@ def test_means_settle_within_students_interval(archive, page):
         assert [mean, half] == pytest.approx([expected.value, expected.upper - expected.value], rel=1e-5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
     def stop(rows):
         raise KeyboardInterrupt

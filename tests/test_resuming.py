@@ -26,6 +26,7 @@ def test_resume_gives_the_same_data_as_an_undisturbed_run(solver, keep, tmp_path
     assert xr.load_dataset(paths[0]).attrs["history"].count("resumed after 4096") == 2
 
 
+@pytest.mark.slow
 def test_resuming_with_fewer_realizations_completes_what_was_begun(archive, tmp_path):
     path = tmp_path / "copy.nc"
     path.write_bytes(archive.read_bytes())
@@ -45,6 +46,7 @@ def test_resuming_is_refused_where_contact_points_were_others(archive, tmp_path)
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, resume=True)
 
 
+@pytest.mark.slow
 def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(archive):
     before = archive.read_bytes()
     with pytest.raises(ArchiveError, match="seed = 3, now it is 4"):
@@ -60,6 +62,7 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
     assert archive.read_bytes() == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("every", "written"), [(0.0, [4096, 8192]), (1e9, [8192])])
 def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_last(every, written, tmp_path, monkeypatch):
     found = []

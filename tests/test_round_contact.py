@@ -39,6 +39,7 @@ def test_a_shaft_in_a_v_rests_where_it_should(sections, solver):
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_peg_lies_where_the_force_pushes_it(solver):
     _, _, t = seated(cases.peg_in_a_hole(), solver)
@@ -47,6 +48,7 @@ def test_a_peg_lies_where_the_force_pushes_it(solver):
     assert np.abs(apart @ [1, -2] / np.sqrt(5) - 0.05).max() < 1e-9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("sections", [24, *nightly(96)])
 def test_a_jammed_peg_tilts_as_far_as_its_rims_let_it(sections, solver):
@@ -77,6 +79,7 @@ def test_a_short_peg_jams_on_its_own_rims():
     assert np.abs(5 * np.sin(angle) + 5 * np.cos(angle) - 5.05).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_ball_rests_in_a_cone_and_on_three_pins():
     _, R, t = seated(cases.ball_in_a_cone())
     apex, axis = R[:, 0] @ [0, 0, -12.0] + t[:, 0], R[:, 0] @ [0, 0, 1.0]
@@ -122,6 +125,7 @@ def test_steps_along_walls_that_are_known_come_to_rest_soon(name):
     assert (run["status"] == Status.RESOLVED).all() and run["iterations"].max() <= 8
 
 
+@pytest.mark.slow
 def test_linearized_steps_start_from_the_exact_gaps():
     results = tc.run(cases.peg_in_a_hole(), samples=200, solver="daqp", method=tc.Method(objective="all points"))
     assert_gaps_recompute(results)
@@ -179,6 +183,7 @@ def turned(frame: cases.Frame) -> tc.Assembly:
     return a
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resolution", ["linearized", "exact"])
 def test_where_the_assembly_stands_changes_nothing(resolution):
     method = tc.Method(resolution=resolution, objective="all points")

@@ -40,6 +40,7 @@ def check_gaps(points, rng, turn):
         assert np.linalg.eigvalsh(wrap).min() > -1e-9 * max(1, np.abs(wrap).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", round_cases.EVERY)
 def test_gaps_of_round_faces_are_those_of_another_way_and_their_derivatives_theirs(name):
     rng = np.random.default_rng(5)

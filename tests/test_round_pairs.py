@@ -22,6 +22,7 @@ def test_check_says_which_pairs_are_round():
     assert "contact round hole: 12 contact points, exact on round faces; triangles up to 0.00061 mm inside\n" in listed
 
 
+@pytest.mark.slow
 def test_what_is_not_a_ball_or_a_shaft_beside_a_wall_has_points():
     def pair(pin, reference, **options):
         a = tc.Assembly("not round")
@@ -96,6 +97,7 @@ def test_a_ball_beside_edges_gaps_and_curves_that_are_not_known_has_points():
     assert not pair_between(BALL, (), small, (ANY,), at=(0, 0, 2)).round  # it rests on the groove's edges
 
 
+@pytest.mark.slow
 def test_walls_that_are_not_whole_between_their_ends_are_none():
     pin = trimesh.creation.cylinder(5, 20, sections=48)
     for gaps, is_round in ((1, True), (2, False), (3, False)):

@@ -66,6 +66,7 @@ def test_one_dimensional_contact_is_followed_in_half_of_the_realizations():
     assert float(of["sensitivity"].sel(state="raw", interval="estimate")) == pytest.approx(1, abs=1e-9)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_intervals_cover():
     """500 repeats of 100 realizations: the mean derivative of max(0, g) is 0.5."""

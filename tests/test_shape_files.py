@@ -66,6 +66,7 @@ WRONG = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", WRONG)
 def test_a_wrong_file_is_one_message(name, tmp_path):
     content, expected = WRONG[name]
@@ -95,6 +96,7 @@ def test_materials_of_an_obj_file_are_left_alone(tmp_path):
     assert shape(tc.Mesh(tmp_path / "block.obj")).mesh.volume == pytest.approx(6000)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["glb", "stl"])
 def test_bodies_that_touch_in_one_mesh_file_are_read(suffix, tmp_path):
     scene = trimesh.Scene()
@@ -128,6 +130,7 @@ def test_ten_million_triangles_are_refused_with_their_number_before_they_are_rea
         shape(tc.Mesh(tmp_path / "huge.ply"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
 def test_files_with_corners_that_are_no_numbers_are_refused(suffix, tmp_path):
     bad = trimesh.Trimesh(BLOCK.vertices * np.where(np.arange(8) == 3, np.nan, 1)[:, None], BLOCK.faces, process=False)

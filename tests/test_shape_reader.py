@@ -39,6 +39,7 @@ def alone(folder, *names):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_a_file_that_brings_its_reader_down_is_a_fault(tmp_path):
     (tmp_path / "rotten.step").write_text(crashing())
     said = alone(tmp_path, "rotten.step")
@@ -65,6 +66,7 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
     assert "good.step" not in said
 
 
+@pytest.mark.slow
 def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path, monkeypatch):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
     monkeypatch.setattr("tolcontact.geometry.files.reader.MEMORY", 350 * 2**20)

@@ -104,6 +104,7 @@ def displacements(part, poses):
     return np.concatenate([u, np.linalg.norm(u, axis=2, keepdims=True)], axis=2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("magnitudes", [700, 450, 2])
 def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
     """However the realizations are cut into blocks, and far from the origin, too; the magnitude is of the first ones."""

@@ -33,6 +33,7 @@ SEVERAL = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SEVERAL)
 def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path):
     content, expected = SEVERAL[kind]
@@ -77,6 +78,7 @@ ONE = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ONE)
 def test_one_body_is_read_whatever_it_consists_of(kind, tmp_path):
     content, volume, closed = ONE[kind]

@@ -28,6 +28,7 @@ TAILS = {
 }
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["corner", *nightly(*(name for name in TAILS if name != "corner"))])
 def test_intervals_cover_known_tails(name):

@@ -53,6 +53,7 @@ def test_of_two_runs_on_one_new_name_one_is_refused_and_the_others_rows_are_whol
     assert left_in(tmp_path) == ["new.nc"]
 
 
+@pytest.mark.slow
 def test_the_target_of_a_link_is_overwritten_and_the_link_stays(tmp_path):
     (tmp_path / "disk").mkdir()
     target, link = tmp_path / "disk" / "real.nc", tmp_path / "link.nc"
@@ -71,6 +72,7 @@ def test_what_a_killed_run_left_is_taken_over(tmp_path):
     assert list(tmp_path.iterdir()) == [out]
 
 
+@pytest.mark.slow
 def test_more_than_the_disk_holds_is_refused_before_the_first_byte(tmp_path):
     with pytest.raises(ArchiveError, match=r"needs .* TB for 100000000000 realizations, but its disk has .* free"):
         tc.run(cases.stack(), samples=10**11, solver="daqp", out=tmp_path / "vast.nc")

@@ -40,6 +40,7 @@ def box(path, factor):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("unit", "length"), [("in", 25.4), ("cm", 10.0), ("m", 1000.0), ("ft", 304.8)])
 def test_the_unit_that_explains_it_is_named(unit, length, tmp_path):
     (told,) = warned(lid(box(tmp_path / "lid.stl", 1 / length)))
@@ -47,6 +48,7 @@ def test_the_unit_that_explains_it_is_named(unit, length, tmp_path):
     assert f'units="{unit}") it would be 250.8 mm' in told
 
 
+@pytest.mark.slow
 def test_metres_of_a_glb_that_are_mm(tmp_path):
     places = [((x * 1000, y * 1000, z * 1000), along) for (x, y, z), along in PLACES]
     assert not warned(lid(box(tmp_path / "lid.glb", 1e-3)))
@@ -55,6 +57,7 @@ def test_metres_of_a_glb_that_are_mm(tmp_path):
     assert "check the coordinates" in warned(lid(box(tmp_path / "far.stl", 1.0), None, places[:1] + PLACES[1:]))[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong", [(1900, 10, 0), (190, 10, 4321), (-777, 10, 0)])
 def test_one_wrong_coordinate_is_no_matter_of_units(wrong, tmp_path):
     places = [PLACES[0], (wrong, "z"), *PLACES[2:]]

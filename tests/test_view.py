@@ -37,6 +37,7 @@ def _wedge():
     return hull.vertices, hull.faces
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", GEOMETRIES)
 def test_words_choose_the_face_that_they_are_of(name):
     part = tc.Assembly("a").part("part", GEOMETRIES[name](), at=(3, -4, 5), rotation=(0.1, 0.2, -0.3))

@@ -77,12 +77,14 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
     assert f"tolcontact {tc.__version__}" in said["versions"] and said["history"].endswith("created")
 
 
+@pytest.mark.slow
 def test_the_weighting_is_that_of_points_where_points_count():
     for objective, weighting, units in (("all points", "all points", "mm"), ("locator stiffness", "none", "N")):
         found = tc.run(cases.stack(), samples=5, solver="daqp", method={"objective": objective})
         assert found.attrs["weighting"] == weighting and found["reaction"].attrs["units"] == units
 
 
+@pytest.mark.slow
 def test_units_of_measures():
     a = cases.one_dimensional(6)
     block = a.parts[1]
@@ -152,6 +154,7 @@ def test_contacts_say_which_parts_touch_and_which_points_belong_to_a_pair(archiv
     assert (contact["locator_of_point"].values == -1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("wrong", "told"),
     [({"seed": 4}, "seed = 3, now it is 4"), ({"keep": "poses"}, "kept = all"), ({"surfaces": 9}, "surfaces = 12, now it is")],
@@ -181,6 +184,7 @@ def test_resuming_a_model_whose_mesh_was_replaced_is_refused(tmp_path):
         tc.run(model(10.001), **run, resume=True)
 
 
+@pytest.mark.slow
 def test_history_tells_when_a_run_went_on(archive, tmp_path):
     path = tmp_path / "copy.nc"
     path.write_bytes(archive.read_bytes())

@@ -69,6 +69,7 @@ def test_a_population_is_inside_its_zones_as_stated_in_any_frame(name):
     assert moved.needed_width.values == pytest.approx(found.needed_width.values, rel=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rule", ["truncated", "uniform"])
 @pytest.mark.parametrize("kind", ["top", "bore"])
 def test_features_outside_are_left_out(rule, kind):

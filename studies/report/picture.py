@@ -5,6 +5,7 @@ python studies/report/picture.py
 
 import io
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -35,7 +36,7 @@ def main() -> None:
         opened.wait_for_timeout(1000)
         taken = opened.screenshot()
         browser.close()
-    Image.open(io.BytesIO(taken)).convert("RGB").save(HERE / "ra1.png", optimize=True)
+    Image.open(io.BytesIO(taken)).convert("RGB").save(sys.argv[1] if len(sys.argv) > 1 else HERE / "ra1.png", optimize=True)
 
 
 if __name__ == "__main__":

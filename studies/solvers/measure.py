@@ -74,22 +74,23 @@ def models() -> dict[str, tc.Assembly]:
 
 def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     """The QPs of the first linear step, with a row for every contact point of the first group."""
-    kept = contact_qp.standing_points
-    contact_qp.standing_points = lambda gaps, _: np.arange(gaps.coordinates.shape[1])
+    kept = contact_qp.standing_points  # type: ignore[attr-defined]
+    contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined]
     found: list[Problem] = []
-    solve = contact_solver.InterpretedFunction.__call__
+    solve = contact_solver.InterpretedFunction.__call__  # type: ignore[attr-defined]
 
     def record(self, inputs):
         if self._solvers and not found:
             found.extend(dict(zip("hgabc", (array[k].copy() for array in inputs), strict=True)) for k in range(len(inputs[0])))
         return solve(self, inputs)
 
-    contact_solver.InterpretedFunction.__call__ = record
+    contact_solver.InterpretedFunction.__call__ = record  # type: ignore[attr-defined]
     try:
         program = tc.build(assembly, solver="daqp", method=tc.Method())
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
-        contact_qp.standing_points, contact_solver.InterpretedFunction.__call__ = kept, solve
+        contact_qp.standing_points = kept  # type: ignore[attr-defined]
+        contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined]
     functions = program.groups[0].program
     h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
     for one in found:

@@ -1,0 +1,42 @@
+"""Each script of `studies/` runs, at a small size."""
+
+import importlib.util
+import shutil
+import sys
+
+import pytest
+
+from tests.helpers import ROOT, run
+
+STUDIES = {
+    "cad/as1.py": ["--samples", "20"],
+    "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
+    "cad/read_files.py": [ROOT / "studies" / "cad"],
+    "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
+    "exact/tables.py": ["--samples", "20"],
+    "paper/reproduce.py": ["--large", "2000", "--to", "."],
+    "report/picture.py": ["ra1.png"],
+    "round/measure.py": ["20"],
+    "scale/scale.py": ["--samples", "20000", "--kills", "2"],
+    "site/build.py": ["site", "--samples", "20"],
+    "solvers/measure.py": ["--realizations", "2", "--figure", "accuracy.png"],
+    "speed/measure.py": ["--quick", "--figure", "cost.png"],
+    "verification/verify.py": [],
+}
+EXTRAS = {"solvers/measure.py": ["qpsolvers"], "speed/measure.py": ["qpsolvers", "daqp"], "report/picture.py": ["playwright"]}
+
+
+def test_no_script_is_forgotten():
+    scripts = (ROOT / "studies").glob("*/*.py")
+    assert {str(path.relative_to(ROOT / "studies")) for path in scripts if "__main__" in path.read_text()} == set(STUDIES)
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("name", STUDIES)
+def test_a_study_runs(name, tmp_path):
+    if missing := [module for module in EXTRAS.get(name, ()) if importlib.util.find_spec(module) is None]:
+        pytest.skip(f"{', '.join(missing)} is not installed")
+    if name == "report/picture.py" and shutil.which("chromium") is None:
+        pytest.skip("there is no Chromium")
+    done = run([sys.executable, ROOT / "studies" / name, *map(str, STUDIES[name])], cwd=tmp_path, timeout=1800)
+    assert done.returncode == 0, done.stderr
