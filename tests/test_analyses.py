@@ -9,8 +9,9 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import call
 from tests.test_report import data_of, unpacked
+from tolcontact.cli.analyses import COMMANDS
 from tolcontact.report.html.page import page_of
-from tolcontact.vocabulary import ANALYZED
+from tolcontact.vocabulary import ANALYSES
 
 FAST = {"solver": "daqp"}
 
@@ -40,7 +41,7 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
                 assert there[each].dims == found[each].dims and "long_name" in there[each].attrs
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
         page = page_of(results, tc.summarize(results))
-    assert "What matters" in page and "Worst cases of corner height [mm]" in page and "Rare events" in page
+    assert "What matters" in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
     assert "beyond the bound: so much is of second order" in page
     assert "Allocation" in page and "Cost 2 before" in page
     drawn = data_of(page)["scene"]["realizations"]
@@ -90,7 +91,7 @@ def test_what_does_not_fit_leaves_the_archive_as_it_was(archive, tmp_path):
     assert archive.read_bytes() == before
     tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
     once = archive.read_bytes()
-    with pytest.raises(tc.ArchiveError, match="sensitivities already"):
+    with pytest.raises(tc.ArchiveError, match="already has statistics/sensitivities"):
         tc.sensitivities(cases.ra1(), samples=4, into=archive, **FAST)
     assert archive.read_bytes() == once and not [path for path in tmp_path.iterdir() if path.name.startswith(".")]
 
@@ -104,10 +105,11 @@ def test_numbers_that_were_changed_are_not_shown(archive):
         page_of(results, tc.summarize(results))
 
 
-def test_every_variable_of_analyses_has_one_kind():
-    kinds = {}
-    for variable in ANALYZED:
-        assert kinds.setdefault(variable.name, variable.kind) == variable.kind
+def test_every_analysis_is_public_has_a_command_and_tables():
+    assert {command.record.name for command in COMMANDS} == set(ANALYSES)
+    assert {command.analysis for command in COMMANDS} <= {getattr(tc, name) for name in tc.__all__}
+    for record in ANALYSES.values():
+        assert len({variable.name for variable in record.variables}) == len(record.variables)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tolcontact.report import summary_text
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
     "declaration", "features", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics",
-    "archive", "report", "plot", "workflow", "cli",
+    "archive", "report", "plot", "workflow", "analyses", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
 

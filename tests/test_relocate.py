@@ -100,7 +100,7 @@ def test_a_place_where_nothing_holds_the_part_is_passed_over():
         ({"locator": "plate.A9"}, 'no locator "plate.A9"; expected one of: plate.A1'),
         ({"between": ((0, 0), (1, 1))}, "expected two different corners"),
         ({"between": ((1, 1, 0), (1, 1, 0))}, "expected two different corners"),
-        ({"least": "height: mean"}, "least is 'height: mean'"),
+        ({"least": "height: mean"}, 'least has "mean"; expected one of: 6 sigma, ppm'),
         ({"least": "depth: ppm"}, 'the measure "depth"; expected one of: height'),
         ({"between": ((10, 0, 0), (50, 0, 0))}, "cannot stand anywhere"),
         ({"samples": 1}, "samples is 1"),

@@ -1,6 +1,5 @@
 """Worst cases: documented answers, closed forms, bounds that searches reach, and the region of what drawings allow."""
 
-import importlib
 import io
 import json
 import math
@@ -15,18 +14,22 @@ import tolcontact as tc
 from tests import cases
 from tests.cases.fasteners import fasteners
 from tests.helpers import call, nightly
+from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
+from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.extreme_search import Effort, Evaluation
+from tolcontact.analyses.worst_case import search_worst_case
 from tolcontact.simulation import map_blocks
 
-module = importlib.import_module("tolcontact.analyses.worst_case")
 
-
-@pytest.fixture
-def few_searches(monkeypatch):
-    """Two for each value, which end at coarse steps: where far ends are the answer, that is enough."""
-    monkeypatch.setattr(module, "BEST", 1)
-    monkeypatch.setattr(module, "OTHERS", 2)
-    monkeypatch.setattr(importlib.import_module("tolcontact.analyses.extreme_search"), "FINEST", 0.1)
+def few_searches(model, samples, method=None):
+    """`worst_case` with two searches for each value, which end at coarse steps: enough where far ends are the answer."""
+    analysis = Analysis(
+        terms.WORST_CASE, model, samples=samples, seed=1, solver=None if isinstance(model, tc.Program) else "daqp",
+        method=method, into=None, client=None, progress=None,
+    )  # fmt: skip
+    return search_worst_case(analysis, Effort(best=1, random=2, finest_step=0.1))
 
 
 def values(found, measure=0, state="corrected", of="worst"):
@@ -34,14 +37,13 @@ def values(found, measure=0, state="corrected", of="worst"):
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_searches")
 @pytest.mark.parametrize(
     ("is_fixed", "pull", "end", "with_float", "without"),
     [(True, -3, 0, 47, 48.5), (False, 3, 1, 54, 52), *nightly((True, 3, 1, 53, 51.5), (False, -3, 0, 46, 48))],
 )
 def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float, without):
     """CASES C4. Forces decide where the float goes; the bound is that of any float."""
-    found = tc.worst_case(fasteners(is_fixed, pull), samples=32, solver="daqp")
+    found = few_searches(fasteners(is_fixed, pull), 32)
     assert values(found)[end] == pytest.approx(with_float, abs=2e-6)
     assert values(found, measure=1)[end] == pytest.approx(without, abs=2e-6)
     assert values(found, 1, "raw", "bound") == pytest.approx([100 - without, without][:: 1 if end else -1], abs=1e-6)
@@ -50,10 +52,9 @@ def test_fasteners_have_the_documented_extremes(is_fixed, pull, end, with_float,
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_searches")
 def test_a_clutch_has_the_worst_cases_of_its_formula():
     """CASES C7."""
-    found = tc.worst_case(cases.model("clutch"), samples=32, solver="daqp")
+    found = few_searches(cases.model("clutch"), 32)
     assert values(found) == pytest.approx([5.9574, 7.9385], abs=1e-4)
     last = found.deviations.isel(measure=0).sel(state="corrected", end="largest")
     labels = ["hub.flat.offset", "roller.barrel.size", "ring.bore.size"]
@@ -91,14 +92,13 @@ def test_contact_alone_keeps_no_part_down():
     assert values(found)[1] > values(found, of="random")[1] and values(found)[0] < values(found, of="random")[0]
 
 
-@pytest.mark.usefixtures("few_searches")
 def test_what_is_found_is_what_the_engine_says_of_the_combination():
     program = tc.build(small_ra1(), solver="daqp")
-    found = tc.worst_case(program, samples=64)
-    assert tc.worst_case(program, samples=64).equals(found)
+    found = few_searches(program, 64)
+    assert few_searches(program, 64).equals(found)
     for state in (0, 1):
         own = found.deviations.isel(measure=0, state=state).values
-        measured = module.Evaluation(program, Region(program.draws, seed=1), map_blocks)(own)
+        measured = Evaluation(Engine(program, map_blocks), Region(program.draws, seed=1)).corrected(own)
         assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
 
 
@@ -197,20 +197,18 @@ def test_steps_end_where_the_region_ends(name):
     assert found.exactly_farthest(goal) @ goal >= (inside @ goal).max() - 1e-9
 
 
-@pytest.mark.usefixtures("few_searches")
 def test_measured_parts_are_one_of_their_rows():
     a = cases.one_dimensional(6)
     a.population(pd.DataFrame({"z": [-1.0, 0.25, 2.0]}), {"block.Z": "z"})
-    found = tc.worst_case(a, samples=16, solver="daqp")
+    found = few_searches(a, 16)
     assert set(np.unique(found.deviations.sel(contributor="block.Z"))) <= {-1.0, 0.25, 2.0}
     assert found.worst.sel(state="raw").values.ravel() == pytest.approx([-1, 2], abs=1e-9)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_searches")
 def test_what_cannot_be_assembled_does_not_count():
     a = cases.square_pins()
-    found = tc.worst_case(a, samples=32, solver="daqp", method=tc.Method(resolution="exact", objective="seating"))
+    found = few_searches(a, 32, tc.Method(resolution="exact", objective="seating"))
     assert int(found.by_status.sel(status_meaning="not_assemblable")) > 0
     assert np.isfinite(found.worst.values).all()
 
@@ -226,7 +224,6 @@ def test_nothing_that_varies_is_refused():
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("few_searches")
 def test_the_command_prints_a_table_json_and_csv(tmp_path):
     options = ("worst", cases.MODELS / "clutch.py", "--samples", "16", "--solver", "daqp")
     done = call(tmp_path, *options)

@@ -35,6 +35,7 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | report | `tolcontact.report` | tables, pages for a browser, notebooks |
 | draw pictures | `tolcontact.plot` | histograms, fields and assemblies for papers and slides |
 | all of it | `tolcontact.workflow` | `run`, `build`, `check`, `simulate`, `compare`, `summarize` from Python |
+| ask | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and places suffice |
 | all of it | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
 `python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.

@@ -1,5 +1,10 @@
 from . import plot
-from .analyses import allocate, contributions, relocate, sensitivities, tails, worst_case
+from .analyses.allocate import allocate
+from .analyses.contributions import contributions
+from .analyses.relocate import relocate
+from .analyses.sensitivities import sensitivities
+from .analyses.tails import tails
+from .analyses.worst_case import worst_case
 from .archive import model_of
 from .cli import command_line, main
 from .compilation import Program

@@ -1,7 +1,8 @@
-"""Which tolerance to tighten first, and ranges at least cost for what is required, with contact."""
+"""Tolerance ranges of least cost for what is required of measures, with contact, and the tolerance to tighten first."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,154 +11,146 @@ import xarray as xr
 from scipy.optimize import Bounds, minimize
 
 from tolcontact import vocabulary as terms
-from tolcontact.analyses.contributions import owners
+from tolcontact.analyses.analysis import Analysis
+from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.grouping import check_grouping, owners
 from tolcontact.analyses.requirement import Requirement
-from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation import outcomes
-from tolcontact.simulation.cluster import MapBlocks, mapping
 from tolcontact.statistics.intervals import Estimate, mean
-from tolcontact.workflow.models import Choice, Model, check_counts, program_of
+from tolcontact.workflow.models import Choice, Model
 
-NARROWEST, WIDEST = 0.1, 3.0  # times the present range
-STEP = 0.1  # of ranges: differences
-BATCHES = 32
-ROUNDS = 24  # steps of the allocation
-FARTHEST, NEAREST = 0.5, 0.004  # of the logarithm of a range: a step at most, in the beginning and in the end
-PENALTY = 10.0  # for what is missed, in costs that would be saved where margins are as large as the slopes
-GAIN = 1e-4  # of the cost: less is no progress
-FRESH = 4  # times as many realizations verify it
+MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
+STEP = 0.1  # of ranges, for differences
+BATCHES = 32  # of realizations, for intervals of effects
+MAX_STEPS = 24  # of one search
+FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
+PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
+MIN_GAIN = 1e-4  # of the cost
+VERIFICATION_FACTOR = 4  # realizations of a verification, times samples
 VERIFICATIONS = 4
 Cost = float | Callable[[float], float]
 
 
 def allocate(
-    model: Model | Program,
-    require: str | Sequence[str],
-    *,
-    costs: Mapping[str, Cost] | None = None,
-    by: str = "contributor",
-    samples: int = 8192,
-    seed: int = 1,
-    solver: str | None = None,
-    method: Choice | None = None,
-    into: str | Path | None = None,
-    client: Any = None,
-    progress: Callable[[int, int], None] | None = None,
-) -> xr.Dataset:
-    """Ranges at least cost with which measures keep what is required, contact resolved.
+    model: Model | Program, require: str | Sequence[str], *, costs: Mapping[str, Cost] | None = None, by: str = "contributor",
+    samples: int = 8192, seed: int = 1, solver: str | None = None, method: Choice | None = None,
+    into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+) -> xr.Dataset:  # fmt: skip
+    """Return tolerance ranges of least cost with which measures keep what is required, contact resolved.
 
         range        (group, stage)                      full width of the zones, "before" and "after"; NaN if they differ
-        factor       (group)                             after over before, for all zones of the group alike
+        factor       (group)                             range after over range before, the same for all zones of the group
         cost         (group, stage)
         kept         (requirement, stage, interval)      the share outside of the limits, or the Ppk, in a fresh run of
                                                          4 samples realizations, with its 95 % interval
-        required     (requirement)                       what it should be
+        required     (requirement)                       the share or the Ppk that is required
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
-    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or several such texts. `costs` has for each group that
-    may change a number c, for c * present range / new range, or a function of the factor; all others keep their ranges. Without
-    costs all groups may change, and c is 1. `by` is as in `contributions`: "contributor", "feature" or "part".
+    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or several of these texts. `costs` maps a group that
+    may change to a number c, for the cost c * present range / new range, or to a function of the factor. Groups without costs
+    keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
+    "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Each step replaces what is required by a function of squared
-    ranges that agrees with it in value and slopes, on the same draws, and solves that with scipy's SLSQP within a region that
-    shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run does not keep what is
-    required, the aim is tightened by what it was missed by, and the search goes on.
-    With a `client` of dask.distributed its workers simulate (see tolcontact.simulation); results are the same to the last bit.
-    With `into`, the result is kept in the archive of that path, which has to be of the same model, as the group
-    statistics/allocation; the report shows it.
-    Raises ModelError, ArchiveError, OptionError for options that cannot be used, or a model in which no range varies.
+    Ranges stay between a tenth and three times the present ones. Each step replaces the margins of the requirements by
+    functions of squared ranges with the same values and slopes, on the same draws. scipy's SLSQP minimizes the cost under them
+    within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run
+    misses a requirement, the search continues with a margin larger by as much. `progress` is called with the number of fresh
+    runs, and their largest number.
+    Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
+    model in which no range varies.
     """
-    check_counts(samples=samples, seed=seed)
-    if by not in terms.GROUPED_BY:
-        raise OptionError(f"by is {by!r}; expected one of: {', '.join(terms.GROUPED_BY)}")
-    program, blocks = program_of(model, solver, method), mapping(client)
-    if into is not None:
-        check_room_for(into, terms.OF_ALLOCATION, program)
-    required = [Requirement.of_text(text, program) for text in ([require] if isinstance(require, str) else require)]
-    if not required:
+    check_grouping(by)
+    analysis = Analysis(
+        terms.ALLOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
+        progress=progress,
+    )  # fmt: skip
+    program = analysis.program
+    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
+    if not requirements:
         raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
-    for each in required:
-        each.check(samples)
+    for requirement in requirements:
+        requirement.check(samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
-    engine = _Engine(program, blocks, list(groups.values()), seed, samples)
-    free = np.array([name in curves for name in groups])
-    cost = [curves.get(name, 0.0) for name in groups]
-    logs, kept = _allocated(engine, required, cost, free, progress)
-    stages = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
-    found = {
-        "range": [[width * factor for factor in row] for width, row in zip(_ranges(program, groups), stages, strict=True)],
-        "factor": stages[:, 1],
-        "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(cost, stages, strict=True)],
-        "kept": [[kept[0][k], kept[1][k]] for k in range(len(required))],
-        "required": [each.value for each in required],
-        "effect": _effects(engine, program),
+    trials = ScaledTrials(analysis.engine(), list(groups.values()), seed, samples)
+    prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
+    logs, estimates = _allocated(trials, requirements, prices, progress)
+    factors = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
+    values = {
+        "range": np.array(_ranges(program, groups))[:, None] * factors,
+        "factor": factors[:, 1],
+        "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(prices.curves, factors, strict=True)],
+        "kept": np.array(estimates).swapaxes(0, 1),
+        "required": [requirement.value for requirement in requirements],
+        "effect": _effects(trials, program),
     }
-    answer = xr.Dataset(
-        {of.name: (of.dims, np.array(found[of.name]), of.all_attributes) for of in terms.ALLOCATION},
-        coords={
-            terms.GROUP: list(groups),
-            terms.STAGE: list(terms.STAGES),
-            terms.REQUIREMENT: [each.name for each in required],
-            terms.MEASURE: [measure.name for measure in program.nominal.measures],
-            terms.OF_EFFECT: list(terms.EFFECTS),
-            terms.INTERVAL: list(terms.ESTIMATE),
-            "measure_units": (terms.MEASURE, [measure.units for measure in program.nominal.measures]),
-        },
-        attrs={
-            "title": f"allocation of tolerances of {program.nominal.assembly.name}",
-            "samples": samples,
-            "fresh": FRESH * samples,
-            "seed": seed,
-            "by": by,
-            "solver": program.plugin.name,
-            "resolution": program.method.resolution,
-            "objective": program.method.objective,
-        },
-    )
-    if into is not None:
-        keep(into, terms.OF_ALLOCATION, answer, program)
-    return answer
+    labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
+    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by)
 
 
-class _Engine:
-    """Corrected measures for factors of the groups' ranges, on the same draws."""
+@dataclass(frozen=True, eq=False)
+class ScaledTrials:
+    """Simulations with scaled ranges, on the same draws.
 
-    def __init__(self, program: Program, blocks: MapBlocks, groups: Sequence[np.ndarray], seed: int, samples: int) -> None:
-        self._program, self._blocks, self._groups, self._seed, self._samples = program, blocks, groups, seed, samples
+    groups  columns of each group
+    """
 
-    def __call__(self, factors: np.ndarray, *, fresh: int = 0) -> np.ndarray:
-        """Measures (n, measure); of other draws, and more of them, if `fresh` is the number of a verification."""
-        scale = np.ones(len(self._program.nominal.contributors))
-        for factor, columns in zip(factors, self._groups, strict=True):
+    engine: Engine
+    groups: Sequence[np.ndarray]
+    seed: int
+    samples: int
+
+    def corrected(self, factors: np.ndarray, *, verification: int = 0) -> np.ndarray:
+        """Return corrected measures (n, measure) with the groups' ranges times factors (group,).
+
+        A `verification` with a number above 0 has draws of its own, and more of them.
+        """
+        program = self.engine.program
+        scale = np.ones(len(program.nominal.contributors))
+        for factor, columns in zip(factors, self.groups, strict=True):
             scale[columns] = factor
-        draws, first = self._program.draws.scaled(scale), fresh << 32
-        count = FRESH * self._samples if fresh else self._samples
-        found = self._blocks(outcomes, self._program, samples=first + count, start=first, seed=self._seed, draws=draws)
-        return np.asarray(np.concatenate([measured[:, terms.CORRECTED] for measured, _ in found]))
+        count = VERIFICATION_FACTOR * self.samples if verification else self.samples
+        draws, start = program.draws.scaled(scale), verification << 32
+        measured, _ = self.engine.simulate(count, start=start, seed=self.seed, draws=draws)
+        return np.ascontiguousarray(measured[:, terms.CORRECTED])
 
     def __len__(self) -> int:
-        return len(self._groups)
+        return len(self.groups)
+
+
+@dataclass(frozen=True, eq=False)
+class Prices:
+    """The cost curves of groups, and whether their ranges may change (group,)."""
+
+    curves: Sequence[Cost]
+    is_free: np.ndarray
+
+    def total(self, logs: np.ndarray) -> float:
+        """Return the cost of the groups that may change, at logarithms of the factors (group,)."""
+        return math.fsum(
+            _cost(curve, factor) for curve, factor, free in zip(self.curves, np.exp(logs), self.is_free, strict=True) if free
+        )
 
 
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
-    """Columns of the deviations by who owns them, of those that have ranges."""
-    found: dict[str, list[int]] = {}
-    for column, (owner, each) in enumerate(zip(owners(program, by), program.draws.contributors, strict=True)):
-        if np.isfinite(each.range) and each.range > 0:
-            found.setdefault(owner, []).append(column)
-    if not found:
+    """Return the columns of the deviations that have ranges, by their owners."""
+    groups: dict[str, list[int]] = {}
+    contributors = program.draws.contributors
+    for column, (owner, contributor) in enumerate(zip(owners(program, by), contributors, strict=True)):
+        if np.isfinite(contributor.range) and contributor.range > 0:
+            groups.setdefault(owner, []).append(column)
+    if not groups:
         raise OptionError(f'"{program.nominal.assembly.name}" has no range to allocate; give locators or features tolerances')
-    return {owner: np.array(columns) for owner, columns in found.items()}
+    return {owner: np.array(columns) for owner, columns in groups.items()}
 
 
 def _ranges(program: Program, groups: Mapping[str, np.ndarray]) -> list[float]:
-    every = program.draws.contributors
-    own = [{every[column].range for column in columns} for columns in groups.values()]
-    return [ranges.pop() if len(ranges) == 1 else np.nan for ranges in own]
+    """Return the range of each group; NaN if its contributors have different ranges."""
+    contributors = program.draws.contributors
+    ranges = [{contributors[column].range for column in columns} for columns in groups.values()]
+    return [widths.pop() if len(widths) == 1 else np.nan for widths in ranges]
 
 
 def _curves(costs: Mapping[str, Cost] | None, groups: Mapping[str, np.ndarray]) -> dict[str, Cost]:
@@ -180,107 +173,114 @@ def _cost(curve: Cost, factor: float) -> float:
 
 
 def _allocated(
-    engine: _Engine,
-    required: Sequence[Requirement],
-    cost: Sequence[Cost],
-    free: np.ndarray,
-    progress: Callable[[int, int], None] | None,
+    trials: ScaledTrials, requirements: Sequence[Requirement], prices: Prices, progress: Progress | None
 ) -> tuple[np.ndarray, list[list[Estimate]]]:
-    """Logarithms of the factors (group,), and what was kept before and after, in fresh runs."""
-    logs, aims = np.zeros(len(engine)), np.zeros(len(required))
-    before = engine(np.ones(len(engine)), fresh=1)
-    kept = [[each.estimate(before[:, each.measure]) for each in required]]
+    """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after."""
+    search, logs = Search(trials, requirements, prices), np.zeros(len(trials))
+    corrected = trials.corrected(np.ones(len(trials)), verification=1)
+    before = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
+    aims = np.zeros(len(requirements))
     for number in range(VERIFICATIONS):
-        logs = _least_cost(engine, required, aims, cost, free, logs)
+        logs = search.least_cost(logs, aims)
         if progress:
             progress(number + 1, VERIFICATIONS)
-        values = engine(np.exp(logs), fresh=2 + number)
-        margins = np.array([each.margin(values[:, each.measure]) for each in required])
+        corrected = trials.corrected(np.exp(logs), verification=2 + number)
+        margins = _margins(requirements, corrected)
         if (margins >= 0).all():
             break
         aims += np.maximum(-margins, 0.0)
-    return logs, [*kept, [each.estimate(values[:, each.measure]) for each in required]]
+    return logs, [before, [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]]
 
 
-def _least_cost(
-    engine: _Engine,
-    required: Sequence[Requirement],
-    aims: np.ndarray,
-    cost: Sequence[Cost],
-    free: np.ndarray,
-    logs: np.ndarray,
-) -> np.ndarray:
-    """Logarithms of the factors (group,) that cost least, with margins of at least `aims`; from some others."""
-
-    def margins(at: np.ndarray) -> np.ndarray:
-        values = engine(np.exp(at))
-        return np.array([each.margin(values[:, each.measure]) - aim for each, aim in zip(required, aims, strict=True)])
-
-    def price(at: np.ndarray) -> float:
-        return math.fsum(_cost(curve, factor) for curve, factor, moves in zip(cost, np.exp(at), free, strict=True) if moves)
-
-    here, reach, slopes = margins(logs), FARTHEST, None
-    for _ in range(ROUNDS):
-        if reach < NEAREST:
-            break
-        if slopes is None:
-            slopes = np.zeros((len(required), len(logs)))
-            for group in np.flatnonzero(free):
-                step = np.eye(len(logs))[group] * STEP
-                slopes[:, group] = (margins(logs + step) - margins(logs - step)) / (2 * STEP)
-            penalty = PENALTY * price(logs) / max(float(np.abs(slopes).sum()), 1e-300)
-        there = _step(here, slopes, logs, price, free, reach)
-        found = margins(there)
-        merits = [price(at) + penalty * float(np.maximum(-each, 0).sum()) for at, each in ((there, found), (logs, here))]
-        if merits[0] < merits[1] - GAIN * abs(merits[1]):
-            logs, here, slopes, reach = there, found, None, min(2 * reach, FARTHEST)
-        else:
-            reach /= 2
-    return logs
+def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
+    return np.array([requirement.margin(corrected[:, requirement.measure]) for requirement in requirements])
 
 
-def _step(
-    here: np.ndarray, slopes: np.ndarray, logs: np.ndarray, price: Callable[[np.ndarray], float], free: np.ndarray, reach: float
-) -> np.ndarray:
-    """Where it costs least, margins taken for functions of squared ranges; if none keeps them, where they are missed least."""
+@dataclass(frozen=True, eq=False)
+class Search:
+    """The search for the least cost with margins that are large enough, in logarithms of the factors (group,)."""
 
-    def margin(at: np.ndarray) -> np.ndarray:
-        return np.asarray(here + slopes @ (np.exp(2 * (at - logs)) - 1) / 2)
+    trials: ScaledTrials
+    requirements: Sequence[Requirement]
+    prices: Prices
 
-    lower = np.where(free, np.maximum(logs - reach, np.log(NARROWEST)), logs)
-    upper = np.where(free, np.minimum(logs + reach, np.log(WIDEST)), logs)
-    bounds = Bounds(lower, upper)
-    found = minimize(
-        price, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": margin}, options={"maxiter": 200}
-    )
-    if not found.success:
-        found = minimize(lambda at: float(np.maximum(-margin(at), 0).sum()), logs, method="SLSQP", bounds=bounds)
-    return np.asarray(np.clip(found.x, lower, upper))
+    def least_cost(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        """Return the logarithms of least cost with margins of at least `aims` (requirement,), from `logs` on.
+
+        The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
+        region of the next one doubles; after any other step the region halves.
+        """
+        margins, radius = self._margins(logs, aims), FIRST_RADIUS
+        slopes = None
+        for _ in range(MAX_STEPS):
+            if radius < LAST_RADIUS:
+                break
+            if slopes is None:
+                slopes = self._slopes(logs, aims)
+                penalty = PENALTY * self.prices.total(logs) / max(float(np.abs(slopes).sum()), 1e-300)
+            candidate = self._step(margins, slopes, logs, radius)
+            candidate_margins = self._margins(candidate, aims)
+            merit = self._merit(logs, margins, penalty)
+            if self._merit(candidate, candidate_margins, penalty) < merit - MIN_GAIN * abs(merit):
+                logs, margins, slopes, radius = candidate, candidate_margins, None, min(2 * radius, FIRST_RADIUS)
+            else:
+                radius /= 2
+        return logs
+
+    def _margins(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        return _margins(self.requirements, self.trials.corrected(np.exp(logs))) - aims
+
+    def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: float) -> float:
+        return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
+
+    def _slopes(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
+        """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change."""
+        slopes = np.zeros((len(self.requirements), len(logs)))
+        for group in np.flatnonzero(self.prices.is_free):
+            step = np.eye(len(logs))[group] * STEP
+            slopes[:, group] = (self._margins(logs + step, aims) - self._margins(logs - step, aims)) / (2 * STEP)
+        return slopes
+
+    def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
+        """Return the point of least cost with margins approximated by functions of squared ranges.
+
+        If no point within the radius keeps the margins, return the point that misses them least.
+        """
+
+        def missed(point: np.ndarray) -> float:
+            return float(np.maximum(-approximate(point), 0).sum())
+
+        def approximate(point: np.ndarray) -> np.ndarray:
+            return np.asarray(margins + slopes @ (np.exp(2 * (point - logs)) - 1) / 2)
+
+        lower = np.where(self.prices.is_free, np.maximum(logs - radius, np.log(MIN_FACTOR)), logs)
+        upper = np.where(self.prices.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
+        bounds = Bounds(lower, upper)
+        solution = minimize(
+            self.prices.total, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},
+            options={"maxiter": 200},
+        )  # fmt: skip
+        if not solution.success:
+            solution = minimize(missed, logs, method="SLSQP", bounds=bounds)
+        return np.asarray(np.clip(solution.x, lower, upper))
 
 
-def _effects(engine: _Engine, program: Program) -> np.ndarray:
-    """Changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower, by batches of the same draws."""
-    ones, limits = (
-        np.ones(len(engine)),
-        [measure.bounds(nominal) for measure, nominal in zip(program.nominal.measures, program.nominal_measures, strict=True)],
-    )
-    usual = engine(ones)
-    found = np.empty((len(limits), len(terms.EFFECTS), len(engine), len(terms.ESTIMATE)))
-    for group in range(len(engine)):
-        narrow = engine(ones - STEP * np.eye(len(engine))[group])
+def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
+    """Return changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower.
+
+    Intervals are those of means over batches of the same draws.
+    """
+    measures = zip(program.nominal.measures, program.nominal_measures, strict=True)
+    limits = [measure.bounds(nominal) for measure, nominal in measures]
+    ones = np.ones(len(trials))
+    present = trials.corrected(ones)
+    effects = np.empty((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
+    for group in range(len(trials)):
+        narrowed = trials.corrected(ones - STEP * np.eye(len(trials))[group])
         for measure, (lower, upper) in enumerate(limits):
-            both = [np.array_split(values[:, measure], BATCHES) for values in (narrow, usual)]
-            spreads, shares = (
-                [np.array([of(x) for x in each]) for each in both] for of in (_six_sigma, _outside(lower, upper))
-            )
-            found[measure, 0, group] = mean(spreads[0] - spreads[1])
-            found[measure, 1, group] = mean(shares[0] - shares[1])
-    return found
-
-
-def _six_sigma(x: np.ndarray) -> Any:
-    return 6 * x.std(ddof=1)
-
-
-def _outside(lower: float, upper: float) -> Callable[[np.ndarray], Any]:
-    return lambda x: ((x < lower) | (x > upper)).mean()
+            batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
+            spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]
+            shares = [np.array([((x < lower) | (x > upper)).mean() for x in values]) for values in batches]
+            effects[measure, 0, group] = mean(spreads[0] - spreads[1])
+            effects[measure, 1, group] = mean(shares[0] - shares[1])
+    return effects

@@ -1,13 +1,14 @@
-"""Designs: draws in which realizations belong together, as sensitivities, Sobol' indices and Shapley effects need them.
+"""Designs: draws in which each base realization has several realizations, for derivatives, Sobol' indices and Shapley effects.
 
-Sobol' indices: Saltelli et al. (2010). For each base realization k there are 2 + groups realizations: A, B, and A with the
-columns of each group from B.
+Sobol' indices: Saltelli et al. (2010). Each base realization has 2 + groups realizations: A, B, and A with the columns of each
+group from B.
 
-Shapley effects: Song, Nelson, Staum (2016); Goda (2021). For each base realization k there are 1 + units realizations. The
-last one is A; in realization m the first m units, in an order that is random for each k, are those of A, and the others are
-drawn anew, given these m. The first one is B, independent of A.
+Shapley effects: Song, Nelson, Staum (2016); Goda (2021). Each base realization has 1 + units realizations. The last one is A.
+Realization m has the first m units of A, in an order that is random for each base realization; the other units are redrawn,
+conditional on these m. The first one is B, independent of A.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -16,89 +17,78 @@ from scipy.special import ndtr, ndtri
 from tolcontact.variation.draws import MIN_UNIFORM, Draws
 from tolcontact.variation.plans import Numbers, uniform
 
-OTHER = 1 << 40  # realizations that B begins at: no run comes so far
+REDRAWN_START = 1 << 40  # number of the realization that B begins at; no run is that long
 
 
-class SteppedDraws:
-    """Deviations as Draws give them: realization k (1 + 2 columns) + m is realization k, with one column stepped for m > 0.
+class Design(ABC):
+    """Deviations as Draws give them: realization k size + m is member m of base realization k."""
 
-    First come the steps up of all `columns`, by `steps` (column,) in their units, then the steps down.
-    """
+    @property
+    @abstractmethod
+    def size(self) -> int:
+        """The number of realizations of each base realization."""
+
+    @abstractmethod
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+
+    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (realization, contributor); see Draws."""
+        base = start // self.size
+        members = self.members(seed, base, -(-stop // self.size))
+        return members.reshape(-1, members.shape[2])[start - base * self.size : stop - base * self.size]
+
+
+class SteppedDraws(Design):
+    """Each realization itself, then with each of `columns` stepped up by `steps` (column,) in its units, then stepped down."""
 
     def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
         self._draws, self._columns, self._steps = draws, columns, steps
 
     @property
-    def together(self) -> int:
-        """How many realizations there are of each."""
+    def size(self) -> int:
+        """The number of realizations of each base realization."""
         return 1 + 2 * len(self._columns)
 
-    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
-        """Deviations (realization, contributor); see Draws."""
-        first, last = start // self.together, -(-stop // self.together)
-        own = self._draws(seed=seed, start=first, stop=last)
-        every = np.repeat(own[:, None], self.together, axis=1)
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+        members = np.repeat(self._draws(seed=seed, start=start, stop=stop)[:, None], self.size, axis=1)
         count = len(self._columns)
         for k, (column, step) in enumerate(zip(self._columns, self._steps, strict=True), start=1):
-            every[:, k, column] += step
-            every[:, count + k, column] -= step
-        return every.reshape(-1, own.shape[1])[start - first * self.together : stop - first * self.together]
+            members[:, k, column] += step
+            members[:, count + k, column] -= step
+        return members
 
 
-class MixedDraws:
-    """Deviations as Draws give them: realization k (2 + groups) + m is mixture m of base realization k."""
+class MixedDraws(Design):
+    """A, B, and A with the columns of each of `groups` from B; columns of different groups are independent."""
 
     def __init__(self, draws: Draws, groups: Sequence[np.ndarray]) -> None:
-        """`groups`: columns of deviations that change together; those of different groups are independent."""
         self._draws, self._groups = draws, groups
 
     @property
-    def together(self) -> int:
-        """How many realizations each base realization has."""
+    def size(self) -> int:
+        """The number of realizations of each base realization."""
         return 2 + len(self._groups)
 
-    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
-        """Deviations (realization, contributor); see Draws."""
-        count = self.together
-        first, last = start // count, -(-stop // count)
-        A = self._draws(seed=seed, start=first, stop=last)
-        B = self._draws(seed=seed, start=OTHER + first, stop=OTHER + last)
-        every = np.repeat(A[:, None], count, axis=1)
-        every[:, 1] = B
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+        A = self._draws(seed=seed, start=start, stop=stop)
+        B = self._draws(seed=seed, start=REDRAWN_START + start, stop=REDRAWN_START + stop)
+        members = np.repeat(A[:, None], self.size, axis=1)
+        members[:, 1] = B
         for member, columns in enumerate(self._groups, start=2):
-            every[:, member, columns] = B[:, columns]
-        return every.reshape(-1, A.shape[1])[start - first * count : stop - first * count]
+            members[:, member, columns] = B[:, columns]
+        return members
 
 
-def independent_groups(draws: Draws, owners: Sequence[str], *, correlated: bool = True) -> dict[str, np.ndarray]:
-    """Columns by who owns them, so that groups are independent of each other: what is drawn together is one group.
+class ReleasedDraws(Design):
+    """Member m has m units of A, the others are redrawn.
 
-    Without `correlated`, groups may be correlated by declaration, but not depend on each other in another way.
+    units  columns of deviations by name; those of different units are independent, or correlated by declaration
     """
-    leader = list(range(len(owners)))
-
-    def find(k: int) -> int:
-        while leader[k] != k:
-            k = leader[k]
-        return k
-
-    first: dict[str, int] = {}
-    together = [[first.setdefault(owner, k), k] for k, owner in enumerate(owners)]
-    for columns in [*together, *draws.dependent(correlated=correlated)]:
-        for k in columns[1:]:
-            one, other = sorted((find(int(columns[0])), find(int(k))))
-            leader[other] = one
-    found: dict[int, list[int]] = {}
-    for k in range(len(owners)):
-        found.setdefault(find(k), []).append(k)
-    return {" + ".join(dict.fromkeys(owners[k] for k in columns)): np.array(columns) for columns in found.values()}
-
-
-class ReleasedDraws:
-    """Deviations as Draws give them: realization k (1 + units) + m has m units of A."""
 
     def __init__(self, draws: Draws, units: Mapping[str, np.ndarray]) -> None:
-        """`units`: columns of deviations by name; those of different units are independent, or correlated by declaration."""
         self._draws, self._names = draws, list(units)
         self._unit = {draws.labels[column]: k for k, columns in enumerate(units.values()) for column in columns}
         self._unit |= {
@@ -108,61 +98,65 @@ class ReleasedDraws:
         }
 
     @property
-    def together(self) -> int:
-        """How many realizations each base realization has."""
+    def size(self) -> int:
+        """The number of realizations of each base realization."""
         return 1 + len(self._names)
 
-    def places(self, seed: int, first: int, last: int) -> np.ndarray:
-        """Where each unit stands in the order of base realizations, (base, unit)."""
-        keys = np.stack([uniform(seed, f"order of {name}", first, last) for name in self._names], axis=1)
+    def places(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return the places (base, unit) of the units in the random orders of base realizations."""
+        keys = np.stack([uniform(seed, f"order of {name}", start, stop) for name in self._names], axis=1)
         return np.asarray(keys.argsort(axis=1).argsort(axis=1))
 
-    def __call__(self, *, seed: int, start: int, stop: int) -> np.ndarray:
-        """Deviations (realization, contributor); see Draws."""
-        first, last = start // self.together, -(-stop // self.together)
-        places, count = self.places(seed, first, last), last - first
+    def members(self, seed: int, start: int, stop: int) -> np.ndarray:
+        """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
+        places = self.places(seed, start, stop)
 
-        def kept(label: str) -> np.ndarray:
-            return uniform(seed, label, first, last)
+        def retained(label: str) -> np.ndarray:
+            return uniform(seed, label, start, stop)
 
-        def anew(label: str) -> np.ndarray:
-            return uniform(seed, label, OTHER + first, OTHER + last)
+        def redrawn(label: str) -> np.ndarray:
+            return uniform(seed, label, REDRAWN_START + start, REDRAWN_START + stop)
 
-        every = np.empty((count, self.together, len(self._draws.labels)))
-        for members in range(self.together):
-            every[:, members] = self._draws.from_numbers(self._mixed(kept, anew, places, members), count)
-        return every.reshape(-1, every.shape[2])[start - first * self.together : stop - first * self.together]
+        members = np.empty((stop - start, self.size, len(self._draws.labels)))
+        for count in range(self.size):
+            numbers = self._mixed(retained, redrawn, places, count)
+            members[:, count] = self._draws.from_numbers(numbers, stop - start)
+        return members
 
-    def _mixed(self, kept: Numbers, anew: Numbers, places: np.ndarray, members: int) -> Numbers:
-        """Numbers with those of the first `members` units kept, and all others anew, given these."""
+    def _mixed(self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int) -> Numbers:
+        """Return numbers in which the first `count` units are retained, and the others redrawn conditional on these."""
         correlated: dict[str, np.ndarray] = {}
         for labels, factor in self._draws.correlated:
-            correlated |= self._conditional(kept, anew, places, members, labels, factor)
+            correlated |= self._conditional(retained, redrawn, places, count, labels, factor)
 
         def numbers(label: str) -> np.ndarray:
             if label in correlated:
                 return correlated[label]
-            unit = self._unit.get(label, self._unit.get(label.rpartition(" #")[0]))  # of a further attempt
-            return anew(label) if unit is None else np.where(places[:, unit] < members, kept(label), anew(label))
+            unit = self._unit.get(label, self._unit.get(label.rpartition(" #")[0]))  # " #2": a further attempt
+            if unit is None:
+                return redrawn(label)
+            return np.where(places[:, unit] < count, retained(label), redrawn(label))
 
         return numbers
 
     def _conditional(
-        self, kept: Numbers, anew: Numbers, places: np.ndarray, members: int, labels: list[str], factor: np.ndarray
+        self, retained: Numbers, redrawn: Numbers, places: np.ndarray, count: int, labels: list[str], factor: np.ndarray
     ) -> dict[str, np.ndarray]:
-        """Numbers of correlated contributors by label.
+        """Return numbers of correlated contributors by label: the first `count` units retained, the others conditional on them.
 
-        With the factor L of the correlations in the order of a realization, z = L e: what comes later in e is what z has
-        beside that which the former determine. So e of the former from the one set, and of the others from the other set.
+        Normal scores z of the contributors have the covariance `factor` factor^T. In the order of the units' places z = L e,
+        with L the Cholesky factor of the covariance in this order, and e independent standard normal numbers. An entry of e
+        is what its score has beside that which earlier contributors determine. So z made of the retained e up to `count`, and
+        of the redrawn e behind, has the earlier scores unchanged and the later ones conditional on them.
         """
-        both = [np.stack([ndtri(of(label)) for label in labels], axis=1) @ factor.T for of in (kept, anew)]
-        last = np.full(len(places), self.together)  # for what does not vary
-        of_label = np.stack([places[:, self._unit[label]] if label in self._unit else last for label in labels], axis=1)
-        order = of_label.argsort(axis=1, kind="stable")
-        own = np.linalg.cholesky((factor @ factor.T)[order[:, :, None], order[:, None, :]])
-        e = [np.linalg.solve(own, np.take_along_axis(z, order, axis=1)[..., None])[..., 0] for z in both]
-        stays = np.take_along_axis(of_label, order, axis=1) < members
-        z = np.empty_like(both[0])
-        np.put_along_axis(z, order, (own @ np.where(stays, *e)[..., None])[..., 0], axis=1)
+        scores = [np.stack([ndtri(numbers(label)) for label in labels], axis=1) @ factor.T for numbers in (retained, redrawn)]
+        behind_all = np.full(len(places), self.size)  # the place of a contributor that does not vary
+        place = np.stack([places[:, self._unit[label]] if label in self._unit else behind_all for label in labels], axis=1)
+        order = place.argsort(axis=1, kind="stable")
+        L = np.linalg.cholesky((factor @ factor.T)[order[:, :, None], order[:, None, :]])
+        e_retained, e_redrawn = (np.linalg.solve(L, np.take_along_axis(z, order, axis=1)[..., None])[..., 0] for z in scores)
+        is_retained = np.take_along_axis(place, order, axis=1) < count
+        z = np.empty_like(scores[0])
+        np.put_along_axis(z, order, (L @ np.where(is_retained, e_retained, e_redrawn)[..., None])[..., 0], axis=1)
         numbers = ndtr(np.linalg.solve(factor, z.T)).clip(MIN_UNIFORM, 1 - MIN_UNIFORM)
         return dict(zip(labels, numbers, strict=True))

@@ -1,56 +1,68 @@
-"""Searches for extreme values on the engine, side by side: what is tried of all of them is simulated together."""
+"""Searches for extreme values of measures, side by side: the candidates of all searches are simulated together.
 
-from collections.abc import Callable
+A search is a generating set search (Kolda, Lewis, Torczon, 2003). It tries points a step away along each contributor and in
+random directions, and then points on the way to the far end of the region along its slopes. It moves to the best of them if
+that gains enough; otherwise its step shrinks. It ends when its step is small.
+"""
+
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
-from tolcontact.compilation import Program
-from tolcontact.simulation import outcomes
-from tolcontact.simulation.cluster import MapBlocks
-from tolcontact.variation import GivenDraws
+from tolcontact.analyses.engine import Engine, Progress
 
-AROUND = 8  # random directions that a search tries, beside those of single contributors
-SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
-SHRINK, FINEST = 0.25, 1e-7  # of a search's step, in shares of the ranges
-GAIN, ENOUGH = 1e-10, 0.01  # of a measure's spread: less is rounding; and, times the square of a step, no progress
-ROUNDS = 200  # steps of a search at most
-FINISHES = 4
-NEAR = 1e-4  # of the ranges: steps of differences at an end
+RANDOM_DIRECTIONS = 8  # that a search tries at each step
+END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
+SHRINKAGE = 0.25  # of a step
+ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
+MAX_STEPS = 200
+MAX_FINISHES = 4
+DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
+
+
+@dataclass(frozen=True)
+class Effort:
+    """The thoroughness of searches.
+
+    best, random  number of searches for each extreme value, from the best combinations and from random ones
+    finest_step   the step at which a search ends, in shares of the ranges
+    """
+
+    best: int = 4
+    random: int = 12
+    finest_step: float = 1e-7
 
 
 class Evaluation:
-    """The engine on own deviations, and how many of each status it has seen."""
+    """Measures at points of the region (see Region)."""
 
-    def __init__(self, program: Program, region: Region, blocks: MapBlocks) -> None:
-        self._program, self._region, self._blocks = program, region, blocks
-        self.statuses = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
+    def __init__(self, engine: Engine, region: Region) -> None:
+        self._engine, self._region = engine, region
 
-    def __call__(self, own: np.ndarray) -> np.ndarray:
-        """Measures (..., state, measure) of own deviations (..., contributor); NaN, corrected, where it is not certified."""
-        flat = self._region.deviations(own.reshape(-1, own.shape[-1]))
-        values = []
-        for measured, status in self._blocks(outcomes, self._program, samples=len(flat), seed=0, draws=GivenDraws(flat)):
-            measured[np.isin(status, terms.UNRESOLVED), terms.CORRECTED] = np.nan
-            values.append(measured)
-            self.statuses += np.bincount(status, minlength=len(self.statuses))
-        return np.concatenate(values).reshape(*own.shape[:-1], len(terms.STATES), -1)
+    def corrected(self, points: np.ndarray) -> np.ndarray:
+        """Return measures (..., state, measure) at points (..., contributor); NaN, corrected, where they are not certified."""
+        measured, status = self._engine.simulate_deviations(self._deviations(points))
+        measured[np.isin(status, terms.UNRESOLVED), terms.CORRECTED] = np.nan
+        return measured.reshape(*points.shape[:-1], len(terms.STATES), -1)
 
-    def raw(self, own: np.ndarray) -> np.ndarray:
-        """The same without contact, which takes no time: NaN, corrected."""
-        flat = self._region.deviations(own.reshape(-1, own.shape[-1]))
-        measured = self._program.observe(poses=self._program.place(deviations=flat)["poses"], deviations=flat)["measured"]
-        return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*own.shape[:-1], len(terms.STATES), -1)
+    def raw(self, points: np.ndarray) -> np.ndarray:
+        """Return the same with raw measures alone, which takes no time; the corrected ones are NaN."""
+        program, deviations = self._engine.program, self._deviations(points)
+        measured = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)["measured"]
+        return np.stack([measured, np.full_like(measured, np.nan)], axis=1).reshape(*points.shape[:-1], len(terms.STATES), -1)
+
+    def _deviations(self, points: np.ndarray) -> np.ndarray:
+        return self._region.deviations(points.reshape(-1, points.shape[-1]))
 
 
 @dataclass(eq=False)
 class Searches:
-    """What each looks for, where it is, how good that is, how far it steps.
+    """Searches with their goals and their present points.
 
     sense, state, measure  (n,): +1 for the largest, -1 for the least value, of a measure in a state
-    own                    (n, contributor)
+    point                  (n, contributor)
     value                  (n,): sense times the measure
     step                   (n,): in shares of the ranges
     """
@@ -58,116 +70,136 @@ class Searches:
     sense: np.ndarray
     state: np.ndarray
     measure: np.ndarray
-    own: np.ndarray
+    point: np.ndarray
     value: np.ndarray
     step: np.ndarray
 
     @classmethod
-    def begun(cls, starts: np.ndarray, seen: np.ndarray, best: int, others: int, rng: np.random.Generator) -> "Searches":
-        """Some for each measure, state and sense: from the best starts (n, contributor), with measures (n, state, measure), and
-        from others at random."""
-        count = best + others
-        every = []
-        for measure in range(seen.shape[2]):
-            for state in range(seen.shape[1]):
+    def begin(cls, starts: np.ndarray, measured: np.ndarray, effort: Effort, rng: np.random.Generator) -> "Searches":
+        """Return searches for each measure, state and sense, from points `starts` (n, contributor).
+
+        They begin at the best points by `measured` (n, state, measure), and at random ones of the others.
+        """
+        searches, ones = [], np.ones(effort.best + effort.random, dtype=int)
+        for measure in range(measured.shape[2]):
+            for state in range(measured.shape[1]):
                 for sense in terms.SENSES:
-                    values = np.nan_to_num(sense * seen[:, state, measure], nan=-np.inf)
-                    order, same = np.argsort(-values, kind="stable"), np.ones(count, dtype=int)
-                    rest = order[best : max(int(np.isfinite(values).sum()), best + 1)]
-                    chosen = np.concatenate([order[:best], rng.choice(rest, others)])
-                    every.append(cls(sense * same, state * same, measure * same, starts[chosen], values[chosen], 1.0 * same))
-        return cls(*(np.concatenate([getattr(each, field.name) for each in every]) for field in fields(cls)))
+                    values = np.nan_to_num(sense * measured[:, state, measure], nan=-np.inf)
+                    order = np.argsort(-values, kind="stable")
+                    worse = order[effort.best : max(int(np.isfinite(values).sum()), effort.best + 1)]
+                    rows = np.concatenate([order[: effort.best], rng.choice(worse, effort.random)])
+                    goal = sense * ones, state * ones, measure * ones
+                    searches.append(cls(*goal, starts[rows], values[rows], 1.0 * ones))
+        return cls(*(np.concatenate([getattr(search, field.name) for search in searches]) for field in fields(cls)))
 
     def take(self, rows: np.ndarray) -> "Searches":
-        """Some of them, as copies."""
+        """Return copies of some searches."""
         return Searches(*(getattr(self, field.name)[rows] for field in fields(self)))
 
-    def put(self, rows: np.ndarray, some: "Searches") -> None:
-        """Take over where some of them got to."""
-        self.own[rows], self.value[rows], self.step[rows] = some.own, some.value, some.step
+    def put(self, rows: np.ndarray, searches: "Searches") -> None:
+        """Replace the points, values and steps of some searches."""
+        self.point[rows], self.value[rows], self.step[rows] = searches.point, searches.value, searches.step
 
-    def worth(self, own: np.ndarray, evaluate: Evaluation) -> np.ndarray:
-        """What own deviations (n, candidate, contributor) are worth (n, candidate)."""
-        found = np.empty(own.shape[:2])
-        for state, seen in ((terms.RAW, evaluate.raw), (terms.CORRECTED, evaluate)):
+    def values_at(self, candidates: np.ndarray, evaluation: Evaluation) -> np.ndarray:
+        """Return the values (n, candidate) of candidates (n, candidate, contributor)."""
+        values = np.empty(candidates.shape[:2])
+        for state, evaluate in ((terms.RAW, evaluation.raw), (terms.CORRECTED, evaluation.corrected)):
             rows = np.flatnonzero(self.state == state)
             if rows.size:
-                measured = seen(own[rows])[np.arange(len(rows)), :, state, self.measure[rows]]
-                found[rows] = np.nan_to_num(self.sense[rows, None] * measured, nan=-np.inf)
-        return found
+                measured = evaluate(candidates[rows])[np.arange(len(rows)), :, state, self.measure[rows]]
+                values[rows] = np.nan_to_num(self.sense[rows, None] * measured, nan=-np.inf)
+        return values
 
-    def move(self, candidates: np.ndarray, worth: np.ndarray, least: np.ndarray) -> np.ndarray:
-        """Move to the best of own deviations (n, candidate, contributor) if it gains more than `least` (n,): which did (n,)."""
-        rows, best = np.arange(len(worth)), worth.argmax(axis=1)
-        gains = worth[rows, best] > self.value + least
-        self.own[gains], self.value[gains] = candidates[rows, best][gains], worth[rows, best][gains]
+    def move(self, candidates: np.ndarray, values: np.ndarray, min_gain: np.ndarray) -> np.ndarray:
+        """Move each search to the best of its candidates (n, candidate, contributor) if it gains more than `min_gain` (n,).
+
+        Return which searches moved, (n,).
+        """
+        rows, best = np.arange(len(values)), values.argmax(axis=1)
+        gains = values[rows, best] > self.value + min_gain
+        self.point[gains], self.value[gains] = candidates[rows, best][gains], values[rows, best][gains]
         return np.asarray(gains)
 
 
 class Searcher:
-    """Moves searches in a region. `spread` (measure,): how much measures differ there."""
+    """Moves searches in a region.
 
-    def __init__(self, region: Region, evaluate: Evaluation, spread: np.ndarray, rng: np.random.Generator) -> None:
-        self._region, self._evaluate, self._spread, self._rng = region, evaluate, spread, rng
+    spread  (measure,) difference between the largest and the least value of random points
+    """
+
+    def __init__(
+        self, region: Region, evaluation: Evaluation, spread: np.ndarray, rng: np.random.Generator, finest_step: float
+    ) -> None:
+        self._region, self._evaluation, self._spread, self._rng = region, evaluation, spread, rng
+        self._finest_step = finest_step
         self._ranges = np.zeros(len(region.lower))
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
         self._compass = np.diag(self._ranges)[region.moves]
 
-    def search(self, searches: Searches, progress: Callable[[int, int], None] | None) -> None:
-        """Go on until all steps are small (a generating set search). `progress` is told how many ended, and of how many."""
-        for _ in range(ROUNDS):
-            going = np.flatnonzero(searches.step > FINEST)
-            if not going.size:
+    def search(self, searches: Searches, progress: Progress | None) -> None:
+        """Move until all steps are small. `progress` is called with the number of searches that ended, and of all."""
+        for _ in range(MAX_STEPS):
+            rows = np.flatnonzero(searches.step > self._finest_step)
+            if not rows.size:
                 break
-            now = searches.take(going)
-            there, worth, slopes = self._around(now, now.step, self._random())
-            gains = now.move(there, worth, self._least(now))
-            gains |= self._go_far(now, self._region.farthest(slopes))
-            now.step[~gains] *= SHRINK
-            searches.put(going, now)
+            active = searches.take(rows)
+            candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
+            gains = active.move(candidates, values, self._min_gain(active))
+            gains |= self._move_towards(active, self._region.farthest(slopes))
+            active.step[~gains] *= SHRINKAGE
+            searches.put(rows, active)
             if progress:
-                progress(int((searches.step <= FINEST).sum()), len(searches.step))
+                progress(int((searches.step <= self._finest_step).sum()), len(searches.step))
 
     def finish(self, searches: Searches) -> None:
-        """Go to the very end of round zones, along the slopes."""
+        """Move along the slopes to the very end of round zones."""
         searches.step[:] = 0.0
-        for _ in range(FINISHES):
-            _, _, slopes = self._around(searches, np.full(len(searches.value), NEAR), np.zeros((0, len(self._ranges))))
+        for _ in range(MAX_FINISHES):
+            steps = np.full(len(searches.value), DIFFERENCE_STEP)
+            _, _, slopes = self._neighbours(searches, steps, np.zeros((0, len(self._ranges))))
             ends = [
-                self._region.exactly_farthest(row) if row.any() else own for row, own in zip(slopes, searches.own, strict=True)
+                self._region.exactly_farthest(row) if row.any() else point
+                for row, point in zip(slopes, searches.point, strict=True)
             ]
-            if not self._go_far(searches, np.array(ends)).any():
+            if not self._move_towards(searches, np.array(ends)).any():
                 return
 
-    def _least(self, searches: Searches) -> np.ndarray:
-        """What a step has to gain (n,): the more the longer it is, so that searches do not creep (a forcing function)."""
-        return np.asarray(self._spread[searches.measure] * (GAIN + ENOUGH * searches.step**2))
+    def _min_gain(self, searches: Searches) -> np.ndarray:
+        """Return the least gain (n,) of a step: a forcing function, which grows with the step so that searches do not creep."""
+        return np.asarray(self._spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
 
-    def _random(self) -> np.ndarray:
-        """Steps (direction, contributor) of length 1 in shares of the ranges."""
-        shares = self._rng.standard_normal((AROUND, len(self._ranges))) * (self._ranges > 0)
+    def _random_steps(self) -> np.ndarray:
+        """Return steps (direction, contributor) of length 1 in shares of the ranges."""
+        shares = self._rng.standard_normal((RANDOM_DIRECTIONS, len(self._ranges))) * (self._ranges > 0)
         return np.asarray(shares / np.maximum(np.linalg.norm(shares, axis=1, keepdims=True), 1e-300) * self._ranges)
 
-    def _around(self, searches: Searches, step: np.ndarray, others: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Own deviations (n, candidate, contributor) a step (n,) away, as far as the region lets them, what they are worth,
-        and slopes (n, contributor) between those of single contributors."""
-        steps = step[:, None, None] * np.vstack([self._compass, -self._compass, others, -others])
-        n, count, width = steps.shape
-        own, flat = np.repeat(searches.own, count, axis=0), steps.reshape(-1, width)
-        there = (own + self._region.reach(own, flat)[:, None] * flat).reshape(n, count, width)
-        worth = searches.worth(there, self._evaluate)
-        up, down = slice(0, len(self._compass)), slice(len(self._compass), 2 * len(self._compass))
-        apart = (there[:, up] - there[:, down])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rise = np.where(apart > 0, (worth[:, up] - worth[:, down]) / apart, 0.0)
-        slopes = np.zeros_like(searches.own)
-        slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
-        return there, worth, slopes
+    def _neighbours(
+        self, searches: Searches, step: np.ndarray, directions: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the points a step (n,) away, as far as the region reaches, their values, and the slopes between them.
 
-    def _go_far(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
-        """Go some share of the way to far ends (n, contributor), if it gains: which did (n,). Of measured parts it is those at
-        the end, whatever the share."""
-        there = searches.own[:, None] + SHARES[:, None] * (ends - searches.own)[:, None]
+        Points (n, candidate, contributor) are those along each contributor, and along `directions` (direction, contributor),
+        in both senses. Slopes are (n, contributor), by the differences along contributors.
+        """
+        steps = step[:, None, None] * np.vstack([self._compass, -self._compass, directions, -directions])
+        n, count, width = steps.shape
+        points, flat = np.repeat(searches.point, count, axis=0), steps.reshape(-1, width)
+        candidates = (points + self._region.reach(points, flat)[:, None] * flat).reshape(n, count, width)
+        values = searches.values_at(candidates, self._evaluation)
+        up, down = slice(0, len(self._compass)), slice(len(self._compass), 2 * len(self._compass))
+        distances = (candidates[:, up] - candidates[:, down])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rise = np.where(distances > 0, (values[:, up] - values[:, down]) / distances, 0.0)
+        slopes = np.zeros_like(searches.point)
+        slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
+        return candidates, values, slopes
+
+    def _move_towards(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
+        """Move a share of the way to far ends (n, contributor), if that gains enough. Return which searches moved, (n,).
+
+        Measured parts are always those at the far end: between their rows there is nothing.
+        """
+        candidates = searches.point[:, None] + END_SHARES[:, None] * (ends - searches.point)[:, None]
         fixed = np.setdiff1d(self._region.varies, self._region.moves)
-        there[:, :, fixed] = ends[:, None, fixed]
-        return searches.move(there, searches.worth(there, self._evaluate), self._least(searches))
+        candidates[:, :, fixed] = ends[:, None, fixed]
+        return searches.move(candidates, searches.values_at(candidates, self._evaluation), self._min_gain(searches))

@@ -1,15 +1,17 @@
-"""Bounds of measures over all that drawings allow, in the linear model: beyond them lies no pose free of penetration.
+"""Bounds of measures over all that drawings allow, in the linear model: no pose free of penetration lies beyond.
 
-Whatever an objective makes of contact, gaps are open at the corrected pose, and two-sided locators hold where forces press. So
-the largest value of a measure over all deviations and all such poses is a linear program, whose zones are cut out by tangents
-(Kelley, 1960): each round bounds the measure from outside. This is the worst case with float of fasteners. Where only the
-objective holds a part, such as one that contact may lift without end, it says nothing: the bound is infinite.
+With any objective, gaps are open at the corrected pose, and two-sided locators hold where forces press. So the largest value
+of a measure over all deviations and all these poses is a linear program. Its zones are cut out by tangents (Kelley, 1960), and
+each round bounds the measure from outside. This is the worst case with float of fasteners. Where only the objective holds a
+part, for instance a part that contact may lift without limit, the bound is infinite.
 
 The objective "all points" has the same quadratic term everywhere. There the optimality conditions join the program, with a
 binary number for each row that may carry or be open; HiGHS bounds that, too, when its time is up.
 
-To first order in deviations and motions; pairs of round faces have no rows, which only widens the bounds.
+To first order in deviations and motions. Pairs of round faces have no rows, which only widens the bounds.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import Bounds, LinearConstraint, milp
@@ -19,114 +21,135 @@ from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.linear_model import LinearModel
 from tolcontact.compilation import Program
 
-ROUNDS = 30
+MAX_ROUNDS = 30
 SLACK = 1e-7  # of a zone's width
-MOST_BINARY, SECONDS = 64, 30.0  # rows that may carry or be open; time for one bound
+MAX_BINARY, MAX_SECONDS = 64, 30.0  # rows that may carry or be open; time for one bound
+MAX_CONDITION = 1e8  # of the objective's quadratic term: contact points with a larger one do not hold all freedoms
 
 
 def farthest_poses(program: Program, region: Region, model: LinearModel) -> np.ndarray:
-    """Bounds (measure, state, end); those of the raw state are without contact."""
-    found = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
-    carrying = _Optimality(model, region) if program.method.objective == "all points" else None
+    """Return bounds (measure, state, end); those of the raw state are without contact."""
+    bounds = np.empty((len(model.measures), len(terms.STATES), len(terms.ENDS)))
+    reactions = _reactions(model, region) if program.method.objective == "all points" else None
     for measure in range(len(model.measures)):
         for end, sense in enumerate(terms.SENSES):
-            raw = _Problem(model, region, measure, sense, is_moved=False, carrying=None)
-            moved = _Problem(model, region, measure, sense, is_moved=True, carrying=carrying)
-            found[measure, :, end] = [model.measures[measure] + sense * each.bound() for each in (raw, moved)]
-    return found
+            raw = _Problem(model, region, measure, sense, is_moved=False, reactions=None)
+            moved = _Problem(model, region, measure, sense, is_moved=True, reactions=reactions)
+            bounds[measure, :, end] = [model.measures[measure] + sense * problem.bound() for problem in (raw, moved)]
+    return bounds
 
 
-class _Optimality:
-    """What the objective "all points" adds: reactions, and how large they and gaps can be.
+@dataclass(frozen=True, eq=False)
+class _Reactions:
+    """What the optimality conditions of the objective "all points" need.
 
-    Is `usable` if some motion opens all gaps at once, and contact points hold all freedoms.
+    hessian           (freedom, freedom) of the objective
+    largest_gap       (row,) bound of each gap at a corrected pose [mm]
+    largest_reaction  (row,) bound of each reaction
     """
 
-    def __init__(self, model: LinearModel, region: Region) -> None:
-        A = model.gaps_by_motion
-        self.hessian = 2 * model.displacements.T @ model.displacements
-        self.usable = 0 < len(A) <= MOST_BINARY and not model.round_pairs and np.linalg.cond(self.hessian) < 1e8
-        if not self.usable:
-            return
-        # The motion d of least energy that opens all gaps by 1: the dual of a small QP, as a linear program is enough here.
-        freedoms = A.shape[1]
-        lift = milp(
-            np.r_[np.zeros(freedoms), np.ones(freedoms)],
-            constraints=[
-                LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
-                LinearConstraint(np.hstack([np.eye(freedoms), np.eye(freedoms)]), 0.0, np.inf),
-                LinearConstraint(np.hstack([-np.eye(freedoms), np.eye(freedoms)]), 0.0, np.inf),
-            ],
-            bounds=Bounds(-np.inf, np.inf),
-        )
-        if not lift.success:
-            self.usable = False
-            return
-        d = lift.x[:freedoms]
-        energy = float(np.sqrt(d @ self.hessian @ d))
-        slopes = region.slopes(model.gaps_by_deviations)
-        middle, half = (region.lower + region.upper) / 2, (region.upper - region.lower) / 2
-        lowest = model.gaps + slopes @ middle - np.abs(slopes) @ half
-        highest = model.gaps + slopes @ middle + np.abs(slopes) @ half
-        deepest = max(float(-lowest.min()), 0.0)
-        # The corrected motion has no more energy than `deepest` d, which opens all gaps; its reactions sum to as much.
-        reach = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(self.hessian), A)) * deepest * energy
-        self.gap = np.maximum(highest + reach, 1e-9)
-        self.reaction = np.full(len(A), max(deepest, 1e-9) * energy**2)
+    hessian: np.ndarray
+    largest_gap: np.ndarray
+    largest_reaction: np.ndarray
+
+
+def _reactions(model: LinearModel, region: Region) -> _Reactions | None:
+    """Return bounds of gaps and reactions.
+
+    There are none if there are too many rows, if contact points do not hold all freedoms, or if no motion opens all gaps.
+    """
+    A, hessian = model.gaps_by_motion, 2 * model.displacements.T @ model.displacements
+    if not 0 < len(A) <= MAX_BINARY or model.round_pairs or np.linalg.cond(hessian) >= MAX_CONDITION:
+        return None
+    # A motion d that opens all gaps by 1, with the least sum of |d|: one of nearly the least energy is as good.
+    freedoms, eye = A.shape[1], np.eye(A.shape[1])
+    lift = milp(
+        np.r_[np.zeros(freedoms), np.ones(freedoms)],
+        constraints=[
+            LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
+            LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
+            LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
+        ],
+        bounds=Bounds(-np.inf, np.inf),
+    )
+    if not lift.success:
+        return None
+    d = lift.x[:freedoms]
+    energy = float(np.sqrt(d @ hessian @ d))
+    slopes = region.slopes(model.gaps_by_deviations)
+    middle, half = (region.lower + region.upper) / 2, (region.upper - region.lower) / 2
+    lowest = model.gaps + slopes @ middle - np.abs(slopes) @ half
+    highest = model.gaps + slopes @ middle + np.abs(slopes) @ half
+    deepest = max(float(-lowest.min()), 0.0)
+    # The corrected motion has no more energy than `deepest` d, which opens all gaps; its reactions sum to as much.
+    opening = np.sqrt(np.einsum("ij,jk,ik->i", A, np.linalg.inv(hessian), A)) * deepest * energy
+    return _Reactions(hessian, np.maximum(highest + opening, 1e-9), np.full(len(A), max(deepest, 1e-9) * energy**2))
 
 
 class _Problem:
-    """The largest sense * (measure - nominal) over own deviations x, motions y, and (reactions r, binaries b)."""
+    """The largest sense * (measure - nominal) over points x of the region and motions y.
+
+    With `reactions`, also over reactions r, and over binaries b of rows that carry (1) or are open (0).
+    """
 
     def __init__(
-        self, model: LinearModel, region: Region, measure: int, sense: int, *, is_moved: bool, carrying: _Optimality | None
+        self, model: LinearModel, region: Region, measure: int, sense: int, *, is_moved: bool, reactions: _Reactions | None
     ) -> None:
         self._region = region
         contributors = len(region.lower)
         freedoms = model.by_motion.shape[1] if is_moved else 0
-        binaries = len(model.gaps) if is_moved and carrying is not None and carrying.usable else 0
+        binaries = 0 if reactions is None else len(model.gaps)
         self._width = contributors + freedoms + 2 * binaries
-        goal = np.zeros(self._width)
-        goal[:contributors] = sense * region.slopes(model.by_deviations[measure])
-        goal[contributors : contributors + freedoms] = sense * model.by_motion[measure, :freedoms]
-        self._goal = goal
+        self._goal = np.zeros(self._width)
+        self._goal[:contributors] = sense * region.slopes(model.by_deviations[measure])
+        self._goal[contributors : contributors + freedoms] = sense * model.by_motion[measure, :freedoms]
         self._integer = np.r_[np.zeros(self._width - binaries), np.ones(binaries)]
         lower, upper = np.full(self._width, -np.inf), np.full(self._width, np.inf)
         lower[:contributors], upper[:contributors] = region.lower, region.upper
+        if reactions is not None:
+            lower[-2 * binaries :], upper[-2 * binaries :] = 0.0, np.r_[reactions.largest_reaction, np.ones(binaries)]
+        self._bounds = Bounds(lower, upper)
         self._constraints: list[LinearConstraint] = []
         if freedoms:
-            gaps = np.hstack([region.slopes(model.gaps_by_deviations), model.gaps_by_motion])
-            self._add(gaps, -model.gaps, np.inf)
-            self._add(np.hstack([np.zeros((len(model.held), contributors)), model.held]), 0.0, 0.0)
-        if binaries and carrying is not None:
-            eye, none = np.eye(binaries), np.zeros((binaries, binaries))
-            lower[-2 * binaries :], upper[-2 * binaries :] = 0.0, np.r_[carrying.reaction, np.ones(binaries)]
-            stationary = np.hstack([np.zeros((freedoms, contributors)), carrying.hessian, -model.gaps_by_motion.T])
-            self._add(stationary, 0.0, 0.0)
-            # A row carries (1), or is open (0).
-            self._add(np.hstack([np.zeros_like(gaps), eye, -carrying.reaction * eye]), -np.inf, 0.0)
-            self._add(np.hstack([gaps, none, carrying.gap * eye]), -np.inf, carrying.gap - model.gaps)
-        self._bounds = Bounds(lower, upper)
+            self._add_contact(model)
+        if reactions is not None:
+            self._add_optimality(model, reactions)
+
+    def _add_contact(self, model: LinearModel) -> None:
+        """Keep gaps open, and two-sided locators where they are."""
+        self._add(np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion]), -model.gaps, np.inf)
+        self._add(np.hstack([np.zeros((len(model.held), len(self._region.lower))), model.held]), 0.0, 0.0)
+
+    def _add_optimality(self, model: LinearModel, reactions: _Reactions) -> None:
+        """Balance the objective's gradient by the reactions; a row carries only if its gap is closed."""
+        gaps = np.hstack([self._region.slopes(model.gaps_by_deviations), model.gaps_by_motion])
+        count, freedoms = model.gaps_by_motion.shape
+        eye, zeros = np.eye(count), np.zeros((count, count))
+        self._add(
+            np.hstack([np.zeros((freedoms, len(self._region.lower))), reactions.hessian, -model.gaps_by_motion.T]), 0.0, 0.0
+        )
+        self._add(np.hstack([np.zeros_like(gaps), eye, -reactions.largest_reaction * eye]), -np.inf, 0.0)
+        self._add(np.hstack([gaps, zeros, reactions.largest_gap * eye]), -np.inf, reactions.largest_gap - model.gaps)
 
     def _add(self, rows: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> None:
-        """Rows (row, variable) of the first variables."""
+        """Add constraints with rows (row, variable) of the first variables."""
         if len(rows):
             self._constraints.append(LinearConstraint(np.pad(rows, ((0, 0), (0, self._width - rows.shape[1]))), lower, upper))
 
     def bound(self) -> float:
-        """An upper bound; infinite if there is none."""
+        """Return an upper bound; infinite if there is none."""
         planes, ends = self._region.planes()
-        least, contributors = np.inf, len(self._region.lower)
-        for _ in range(ROUNDS):
+        bound, contributors = np.inf, len(self._region.lower)
+        for _ in range(MAX_ROUNDS):
             self._add(planes, -np.inf, ends)
-            found = milp(
+            solution = milp(
                 -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
-                options={"time_limit": SECONDS},
+                options={"time_limit": MAX_SECONDS},
             )  # fmt: skip
-            if found.x is None:
+            if solution.x is None:
                 break
-            least = min(least, -float(found.mip_dual_bound if self._integer.any() else found.fun))
-            planes, ends = self._region.planes(found.x[:contributors], SLACK)
+            bound = min(bound, -float(solution.mip_dual_bound if self._integer.any() else solution.fun))
+            planes, ends = self._region.planes(solution.x[:contributors], SLACK)
             if not len(planes):
                 break
-        return least
+        return bound

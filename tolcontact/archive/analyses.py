@@ -1,4 +1,4 @@
-"""What was asked of a model beside its run, kept in the archive: group statistics/NAME."""
+"""Analyses of a model in the archive of its run: each is a group statistics/NAME."""
 
 import os
 import shutil
@@ -15,30 +15,32 @@ from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 
-CHECKED = {variable.name: variable for variable in terms.ANALYZED}
 
-
-def check_room_for(path: str | Path, name: str, program: Program) -> None:
-    """Raise ArchiveError unless an archive is of that model, and has no analysis of that name yet."""
-    real = Path(os.path.realpath(path))
-    if not real.is_file():
+def check_room_for(path: str | Path, record: terms.AnalysisRecord, program: Program) -> None:
+    """Raise ArchiveError unless an archive is of the program's model and does not hold this analysis yet."""
+    archive = Path(os.path.realpath(path))
+    if not archive.is_file():
         raise ArchiveError(f'archive "{path}" does not exist; write one with: tolcontact run MODEL.py --out {path}')
-    inspect(real)
-    with opened_locked(real, "r") as file:
-        check_same_model(file, real, program)
-        if terms.ANALYSES in file.groups and name in file[terms.ANALYSES].groups:
-            raise ArchiveError(f'"{path}" has {terms.ANALYSES}/{name} already, which is not replaced; choose another archive')
+    inspect(archive)
+    with opened_locked(archive, "r") as file:
+        check_same_model(file, archive, program)
+        if terms.ANALYSES_GROUP in file.groups and record.name in file[terms.ANALYSES_GROUP].groups:
+            group = f"{terms.ANALYSES_GROUP}/{record.name}"
+            raise ArchiveError(f'"{path}" already has {group}, which is not replaced; choose another archive')
 
 
-def keep(path: str | Path, name: str, found: xr.Dataset, program: Program) -> None:
-    """Add an analysis to an archive of the same model; see check_room_for. The file is as it was until all of it is written."""
-    with taken(path, resume=True) as real:
-        check_room_for(real, name, program)
-        with replacing(real) as part:
-            shutil.copyfile(real, part)
-            stored = found.copy()
-            for variable in stored.variables.values():
-                variable.encoding = {"dtype": "S1"} if variable.dtype.kind in "UO" else {}
-            for each in stored.data_vars:
-                stored[each].attrs[terms.CHECKSUM] = crc32(CHECKED[str(each)], stored[each].values)
-            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES}/{name}", engine="netcdf4")
+def keep(path: str | Path, record: terms.AnalysisRecord, dataset: xr.Dataset, program: Program) -> None:
+    """Add an analysis to an archive of the same model (see `check_room_for`).
+
+    The file is replaced only when all of the new one is written.
+    """
+    with taken(path, resume=True) as archive:
+        check_room_for(archive, record, program)
+        with replacing(archive) as part:
+            shutil.copyfile(archive, part)
+            stored = dataset.copy()
+            for array in stored.variables.values():
+                array.encoding = {"dtype": "S1"} if array.dtype.kind in "UO" else {}
+            for variable in record.variables:
+                stored[variable.name].attrs[terms.CHECKSUM] = crc32(variable, stored[variable.name].values)
+            stored.to_netcdf(part, mode="a", group=f"{terms.ANALYSES_GROUP}/{record.name}", engine="netcdf4")

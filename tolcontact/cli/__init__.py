@@ -57,26 +57,9 @@ netCDF with `--out`.
 (True, 0)
 """
 
-from tolcontact.cli import (
-    allocate,
-    bodies,
-    check,
-    compare,
-    contributions,
-    faces,
-    new,
-    relocate,
-    report,
-    run,
-    sensitivities,
-    summary,
-    tails,
-    view,
-    worst,
-)
+from tolcontact.cli import analyses, bodies, check, compare, faces, new, report, run, summary, view
 from tolcontact.cli.app import command_line, main
 
 __all__ = [
-    "allocate", "bodies", "check", "command_line", "compare", "contributions", "faces", "main", "new", "relocate", "report",
-    "run", "sensitivities", "summary", "tails", "view", "worst",
+    "analyses", "bodies", "check", "command_line", "compare", "faces", "main", "new", "report", "run", "summary", "view",
 ]  # fmt: skip

@@ -39,22 +39,9 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 
 from tolcontact.report.figures import grouped
 from tolcontact.report.html import write_comparison, write_page, write_view
-from tolcontact.report.text import (
-    allocation_text,
-    capability_text,
-    comparison_text,
-    contributions_text,
-    population_text,
-    relocation_text,
-    runs_text,
-    sensitivities_text,
-    summary_text,
-    tails_text,
-    worst_case_text,
-)
+from tolcontact.report.text import analysis_text, capability_text, comparison_text, population_text, runs_text, summary_text
 
 __all__ = [
-    "allocation_text", "capability_text", "comparison_text", "contributions_text", "grouped", "population_text",
-    "relocation_text", "runs_text", "sensitivities_text", "summary_text", "tails_text", "worst_case_text",
+    "analysis_text", "capability_text", "comparison_text", "grouped", "population_text", "runs_text", "summary_text",
     "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

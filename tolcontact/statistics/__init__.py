@@ -74,7 +74,6 @@ each point.
 ('vertex',)
 """
 
-from tolcontact.statistics.archived_analysis import kept_analysis
 from tolcontact.statistics.contact import TouchingShares, touching
 from tolcontact.statistics.fields import BlockSums, DisplacementFields
 from tolcontact.statistics.measure_statistics import STATISTICS, limits
@@ -83,6 +82,6 @@ from tolcontact.statistics.summary import Summary, estimate_of, summarize
 
 __all__ = [
     "STATISTICS",
-    "BlockSums", "DisplacementFields", "Summary", "TouchingShares", "compare_runs", "estimate_of", "kept_analysis", "limits",
+    "BlockSums", "DisplacementFields", "Summary", "TouchingShares", "compare_runs", "estimate_of", "limits",
     "summarize", "touching",
 ]  # fmt: skip

@@ -1,15 +1,9 @@
 """Every name of archives, summaries and comparisons, once, with its units."""
 
-from tolcontact.vocabulary.allocation import *  # noqa: F403
 from tolcontact.vocabulary.analyses import *  # noqa: F403
 from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)
-from tolcontact.vocabulary.contributions import *  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
-from tolcontact.vocabulary.relocation import *  # noqa: F403
-from tolcontact.vocabulary.sensitivities import *  # noqa: F403
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surfaces import *  # noqa: F403
-from tolcontact.vocabulary.tails import *  # noqa: F403
 from tolcontact.vocabulary.variable import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.variation import *  # noqa: F403
-from tolcontact.vocabulary.worst_case import *  # noqa: F403

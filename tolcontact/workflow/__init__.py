@@ -77,53 +77,7 @@ intervals narrow; others as independent ones.
 `tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside
 of every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
 
-`tc.contributions` says which contributors the variance of each measure comes from: Sobol' indices, which hold with contact,
-beside the classical linear percentages, which do not: here contact leaves nothing of what the locators below do.
-
->>> shares = tc.contributions(assembly, samples=1024, solver="daqp").sel(measure="height")
->>> bool(shares.total.sel(state="raw", interval="estimate").max() > 0.5)
-True
->>> bool(shares.missed.sel(state="corrected", interval="estimate") > 0.5)  # of the variance, by linear sensitivities
-True
-
-`tc.sensitivities` gives the derivatives of each measure by each contributor, realization by realization, through contact: their
-means, spreads, and what they are where contact moved parts and where not.
-
->>> slopes = tc.sensitivities(assembly, samples=100, solver="daqp").sel(measure="height")
->>> bool(abs(slopes.by_contact.sel(contact="touched", interval="estimate")).max() < 0.01)  # the block lies flat on the table
-True
-
-`tc.worst_case` searches all that the drawings allow for the least and the largest value of each measure, with the combination
-of deviations that gives them, and bounds them: no pose free of penetration lies beyond, to first order. Where contact alone
-does not hold a part, as on a table from above, there is no such bound.
-
->>> worst = tc.worst_case(assembly, samples=256, solver="daqp").sel(measure="height")
->>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
-(True, -0.0)
-
-`tc.tails` estimates what is too rare to be counted, that a measure is outside its limits or parts do not go together, by
-subset simulation: some ten thousand realizations tell probabilities of 1e-6 or less within a few tenths of them.
-
->>> far = tc.Assembly("far")
->>> bar = far.part("bar", tc.Box(50, 25, 10))
->>> location = far.locate(bar, tc.three_two_one(bar.face("-z"), bar.face("-y"), bar.face("-x")), tolerance=0.6)
->>> end = far.measure("end", bar.point(50, 12.5, 10), along="x", limits=(None, 0.5))
->>> _, lower, upper = tc.tails(far, samples=20_000).probability.sel(event="end outside limits").values
->>> bool(0 < lower < upper < 1e-3)
-True
-
-`tc.allocate` widens and narrows ranges until what is required of measures, a share outside of their limits or a Ppk, is kept at
-least cost, and says which range to tighten first.
-
->>> given = tc.allocate(far, "end: ppm 20000", by="part", samples=1024)
->>> bool(given.cost.sum("group").sel(stage="after") < given.cost.sum("group").sel(stage="before"))
-True
-
-`tc.relocate` looks for the place of a locator, within a box, where a measure varies least: here as far out as it may be.
-
->>> moved = tc.relocate(assembly, "block.A3", between=((0, 25, 0), (50, 25, 0)), least="height: 6 sigma", samples=256)
->>> moved.point.sel(stage="before").values.tolist(), moved.sizes["trial"] > 9
-([25.0, 25.0, 0.0], True)
+`tolcontact.analyses` has the analyses of a model beside its run.
 
 What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
 

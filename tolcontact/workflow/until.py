@@ -2,15 +2,14 @@
 
 import logging
 import math
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
 from tolcontact.archive import opened
 from tolcontact.compilation import Program
-from tolcontact.errors import OptionError
 from tolcontact.simulation import block_rows
 from tolcontact.statistics import STATISTICS, estimate_of
+from tolcontact.statistics.question import HALF_WIDTH, Question
 from tolcontact.vocabulary import OUTSIDE, PPM
 
 log = logging.getLogger(__name__)
@@ -18,10 +17,7 @@ log = logging.getLogger(__name__)
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
 MARGIN = 1.05  # times the realizations that the interval seems to need
 MAX_REALIZATIONS = 100_000_000
-_PATTERN = re.compile(
-    r"(?P<measure>.+): *(?P<statistic>.+?) *(?:\+-|±) *(?P<half>[0-9.]+(?:[eE][+-]?[0-9]+)?) *(?P<percent>%)?"
-)
-_STATISTIC_NAMES = {PPM: OUTSIDE}
+EXAMPLES = ("corner height: 6 sigma +-1 %", "gap: mean +-0.001")
 
 
 @dataclass(frozen=True)
@@ -31,6 +27,7 @@ class Target:
     half  in the units of the measure, or as a fraction of the estimate if `is_relative`
     """
 
+    question: Question
     measure: str
     statistic: str
     half: float
@@ -38,29 +35,15 @@ class Target:
 
     @classmethod
     def of(cls, text: str) -> "Target":
-        """Parse "corner height: 6 sigma +-1 %", "gap: mean +-0.001" or "gap: ppm +-20 %".
-
-        Raises OptionError for other texts.
-        """
-        match = _PATTERN.fullmatch(text.strip()) if isinstance(text, str) else None
-        if match is None or not float(match["half"]) > 0:
-            raise OptionError(
-                f'until is {text!r}; expected a text such as "corner height: 6 sigma +-1 %" or "gap: mean +-0.001"'
-            )
-        statistic = _STATISTIC_NAMES.get(match["statistic"], match["statistic"])
-        if statistic not in STATISTICS:
-            names = ", ".join([PPM, *STATISTICS])
-            raise OptionError(f'until has "{match["statistic"]}"; expected one of: {names}')
-        half = float(match["half"])
-        if match["percent"]:
-            return cls(match["measure"], statistic, half / 100, True)
-        return cls(match["measure"], statistic, half * (1e-6 if match["statistic"] == PPM else 1.0), False)
+        """Return the target "corner height: 6 sigma +-1 %" or "gap: ppm +-20 %". Raises OptionError for other texts."""
+        question = Question.parse(text, "until", statistics=(PPM, *STATISTICS), form=HALF_WIDTH, examples=EXAMPLES)
+        is_ppm = question.statistic == PPM
+        half = question.value / 100 if question.is_percent else question.value * (1e-6 if is_ppm else 1.0)
+        return cls(question, question.measure, OUTSIDE if is_ppm else question.statistic, half, question.is_percent)
 
     def check(self, program: Program) -> None:
         """Raise OptionError if the model has no such measure."""
-        measures = [measure.name for measure in program.nominal.measures]
-        if self.measure not in measures:
-            raise OptionError(f'until has the measure "{self.measure}"; expected one of: {", ".join(measures)}')
+        self.question.number_of([measure.name for measure in program.nominal.measures])
 
     def next(self, path: Path, program: Program) -> int | None:
         """Return the number of realizations that the archive should have next.

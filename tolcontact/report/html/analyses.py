@@ -1,4 +1,4 @@
-"""What a page shows of the analyses that its archive keeps: contributions as bars, the others as tables."""
+"""Analyses of an archive on its page: contributions as bars, the others as tables."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -7,67 +7,47 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.report.figures import grouped
-from tolcontact.report.text.allocation import allocation_tables
-from tolcontact.report.text.relocation import relocation_table
-from tolcontact.report.text.sensitivities import LEVERAGE_COLUMNS, SENSITIVITY_COLUMNS, leverage_rows, sensitivity_rows
-from tolcontact.report.text.tails import TAIL_COLUMNS, tail_rows
-from tolcontact.report.text.worst_case import WORST_COLUMNS, worst_remarks, worst_rows
-from tolcontact.statistics import kept_analysis
+from tolcontact.report.analysis_tables import analysis_report, archived_analysis
 
-MOST = 15  # bars of a chart
+MAX_BARS = 15  # of a chart
+CASES_NOTE = "The corrected ones are the first of the single realizations above."
 
 
 def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:
-    """For each measure its groups, the largest total index first, with total and first-order shares of both states."""
-    found = kept_analysis(results, terms.OF_CONTRIBUTIONS)
-    return [] if found is None else [_shares(found.sel(measure=measure)) for measure in found["measure"].values]
+    """Return total and first-order shares of each measure's groups, in both states, the largest total share first."""
+    dataset = archived_analysis(results, terms.CONTRIBUTIONS)
+    return [] if dataset is None else [_shares(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
 
 
 def tables_of(results: xr.DataTree) -> Iterator[dict[str, Any]]:
-    """Sensitivities, worst cases, rare events and allocation, with titles, columns and rows; some with remarks below."""
-    slopes = kept_analysis(results, terms.OF_SENSITIVITIES)
-    if slopes is not None:
-        count = grouped(slopes.attrs["realizations"])
-        for measure in slopes["measure"].values:
-            rows, _ = sensitivity_rows(slopes.sel(measure=measure))
-            yield {"title": f"Sensitivities of {measure}, {count} realizations", "columns": SENSITIVITY_COLUMNS, "rows": rows}
-        if rows := leverage_rows(slopes):
-            yield {"title": "Leverage of locators", "columns": LEVERAGE_COLUMNS, "rows": rows}
-    worst = kept_analysis(results, terms.OF_WORST_CASE)
-    if worst is not None:
-        for measure in worst["measure"].values:
-            of = worst.sel(measure=measure)
-            title = f"Worst cases of {measure} [{of['measure_units'].values}], the first of the single realizations above"
-            yield {"title": title, "columns": WORST_COLUMNS, "rows": list(worst_rows(of)), "remarks": list(worst_remarks(of))}
-    rare = kept_analysis(results, terms.OF_TAILS)
-    if rare is not None:
-        yield {"title": "Rare events", "columns": TAIL_COLUMNS, "rows": tail_rows(rare)}
-    allocation = kept_analysis(results, terms.OF_ALLOCATION)
-    if allocation is not None:
-        for title, columns, rows in allocation_tables(allocation):
-            yield {"title": title, "columns": columns, "rows": rows}
-
-    relocation = kept_analysis(results, terms.OF_RELOCATION)
-    if relocation is not None:
-        columns, rows = relocation_table(relocation)
-        yield {"title": "Place of a locator", "columns": columns, "rows": rows}
+    """Yield the tables of all other analyses, with titles, columns, rows, and remarks below."""
+    for record in terms.ANALYSES.values():
+        dataset = archived_analysis(results, record)
+        if dataset is None:
+            continue
+        report = analysis_report(record, dataset)
+        notes = [f"{report.count}. {' '.join(report.notes)}", *([CASES_NOTE] if record is terms.WORST_CASE else [])]
+        for table in report.tables:
+            if not table.is_detail:
+                title = f"{report.name}: {table.title}" if table.title else report.name
+                yield {"title": title, "columns": table.columns, "rows": table.rows, "remarks": [*table.remarks, *notes]}
+                notes = []
 
 
-def _shares(of: xr.Dataset) -> dict[str, Any]:
-    total = of[terms.TOTAL].sel(interval="estimate")
-    order = np.argsort(-np.nan_to_num(total.max("state").values), kind="stable")[:MOST]
+def _shares(dataset: xr.Dataset) -> dict[str, Any]:
+    total = dataset["total"].sel(interval="estimate")
+    order = np.argsort(-np.nan_to_num(total.max("state").values), kind="stable")[:MAX_BARS]
     states = [
-        {word: [_finite(of[word].values[state, k]) for k in order] for word in (terms.FIRST, terms.TOTAL)}
+        {word: [_percents(dataset[word].values[state, k]) for k in order] for word in ("first", "total")}
         for state in range(len(terms.STATES))
     ]
     return {
-        "measure": str(of["measure"].values),
-        "groups": [str(of["group"].values[k]) for k in order],
+        "measure": str(dataset["measure"].values),
+        "groups": [str(dataset["group"].values[k]) for k in order],
         "states": states,
-        "linear": [_finite(of[terms.LINEAR].values[k, None])[0] for k in order],
+        "linear": _percents(dataset["linear"].values[order]),
     }
 
 
-def _finite(values: np.ndarray) -> list[float | None]:
-    return [100 * float(value) if np.isfinite(value) else None for value in values]
+def _percents(shares: np.ndarray) -> list[float | None]:
+    return [100 * float(share) if np.isfinite(share) else None for share in shares]

@@ -6,11 +6,12 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, marks_of
 from tolcontact.report.html.decimation import allowed, coarser
 from tolcontact.report.html.packed_array import Packed, packed
 from tolcontact.report.html.shown_realizations import Shown
-from tolcontact.statistics import kept_analysis, touching
+from tolcontact.statistics import touching
 
 Drawn = dict[str, Any]
 
@@ -71,7 +72,7 @@ def _realizations(results: xr.DataTree, shown: list[Shown]) -> Drawn:
     back = np.empty(len(order), dtype=int)
     back[order] = np.arange(len(order))
     rows = results.to_dataset().isel({terms.REALIZATION: np.array([each.row for each in shown], dtype=int)[order]})
-    worst = kept_analysis(results, terms.OF_WORST_CASE)
+    worst = archived_analysis(results, terms.WORST_CASE)
     names = [] if worst is None else [f"worst case: {case}" for case in worst[terms.CASE].values]
 
     def of(variable: terms.ArchiveVariable) -> np.ndarray:

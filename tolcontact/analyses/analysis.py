@@ -1,0 +1,102 @@
+"""What all analyses have in common: checks before any simulation, the dataset that is returned, and its place in an archive."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.archive import check_room_for, keep
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
+from tolcontact.simulation.cluster import mapping
+from tolcontact.workflow.models import Choice, Model, check_counts, program_of
+
+SPREAD_SAMPLES = 1 << 14  # realizations that the spreads of contributors are estimated from
+
+
+class Analysis:
+    """One analysis of one model. Nothing is simulated before all of its options are checked.
+
+    Raises ModelError, ArchiveError, OptionError for arguments that cannot be used.
+    """
+
+    def __init__(
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
+        method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
+    ) -> None:  # fmt: skip
+        check_counts(samples=samples, seed=seed)
+        self.record, self.samples, self.seed, self.progress = record, samples, seed, progress
+        self.program = program_of(model, solver, method)
+        self.blocks = mapping(client)
+        self._into = into
+        if into is not None:
+            check_room_for(into, record, self.program)
+
+    @property
+    def assembly(self) -> str:
+        """The name of the assembly."""
+        return self.program.nominal.assembly.name
+
+    def engine(self, total: int | None = None) -> Engine:
+        """Return an engine that reports its progress if there is a `total` of realizations."""
+        return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
+
+    def sampled_deviations(self) -> np.ndarray:
+        """Return deviations (n, contributor) of enough realizations to estimate spreads."""
+        return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
+
+    def check_varies(self, varies: object) -> None:
+        """Raise OptionError if nothing varies."""
+        if not varies:
+            raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')
+
+    def dataset(
+        self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
+    ) -> xr.Dataset:
+        """Return the dataset of the analysis, and add it to the archive if there is one.
+
+        values      array for each variable of the record
+        labels      labels of dimensions that neither the vocabulary nor the model knows
+        units       units of the only measure, where no dimension lists measures
+        attributes  beside the title, the seed and the method
+        """
+        arrays = {v.name: v.entry(np.array(values[v.name])) for v in self.record.variables}
+        dataset = xr.Dataset(
+            arrays,
+            coords=self._coordinates(labels) | ({} if units is None else {"measure_units": ((), units)}),
+            attrs={
+                "title": self.record.title.format(assembly=self.assembly, **attributes),
+                **attributes,
+                "seed": self.seed,
+                "solver": self.program.plugin.name,
+                "resolution": self.program.method.resolution,
+                "objective": self.program.method.objective,
+            },
+        )
+        if self._into is not None:
+            keep(self._into, self.record, dataset, self.program)
+        return dataset
+
+    def _coordinates(self, labels: Mapping[str, Sequence[str]]) -> dict[str, Any]:
+        nominal, contributors = self.program.nominal, self.program.draws.contributors
+        units = {
+            terms.MEASURE: {measure.name: measure.units for measure in nominal.measures},
+            terms.CONTRIBUTOR: {contributor.label: contributor.units for contributor in contributors},
+        }
+        known = {
+            **terms.FIXED_LABELS,
+            terms.MEASURE: list(units[terms.MEASURE]),
+            terms.CONTRIBUTOR: list(nominal.contributors),
+            terms.PART: [part.name for part in nominal.parts],
+            terms.PAIR: [pair.name for pair in nominal.pairs],
+            **labels,
+        }
+        coordinates: dict[str, Any] = {dim: list(known[dim]) for dim in self.record.dims if dim in known}
+        for dim in units:
+            if self.record.has_units_of(dim):
+                coordinates[f"{dim}_units"] = (dim, [units[dim][label] for label in coordinates[dim]])
+        return coordinates

@@ -1,0 +1,62 @@
+"""The engine of all analyses: it simulates realizations in blocks, gathers what is observed and counts statuses."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from tolcontact import vocabulary as terms
+from tolcontact.analyses.designs import Design
+from tolcontact.compilation import Program
+from tolcontact.simulation import Block, outcomes
+from tolcontact.simulation.cluster import MapBlocks
+from tolcontact.simulation.threads import Sampler
+from tolcontact.variation import GivenDraws
+
+Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
+Observer = Callable[[Block], tuple[Any, ...]]  # gives arrays of a block; the last one is the statuses (n,)
+
+
+class Engine:
+    """Simulations of a program.
+
+    statuses  (status_meaning,) int: number of realizations simulated so far, by their status
+    total     number of realizations that `progress` refers to
+    """
+
+    def __init__(self, program: Program, blocks: MapBlocks, *, progress: Progress | None = None, total: int = 0) -> None:
+        self.program = program
+        self.statuses = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
+        self._blocks, self._progress, self._total = blocks, progress, total
+
+    @property
+    def unresolved(self) -> int:
+        """The number of realizations so far that were not resolved."""
+        return int(self.statuses[list(terms.UNRESOLVED)].sum())
+
+    def simulate(
+        self, samples: int, *, seed: int = 0, start: int = 0, draws: Sampler | None = None, observe: Observer = outcomes
+    ) -> tuple[np.ndarray, ...]:
+        """Simulate `samples` realizations from number `start` on, and return what `observe` gives of all blocks, joined.
+
+        By default these are measures (n, state, measure) and statuses (n,). `draws` replaces the draws of the program.
+        """
+        observed = []
+        for arrays in self._blocks(observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws):
+            observed.append(arrays)
+            self.statuses += np.bincount(arrays[-1], minlength=len(self.statuses))
+            if self._progress:
+                self._progress(min(int(self.statuses.sum()), self._total), self._total)
+        return tuple(np.concatenate(column) for column in zip(*observed, strict=True))
+
+    def simulate_deviations(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return measures (n, state, measure) and statuses (n,) of deviations (n, contributor)."""
+        measured, status = self.simulate(len(deviations), draws=GivenDraws(deviations))
+        return measured, status
+
+    def simulate_design(
+        self, design: Design, samples: int, *, seed: int, observe: Observer = outcomes
+    ) -> tuple[np.ndarray, ...]:
+        """Return what `observe` gives of `samples` base realizations of a design, as arrays (base, realization, ...)."""
+        arrays = self.simulate(samples * design.size, seed=seed, draws=design, observe=observe)
+        return tuple(array.reshape(samples, len(array) // samples, *array.shape[1:]) for array in arrays)

@@ -1,0 +1,52 @@
+"""Groups of contributors: columns of deviations by contributor, feature or part."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tolcontact.compilation import Program
+from tolcontact.errors import OptionError
+from tolcontact.variation.draws import Draws
+from tolcontact.vocabulary import GROUPED_BY
+
+
+def check_grouping(by: str) -> None:
+    """Raise OptionError for a grouping that does not exist."""
+    if by not in GROUPED_BY:
+        raise OptionError(f"by is {by!r}; expected one of: {', '.join(GROUPED_BY)}")
+
+
+def owners(program: Program, by: str) -> list[str]:
+    """Return the owner of each column of the deviations: its contributor, feature or part."""
+    nominal, labels = program.nominal, list(program.nominal.contributors)
+    if by == "contributor":
+        return labels
+    # Locators belong to the part that they locate, even if `by` is "feature".
+    owner_of = {label: part.name for part in nominal.parts for label in part.locators.labels}
+    for feature in nominal.features:
+        owner_of |= dict.fromkeys(feature.labels, feature.feature.part.name if by == "part" else feature.label)
+    return [owner_of.get(label, label) for label in labels]
+
+
+def independent_groups(draws: Draws, owners: Sequence[str], *, correlated: bool = True) -> dict[str, np.ndarray]:
+    """Return columns by owner, with owners joined whose columns are drawn together, so that groups are independent.
+
+    Without `correlated`, groups that are correlated by declaration stay apart.
+    """
+    leader = list(range(len(owners)))
+
+    def find(column: int) -> int:
+        while leader[column] != column:
+            column = leader[column]
+        return column
+
+    first_column: dict[str, int] = {}
+    joined = [[first_column.setdefault(owner, column), column] for column, owner in enumerate(owners)]
+    for columns in [*joined, *draws.dependent(correlated=correlated)]:
+        for column in columns[1:]:
+            lower, upper = sorted((find(int(columns[0])), find(int(column))))
+            leader[upper] = lower
+    members: dict[int, list[int]] = {}
+    for column in range(len(owners)):
+        members.setdefault(find(column), []).append(column)
+    return {" + ".join(dict.fromkeys(owners[k] for k in columns)): np.array(columns) for columns in members.values()}

@@ -1,0 +1,257 @@
+"""The commands of all analyses, from one table: options that they share are declared once."""
+
+import functools
+import inspect
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.analyses.allocate import allocate
+from tolcontact.analyses.contributions import contributions
+from tolcontact.analyses.relocate import relocate
+from tolcontact.analyses.sensitivities import sensitivities
+from tolcontact.analyses.tails import tails
+from tolcontact.analyses.worst_case import worst_case
+from tolcontact.cli.app import (
+    AsCsv,
+    AsJson,
+    Into,
+    Model,
+    Objective,
+    Quiet,
+    Resolution,
+    Scheduler,
+    Seed,
+    Solver,
+    Workers,
+    app,
+    chosen,
+    examples,
+    only_one,
+    or_,
+)
+from tolcontact.cli.output import console, print_data
+from tolcontact.cli.progress import shown_progress
+from tolcontact.declaration.script import load_model
+from tolcontact.errors import OptionError
+from tolcontact.report import analysis_text
+from tolcontact.simulation.cluster import client_of
+from tolcontact.workflow.models import DEFAULT_SOLVER
+
+SHARED = {  # options of every analysis, with their defaults
+    "seed": (Seed, 1), "solver": (Solver, DEFAULT_SOLVER), "resolution": (Resolution, None), "objective": (Objective, None),
+    "as_json": (AsJson, False), "as_csv": (AsCsv, False), "into": (Into, None), "workers": (Workers, None),
+    "scheduler": (Scheduler, None), "quiet": (Quiet, False),
+}  # fmt: skip
+CORNER = "X,Y,Z"
+REQUIRED = inspect.Parameter.empty
+By = Annotated[str, typer.Option(help=f"How contributors are grouped: {or_(terms.GROUPED_BY)}.")]
+Frame = Callable[[xr.Dataset], Any]
+
+
+@dataclass(frozen=True)
+class AnalysisCommand:
+    """A command that asks one analysis of a model.
+
+    samples    what the number of samples is, for the help text
+    frame      makes the data frame that --csv prints
+    options    options of its own by parameter: their typer annotations, and defaults (REQUIRED: none)
+    arguments  makes arguments of the analysis from these options, where they differ
+    """
+
+    name: str
+    purpose: str
+    analysis: Callable[..., xr.Dataset]
+    record: terms.AnalysisRecord
+    samples: str
+    examples: tuple[str, ...]
+    frame: Frame
+    options: Mapping[str, tuple[Any, Any]] = field(default_factory=dict)
+    arguments: Callable[[dict[str, Any]], dict[str, Any]] = lambda options: options
+
+    def register(self) -> None:
+        """Add the command to the application."""
+        samples = Annotated[int, typer.Option(help=self.samples)]
+        default = inspect.signature(self.analysis).parameters["samples"].default
+        options = {"model": (Model, REQUIRED), **self.options, "samples": (samples, default), **SHARED}
+        command = functools.partial(self._run)
+        command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
+            [
+                inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=annotation, default=default)
+                for name, (annotation, default) in options.items()
+            ]
+        )
+        command.__annotations__ = {}  # type: ignore[attr-defined]
+        app.command(self.name, help=self.purpose, epilog=examples(*self.examples))(command)
+
+    def _run(
+        self, *, model: Path, resolution: str | None, objective: str | None, as_json: bool, as_csv: bool, workers: int | None,
+        scheduler: str | None, quiet: bool, **options: Any,
+    ) -> None:  # fmt: skip
+        only_one(json=as_json, csv=as_csv)
+        arguments = self.arguments(options)
+        with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
+            dataset = self.analysis(
+                functools.partial(load_model, model), method=chosen(resolution=resolution, objective=objective), client=client,
+                progress=show, **arguments,
+            )  # fmt: skip
+        if as_json:
+            print_data(dataset)
+        elif as_csv:
+            typer.echo(self.frame(dataset).to_csv(lineterminator="\n"), nl=False)
+        else:
+            console().print(analysis_text(self.record, dataset))
+
+
+def _intervals(name: str) -> Frame:
+    """Return a maker of frames with the estimates of a variable, and their intervals as columns."""
+    return lambda dataset: dataset[name].to_dataset("interval").to_dataframe()[list(terms.ESTIMATE)]
+
+
+def _columns(names: list[str], dim: str) -> Frame:
+    """Return a maker of frames of variables, with a column for each label of a dimension."""
+
+    def frame(dataset: xr.Dataset) -> Any:
+        values = dataset[names].to_dataframe().unstack(dim)
+        values.columns = [" ".join(column) for column in values.columns]
+        return values
+
+    return frame
+
+
+def _trials(dataset: xr.Dataset) -> Any:
+    return dataset["tried"].to_pandas().assign(value=dataset["tried_value"].values).set_index("x")
+
+
+def _with_costs(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `allocate`."""
+    costs = options.pop("cost")
+    return options | {"costs": dict(map(_cost, costs)) if costs else None}
+
+
+def _cost(text: str) -> tuple[str, float]:
+    name, _, value = text.rpartition("=")
+    try:
+        return name, float(value)
+    except ValueError:
+        raise OptionError(f'--cost is "{text}"; expected a group and a number, such as --cost top.A1=2') from None
+
+
+def _with_corners(options: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `relocate`."""
+    corners = _corner(options.pop("from_corner"), "--from"), _corner(options.pop("to_corner"), "--to")
+    return options | {"between": corners}
+
+
+def _corner(text: str, option: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(coordinate) for coordinate in text.split(","))
+    except ValueError:
+        raise OptionError(f'{option} is "{text}"; expected three numbers, such as 5,20,0') from None
+
+
+COMMANDS = (
+    AnalysisCommand(
+        "contributions",
+        "Print which contributors the variance of each measure comes from, without contact and with it.",
+        contributions,
+        terms.CONTRIBUTIONS,
+        "Number of base realizations; each is simulated again for every group.",
+        ("contributions model.py", "contributions model.py --by part", "contributions model.py --csv > shares.csv"),
+        _columns(["first", "total"], "interval"),
+        options={"by": (By, "contributor")},
+    ),
+    AnalysisCommand(
+        "sensitivities",
+        "Print how much each measure follows each contributor, without contact and through it.",
+        sensitivities,
+        terms.SENSITIVITIES,
+        "Number of realizations.",
+        ("sensitivities model.py", "sensitivities model.py --samples 200 --csv > slopes.csv"),
+        _intervals("sensitivity"),
+    ),
+    AnalysisCommand(
+        "tails",
+        "Print how often measures are outside their limits, or parts cannot be assembled, where that is rare.",
+        tails,
+        terms.TAILS,
+        "Approximate number of realizations for each event.",
+        ("tails model.py", "tails model.py --samples 400000 --json > rare.json"),
+        _intervals("probability"),
+    ),
+    AnalysisCommand(
+        "worst",
+        "Print the least and the largest value of each measure that the drawings allow, and the deviations that give them.",
+        worst_case,
+        terms.WORST_CASE,
+        "Number of random combinations; searches begin at the best of them.",
+        ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
+        lambda dataset: dataset[["worst", "bound", "random", "ends", "unseen"]].drop_vars("measure_units").to_dataframe(),
+    ),
+    AnalysisCommand(
+        "allocate",
+        "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
+        allocate,
+        terms.ALLOCATION,
+        "Number of realizations of each trial.",
+        (
+            'allocate model.py --require "gap: ppm 1000"',
+            'allocate model.py --require "gap: Ppk 1.33" --by part --cost base=2 --cost top=1',
+        ),
+        _columns(["range", "cost"], "stage"),
+        options={
+            "require": (
+                Annotated[
+                    list[str],
+                    typer.Option(metavar="TEXT", help='Requirement on a measure: "MEASURE: ppm 1000", "MEASURE: Ppk 1.33".'),
+                ],
+                REQUIRED,
+            ),
+            "cost": (
+                Annotated[
+                    list[str] | None,
+                    typer.Option(
+                        metavar="GROUP=COST", help="Present cost of a group; it grows as the ranges shrink. Default: 1 each."
+                    ),
+                ],
+                None,
+            ),
+            "by": (By, "contributor"),
+        },
+        arguments=_with_costs,
+    ),
+    AnalysisCommand(
+        "relocate",
+        "Print the place of a locator, within a box, at which a measure varies least.",
+        relocate,
+        terms.RELOCATION,
+        "Number of realizations of each trial.",
+        (
+            'relocate model.py --locator top.A3 --from 5,5,0 --to 45,20,0 --least "gap: 6 sigma"',
+            'relocate model.py --locator top.A3 --from 5,5,0 --to 45,5,0 --least "gap: ppm"',
+        ),
+        _trials,
+        options={
+            "locator": (Annotated[str, typer.Option(help="The locator, as part.locator.")], REQUIRED),
+            "from_corner": (
+                Annotated[
+                    str, typer.Option("--from", metavar=CORNER, help="A corner of the box, in mm in the part's own frame.")
+                ],
+                REQUIRED,
+            ),
+            "to_corner": (Annotated[str, typer.Option("--to", metavar=CORNER, help="The opposite corner.")], REQUIRED),
+            "least": (
+                Annotated[str, typer.Option(metavar="TEXT", help='Statistic to minimize: "MEASURE: 6 sigma", "MEASURE: ppm".')],
+                REQUIRED,
+            ),
+        },
+        arguments=_with_corners,
+    ),
+)
+for _command in COMMANDS:
+    _command.register()

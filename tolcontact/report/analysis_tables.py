@@ -1,0 +1,267 @@
+"""Tables of analyses, the same for the terminal and the page; each analysis has a function that makes them from its dataset."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.checksums import crc32
+from tolcontact.errors import ArchiveError
+from tolcontact.report.figures import grouped, number, percent, share
+
+SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
+SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
+LARGE_UNSEEN = 0.1  # share of unseen starts from which on a remark states that there may be worse ends
+
+
+@dataclass(frozen=True)
+class AnalysisTable:
+    """A table with its title, and remarks below it; a detail is left out of the page."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    remarks: Sequence[str] = ()
+    is_detail: bool = False
+
+
+@dataclass(frozen=True)
+class AnalysisReport:
+    """What people read of an analysis.
+
+    name     before the titles of its tables on a page
+    count    what was simulated, in words
+    notes    lines that explain the tables
+    """
+
+    name: str
+    count: str
+    notes: Sequence[str]
+    tables: Sequence[AnalysisTable]
+
+
+def archived_analysis(results: xr.DataTree, record: terms.AnalysisRecord) -> xr.Dataset | None:
+    """Return an analysis that an archive holds, or None. Raises ArchiveError if it is not what was written."""
+    if terms.ANALYSES_GROUP not in results.children or record.name not in results[terms.ANALYSES_GROUP].children:
+        return None
+    group = f"{terms.ANALYSES_GROUP}/{record.name}"
+    dataset = results[group].to_dataset()
+    variables = {variable.name: variable for variable in record.variables}
+    for name, array in dataset.data_vars.items():
+        variable = variables.get(str(name))
+        if variable is None or crc32(variable, array.values) != int(array.attrs.get(terms.CHECKSUM, -1)):
+            raise ArchiveError(f"{group}/{name} in the archive is not what was written")
+    return dataset
+
+
+def analysis_report(record: terms.AnalysisRecord, dataset: xr.Dataset) -> AnalysisReport:
+    """Return what people read of the dataset of an analysis."""
+    return _REPORTS[record.name](dataset)
+
+
+def _lost(count: int) -> list[str]:
+    return [f"{grouped(count)} realizations were not resolved; their last poses are included"] if count else []
+
+
+def _unresolved(dataset: xr.Dataset) -> int:
+    return int(dataset["by_status"].values[list(terms.UNRESOLVED)].sum())
+
+
+def _ppm(values: np.ndarray, sign: str = "") -> str:
+    estimate, lower, upper = (1e6 * float(value) for value in values)
+    return f"{estimate:{sign}.0f} ppm [{lower:.0f}, {upper:.0f}]"
+
+
+def _contributions(dataset: xr.Dataset) -> AnalysisReport:
+    notes = ["Shares of variance: alone, and in total, together with others; 95 % intervals.", *_lost(_unresolved(dataset))]
+    tables = [table for measure in dataset["measure"].values for table in _shares(dataset.sel(measure=measure))]
+    return AnalysisReport("Contributions", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
+
+
+def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
+    """Yield shares of groups, the largest total share first; and Shapley effects, if there are any."""
+    measure = str(dataset["measure"].values)
+    raw, corrected = (percent(dataset["missed"].sel(state=state).values) for state in terms.STATES)
+    missed = [f"missed by linear sensitivities:\n  raw {raw}, corrected {corrected}"]
+    largest = dataset["total"].sel(interval="estimate").max("state", skipna=True)
+    rows = []
+    for group in _by_size(dataset["total"]):
+        if float(largest[group]) < SMALL_SHARE:
+            continue
+        shares = dataset.isel(group=group)
+        # Without contact, measures are nearly sums: shares alone and in total hardly differ there.
+        cells = [
+            percent(shares["total"].isel(state=terms.RAW).values),
+            percent(shares["first"].isel(state=terms.CORRECTED).values),
+            percent(shares["total"].isel(state=terms.CORRECTED).values),
+        ]
+        linear = float(shares["linear"])
+        rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
+    small = dataset.sizes["group"] - len(rows)
+    remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
+    columns = ["", "raw", "corrected, alone", "in total", "linear"]
+    if not dataset.sizes["unit"]:
+        yield AnalysisTable(measure, columns, rows, [*remarks, *missed], is_detail=True)
+        return
+    yield AnalysisTable(measure, columns, rows, remarks, is_detail=True)
+    effects = dataset["shapley"].sel(interval="estimate")
+    rows = [
+        [str(dataset["unit"].values[k]), *(percent(dataset["shapley"].sel(state=s).values[k]) for s in terms.STATES)]
+        for k in _by_size(dataset["shapley"])
+        if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
+    ]
+    title = f"{measure}: Shapley effects, which divide what is correlated"
+    yield AnalysisTable(title, ["", *terms.STATES], rows, missed, is_detail=True)
+
+
+def _by_size(shares: xr.DataArray) -> np.ndarray:
+    """Return positions of shares (state, group, interval), the largest corrected estimate first."""
+    return shares.sel(interval="estimate").isel(state=terms.CORRECTED).argsort()[::-1].values
+
+
+def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
+    notes = [
+        "Mean derivatives, 95 % intervals: without contact and with it, where they are smooth; and of",
+        "all, with kinks and jumps, whose share is stated.",
+        *_lost(_unresolved(dataset)),
+    ]
+    tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
+    leverage = dataset["leverage"].values
+    order = [k for k in np.argsort(-leverage, kind="stable") if np.isfinite(leverage[k])]
+    if order:
+        rows = [[str(dataset["contributor"].values[k]), f"{leverage[k]:.3g}"] for k in order]
+        title = "Leverage of locators: the largest displacement of a point of their part for 1 mm"
+        tables.append(AnalysisTable(title, ["", "leverage"], rows))
+    return AnalysisReport("Sensitivities", f"{grouped(dataset.attrs['realizations'])} realizations", notes, tables)
+
+
+def _slopes(dataset: xr.Dataset) -> AnalysisTable:
+    """Return the derivatives of a measure, those of the contributors with the largest effect first."""
+    mean = np.abs(dataset["sensitivity"].sel(interval="estimate").values).max(axis=0)
+    size = np.fmax(mean, dataset["spread"].max("state").values)
+    rows = []
+    for k in np.argsort(-size * dataset["step"].values, kind="stable"):
+        if not size[k] > SMALL_SLOPE * np.nanmax(size):
+            continue
+        slopes = dataset.isel(contributor=int(k))
+        by_contact = [number(slopes["by_contact"].sel(contact=contact).values) for contact in terms.CONTACT_STATES]
+        corrected = number(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
+        spread, nominal = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", f"{float(slopes['nominal']):.3g}"
+        kinks = percent(slopes["changing"].values)
+        rows.append([str(slopes["contributor"].values), nominal, *by_contact, corrected, spread, kinks])
+    small = dataset.sizes["contributor"] - len(rows)
+    title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
+    columns = ["", "nominal", *terms.CONTACT_STATES, "corrected", "spread", "kinks"]
+    return AnalysisTable(title, columns, rows, [f"and {small} with next to no effect"] if small else [])
+
+
+def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
+    notes = [
+        "Found by searches over all that the drawings allow; `bound`: no pose free of penetration",
+        "lies beyond, to first order; `random`: the worst of random combinations.",
+    ]
+    counts = dataset["by_status"].values
+    for status in terms.UNRESOLVED:
+        if counts[status]:
+            meaning = terms.STATUS_MEANINGS[status].replace("_", " ")
+            notes.append(f"{grouped(int(counts[status]))} combinations are {meaning}; they do not count")
+    if counts[terms.Status.NOT_ASSEMBLABLE]:
+        notes.append("So the drawings allow parts that do not go together.")
+    tables = [table for measure in dataset["measure"].values for table in _extremes(dataset.sel(measure=measure))]
+    return AnalysisReport("Worst cases", f"{grouped(int(counts.sum()))} combinations", notes, tables)
+
+
+def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
+    """Yield both ends of a measure in both states, and the combinations that give the corrected ends."""
+    rows = []
+    for state in terms.STATES:
+        for end in terms.ENDS:
+            extreme = dataset.sel(state=state, end=end)
+            values = [float(extreme[word]) for word in ("worst", "bound", "random")]
+            cells = [f"{value:.6g}" if math.isfinite(value) else "none" for value in values]
+            rows.append([f"{state}, {end}", *cells, f"{100 * float(extreme['unseen']):.0f} %"])
+    remarks = []
+    beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
+    if beyond > 0:
+        remarks.append(f"Up to {beyond:.2g} beyond the bound: so much is of second order in the deviations.")
+    if float(dataset["unseen"].max()) > LARGE_UNSEEN:
+        remarks.append("Searches ended at several values, so there may be worse ones; more --samples find more.")
+    title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
+    yield AnalysisTable(title, ["", "found", "bound", "random", "unseen ends"], rows, remarks)
+    deviations = dataset["deviations"].isel(state=terms.CORRECTED).transpose("contributor", "end").values
+    combination = [
+        [str(label), *(f"{value:+.4g}" for value in values)]
+        for label, values in zip(dataset["contributor"].values, deviations, strict=True)
+        if np.abs(values).max() > 0
+    ]
+    yield AnalysisTable("", ["corrected", *terms.ENDS], combination, is_detail=True)
+
+
+def _tails(dataset: xr.Dataset) -> AnalysisReport:
+    rows = []
+    for event in dataset["event"].values:
+        ppm = [1e6 * float(value) for value in dataset["probability"].sel(event=event).values]
+        estimate, lower, upper = (grouped(round(value)) if value >= 1000 else f"{value:.3g}" for value in ppm)
+        rows.append([str(event), f"{estimate} [{lower}, {upper}]"])
+    count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
+    notes = ["Probabilities in ppm, with contact, by subset simulation; 95 % intervals."]
+    return AnalysisReport("Rare events", count, notes, [AnalysisTable("", ["", "ppm"], rows)])
+
+
+def _allocation(dataset: xr.Dataset) -> AnalysisReport:
+    requirements = []
+    for name, values in zip(dataset["requirement"].values, dataset["kept"].values, strict=True):
+        text = share if f": {terms.PPM}" in str(name) else number
+        requirements.append([str(name), *map(text, values)])
+    ranges = []
+    for group in dataset["group"].values:
+        row = dataset.sel(group=group)
+        widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
+        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}"])
+    before, after = dataset["cost"].sum("group").values
+    tables = [
+        AnalysisTable("", ["required", *terms.STAGES], requirements),
+        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["range", *terms.STAGES, "factor"], ranges),
+        *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
+    ]
+    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals.\n"]
+    return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
+
+
+def _effects(effect: xr.DataArray) -> AnalysisTable:
+    """Return the effects (of_effect, group, interval) on a measure, that of the group with the largest one first."""
+    rows = []
+    for k in np.argsort(effect.values[0, :, 0], kind="stable"):
+        spread, outside = effect.values[:, k]
+        rows.append([str(effect["group"].values[k]), number(spread, sign=True), _ppm(outside, "+")])
+    title = f"{effect['measure'].values} [{effect['measure_units'].values}]: changes if zones were a tenth narrower than before"
+    return AnalysisTable(title, ["", *terms.EFFECTS], rows)
+
+
+def _relocation(dataset: xr.Dataset) -> AnalysisReport:
+    statistic = dataset.attrs["least"]
+    is_share = statistic.endswith(terms.PPM)
+    text = share if is_share else number
+    rows = []
+    for stage, point, reached in zip(terms.STAGES, dataset["point"].values, dataset["reached"].values, strict=True):
+        rows.append([f"{stage}: ({', '.join(f'{c:.4g}' for c in point)})", text(reached)])
+    change = dataset["change"].values
+    rows.append(["after less before", _ppm(change, "+")] if is_share else ["after over before", number(change)])
+    columns = [dataset.attrs["locator"], statistic if is_share else f"{statistic} [{dataset['measure_units'].values}]"]
+    samples, fresh = (grouped(dataset.attrs[word]) for word in ("samples", "fresh"))
+    notes = [f"{samples} realizations each, {fresh} other ones below; 95 % intervals.\n"]
+    table = AnalysisTable("", columns, rows, _lost(int(dataset["unresolved"].max())))
+    return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
+
+
+_REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
+    terms.CONTRIBUTIONS.name: _contributions,
+    terms.SENSITIVITIES.name: _sensitivities,
+    terms.WORST_CASE.name: _worst_case,
+    terms.TAILS.name: _tails,
+    terms.ALLOCATION.name: _allocation,
+    terms.RELOCATION.name: _relocation,
+}
