@@ -12,7 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tolcontact.archive.header import declaration
+from tolcontact.archive.settings import declaration
 from tolcontact.declaration import tape
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError, ModelError

@@ -130,11 +130,11 @@ arguments are numbers.
 
 from tolcontact.archive.analyses import check_room_for, keep
 from tolcontact.archive.archive_lock import taken
-from tolcontact.archive.dataset import labelled
 from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
-from tolcontact.archive.header import Run, run_settings, sizes_of_rows
+from tolcontact.archive.labels import labelled, sizes_of_rows
 from tolcontact.archive.reader import model_of, open_archive, opened
 from tolcontact.archive.row_checksums import check_rows
+from tolcontact.archive.settings import Run, run_settings
 from tolcontact.archive.stored_block import row_values, stored
 from tolcontact.archive.writer import ArchiveWriter
 

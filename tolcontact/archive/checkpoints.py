@@ -26,19 +26,19 @@ class Checkpoint(NamedTuple):
 
 
 def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> Checkpoint:
-    """The last checkpoint of an archive. Raises ArchiveError if it is not what was written."""
+    """Return the last checkpoint of an archive. Raises ArchiveError if it is not what was written."""
     summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][:])
     place = int(summed.argmax())
-    rows, found = max(0, int(summed[place])), []
+    rows, sums = max(0, int(summed[place])), []
     for part in parts if rows else ():
         group = file[terms.field_of(part)]
-        found.append(np.ma.getdata(group[terms.FIELD_SUMS.name][place]))
-        if _checksum(rows, found[-1]) != int(group[terms.SUMS_CHECKSUM.name][place]):
+        sums.append(np.ma.getdata(group[terms.FIELD_SUMS.name][place]))
+        if _checksum(rows, sums[-1]) != int(group[terms.SUMS_CHECKSUM.name][place]):
             raise ArchiveError(
                 f'archive "{path}" is damaged: the sums of the field of part "{part}" are not what was written; write to '
                 "a new file"
             )
-    return Checkpoint(rows, place, found)
+    return Checkpoint(rows, place, sums)
 
 
 def write_checkpoint(archive: LaidOut, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
@@ -52,5 +52,5 @@ def write_checkpoint(archive: LaidOut, checkpoint: Checkpoint, parts: Sequence[s
 
 
 def _checksum(rows: int, sums: np.ndarray) -> int:
-    """Of the sums and of how many realizations they are: one written without the other has another one."""
+    """Return the checksum of the sums together with their number of realizations, so that neither matches alone."""
     return crc32(terms.FIELD_SUMS, sums, crc32(terms.SUMMED_ROWS, rows))

@@ -9,39 +9,40 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.header import kept_rows, sizes_of_rows
+from tolcontact.archive.labels import sizes_of_rows
+from tolcontact.archive.settings import kept_rows
 from tolcontact.archive.variables import rows_together
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.vocabulary import ArchiveVariable
 
-AT_ONCE = 8  # chunks that are laid out at once
+CHUNKS = 8  # laid out in one write
 
 
 def check_room(path: Path, nominal: Nominal, rows: Sequence[ArchiveVariable], samples: int) -> None:
-    """Raise ArchiveError if the disk does not hold `samples` more realizations, of which some `rows` variables are kept."""
+    """Raise ArchiveError if the disk has no room for `samples` more realizations of the variables `rows`."""
     needed, free = samples * bytes_of_row(nominal, rows), shutil.disk_usage(path.parent).free
     if needed > free:
-        less = ", or keep less of each realization (measures)" if terms.ROTATION in rows else ""
+        advice = ", or keep less of each realization (measures)" if terms.ROTATION in rows else ""
         raise ArchiveError(
             f'archive "{path}" needs {size_in_words(needed)} for {samples} realizations, but its disk has '
-            f"{size_in_words(free)} free; ask for fewer, write to another disk{less}"
+            f"{size_in_words(free)} free; ask for fewer, write to another disk{advice}"
         )
 
 
 def bytes_of_rows(nominal: Nominal, keep: str, samples: int) -> int:
-    """How many bytes `samples` realizations take in an archive that keeps what `keep` names."""
+    """Return the size of `samples` realizations in an archive with the option `keep` [bytes]."""
     return samples * bytes_of_row(nominal, kept_rows(keep))
 
 
 def bytes_of_row(nominal: Nominal, rows: Sequence[ArchiveVariable]) -> int:
-    """How many bytes a realization takes."""
+    """Return the size of one realization [bytes]."""
     sizes = {terms.REALIZATION: 1, **sizes_of_rows(nominal)}
     return sum(np.dtype(v.kind).itemsize * prod(sizes[d] for d in v.dims) for v in (terms.NUMBERS, *rows))
 
 
 def size_in_words(count: float) -> str:
-    """A number of bytes for people: 1.5 GB."""
+    """Return a number of bytes with a readable unit: 1.5 GB."""
     for unit in ("B", "kB", "MB", "GB"):
         if count < 1000:
             return f"{count:.3g} {unit}"
@@ -54,13 +55,13 @@ def lay_out_rows(file: netCDF4.Dataset, start: int, stop: int) -> None:
     for variable in terms.BY_REALIZATION:
         stored = (file["sample"] if variable is terms.DEVIATION else file).variables.get(variable.name)
         if stored is not None and 0 not in stored.shape[1:]:
-            nothing = np.nan if np.dtype(variable.kind).kind == "f" else terms.UNFINISHED
+            initial = np.nan if np.dtype(variable.kind).kind == "f" else terms.UNFINISHED
             stored.set_var_chunk_cache(0)  # whole chunks go straight to the file
-            together = AT_ONCE * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
-            piece = np.full((together, *stored.shape[1:]), nothing, dtype=variable.kind)
-            for first in range(start, stop, together):
-                last = min(first + together, stop)
-                stored[first:last] = piece[: last - first]
+            rows = CHUNKS * rows_together(np.dtype(variable.kind).itemsize * prod(stored.shape[1:]))
+            piece = np.full((rows, *stored.shape[1:]), initial, dtype=variable.kind)
+            for begin in range(start, stop, rows):
+                end = min(begin + rows, stop)
+                stored[begin:end] = piece[: end - begin]
     file[terms.REALIZATION][start:stop] = np.arange(start, stop)
     sums = file[terms.ROW_CHECKSUM.name]
     blocks = slice(len(sums), -(-stop // int(file.block_rows)))

@@ -1,87 +1,27 @@
 """The header of an archive: everything but what is written block by block."""
 
-import datetime
-import json
-import platform
 from collections.abc import Mapping, Sequence
-from importlib.metadata import version
-from typing import Any, NamedTuple
+from typing import Any
 
 import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.labels import labels_of_rows, units_of_rows
+from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
 from tolcontact.archive.surface_rows import nothing_checked
 from tolcontact.archive.variables import define, lay_out, write
-from tolcontact.compilation import ACCURACY, Program
+from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
-from tolcontact.declaration.document import Writing, to_document
 from tolcontact.discretization import Nominal, NominalPart
 from tolcontact.geometry import known_surfaces, surface_arrays
-from tolcontact.method import Method
-from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import ArchiveVariable
-
-_LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
-
-
-class Run(NamedTuple):
-    """What is asked of a run, besides its program.
-
-    keep       what is archived of each realization: one of `KEPT`
-    surfaces   number of realizations that will be checked against the surfaces
-    plan       the sampling plan: one of `PLANS`
-    fields     of how many realizations the magnitude of displacement fields is: a number, "some", "all" or "none"
-    """
-
-    seed: int
-    samples: int
-    keep: str
-    surfaces: int
-    fields: str
-    plan: str = terms.MONTE_CARLO
-
-
-def run_settings(program: Program, run: Run) -> dict[str, Any]:
-    """Global attributes that say how the rows came about; a resumed run must agree in all but `samples`."""
-    method = program.method
-    return {
-        "solver": program.plugin.name,
-        "solver_options": json.dumps(program.plugin.options),
-        "solver_second": ", ".join(program.plugin.second),
-        "solver_accuracy": ACCURACY,
-        "resolution": method.resolution,
-        "objective": method.objective,
-        "weighting": method.objective if method.minimizes.counts_points else "none",
-        "regularization": method.regularization,
-        "eta": method.eta,
-        "active_set": method.active_set,
-        "activity": method.activity,
-        "search": method.search,
-        "near_turn": method.near_turn,
-        "near_travel": method.near_travel,
-        "method_from": _whose(program),
-        "sampler": run.plan,
-        "seed": np.int64(run.seed),
-        "samples": np.int64(run.samples),
-        "kept": run.keep,
-        "fields": run.fields,
-        "block_rows": np.int64(block_rows(program)),
-    }
-
-
-def _whose(program: Program) -> str:
-    """Where the method came from: the model, the defaults, or the options of the run."""
-    own = program.nominal.assembly.method
-    if program.method == (own or Method()):
-        return "defaults" if own is None else "model"
-    return "options"
 
 
 def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequence[int]) -> None:
-    """All attributes, dimensions, labels and groups; of the rows and of the fields what they will be called.
+    """Write all attributes, dimensions, labels and groups, and define rows and fields without values.
 
-    `sums` is for each part how many numbers the sums of its field are, in one state.
+    `sums` is the length of the sums of each part's field, in one state.
     """
     nominal = program.nominal
     file.setncatts(
@@ -104,16 +44,16 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_contact(file.createGroup("contact"), nominal)
     _write_sample(file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
     file["contact"].createDimension(terms.BOUND, 2)
-    _lay_out_together(file["contact"], nothing_touching(file["contact"].dimensions[terms.POINT].size))
+    _lay_out_group(file["contact"], nothing_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
-    _lay_out_together(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
+    _lay_out_group(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.parts, sums, strict=True):
         _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
 
 
 def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
-    """Dimensions of the root, and what their places are called."""
+    """Write the dimensions of the root and their labels."""
     labels = labels_of_rows(nominal)
     file.createDimension(terms.REALIZATION, None)
     for name, values in labels.items():
@@ -125,36 +65,8 @@ def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
             define(file, coordinate)
 
 
-def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:
-    """What the places along the dimensions of rows are called."""
-    return {
-        terms.STATE: terms.STATES,
-        terms.PART: [part.name for part in nominal.parts],
-        terms.PAIR: [pair.name for pair in nominal.pairs],
-        terms.MEASURE: [measure.name for measure in nominal.measures],
-        terms.AXIS: terms.AXES,
-        terms.BODY_AXIS: terms.AXES,
-    }
-
-
-def sizes_of_rows(nominal: Nominal) -> dict[str, int]:
-    """How many places the dimensions of a row have."""
-    return {name: len(labels) for name, labels in labels_of_rows(nominal).items()} | {
-        terms.CONTRIBUTOR: len(nominal.contributors)
-    }
-
-
-def units_of_rows(program: Program) -> dict[ArchiveVariable, str]:
-    """Units that depend on the model; those of measures are "1" if they differ."""
-    units = {measure.units for measure in program.nominal.measures} or {"mm"}
-    return {
-        terms.REACTION: program.method.minimizes.reaction_units,
-        terms.MEASURED: units.pop() if len(units) == 1 else "1",
-    }
-
-
 def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveVariable]) -> None:
-    """The variables of realizations, their checksums, and the places of checkpoints; all without values yet."""
+    """Define the variables of realizations, their checksums and checkpoints, all without values."""
     for variable in terms.ROWS:
         if variable in rows:
             define(file, variable)
@@ -181,7 +93,7 @@ def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
 
 
 def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
-    """The surface of a part, and room for its displacement field and its sums."""
+    """Write the surface of a part, and lay out its displacement field and its sums."""
     group.setncattr("part", part.name)
     sizes = {
         terms.VERTEX: len(part.vertices),
@@ -197,19 +109,13 @@ def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     write(group, terms.FIELD_VERTICES, part.vertices)
     write(group, terms.FIELD_FACES, part.faces)
     write(group, terms.BOUND_LABEL, terms.BOUNDS)
-    _lay_out_together(group, no_field(len(part.vertices)))
+    _lay_out_group(group, no_field(len(part.vertices)))
     lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
     lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
 
 
-def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
-    """What is archived of each realization."""
-    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
-    return tuple(variable for variable in terms.BY_REALIZATION if variable not in left_out[kept])
-
-
 def no_field(vertices: int) -> dict[ArchiveVariable, Any]:
-    """What the group of a part holds before its field was written."""
+    """Return the values in the group of a part before its field is written."""
     states = len(terms.STATES)
     return {
         **{v: np.full([states, vertices, len(terms.COMPONENTS)], np.nan) for v in (terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA)},
@@ -220,7 +126,7 @@ def no_field(vertices: int) -> dict[ArchiveVariable, Any]:
 
 
 def nothing_touching(points: int) -> dict[ArchiveVariable, Any]:
-    """What the group of contact points holds of how often they touch, before that was looked at."""
+    """Return the shares of touching before any are known."""
     return {
         terms.TOUCHING_SHARE: np.full(points, np.nan),
         terms.TOUCHING_INTERVAL: np.full((points, 2), np.nan),
@@ -228,9 +134,9 @@ def nothing_touching(points: int) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _lay_out_together(group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
-    for variable, nothing in values.items():
-        lay_out(group, variable, nothing)
+def _lay_out_group(group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
+    for variable, initial in values.items():
+        lay_out(group, variable, initial)
     lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
 
 
@@ -245,13 +151,13 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
             mesh.createDimension(terms.CORNER, 3)
             write(mesh, terms.MESH_VERTICES, part.mesh.vertices)
             write(mesh, terms.MESH_FACES, part.mesh.faces)
-            known = known_surfaces(part.mesh)
-            if known is not None:
-                mesh.createDimension(terms.BREP_FACE, len(known[1]))
-                write(mesh, terms.BREP_OF_FACE, known[0])
-                _write_surfaces(mesh, terms.OF_BREP_FACE, surface_arrays(known[1]))
-                if known[2]:
-                    write(mesh, terms.NAME_OF_BREP_FACE, known[2])
+            surfaces = known_surfaces(part.mesh)
+            if surfaces is not None:
+                mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
+                write(mesh, terms.BREP_OF_FACE, surfaces[0])
+                _write_surfaces(mesh, terms.OF_BREP_FACE, surface_arrays(surfaces[1]))
+                if surfaces[2]:
+                    write(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
 
 
 def _write_surfaces(group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]) -> None:
@@ -276,7 +182,7 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
 
 
 def contact_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
-    """What the group `contact` holds: which parts touch, and where."""
+    """Return the values of the group `contact`: which parts touch, and where."""
     pairs = nominal.pairs
     parts = {
         terms.MOVING_PART: [pair.moving for pair in pairs],
@@ -296,7 +202,7 @@ def contact_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
 
 
 def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
-    """How the faces of features deviate, and which sides of pairs they are."""
+    """Return how the faces of features deviate, and which sides of pairs they are."""
     faces, count = nominal.faces, len(nominal.contributors)
     if not faces:
         return {}
@@ -320,31 +226,31 @@ def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
 
 
 def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
-    """What says where round faces touch, at any pose."""
-    first = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
-    known = [(first[k] + np.arange(len(pair.round)), pair.round) for k, pair in enumerate(nominal.pairs) if pair.round]
-    if not known:
+    """Return the values that determine where round faces touch, at any pose."""
+    starts = np.cumsum([0, *(len(pair.P_m) for pair in nominal.pairs)])
+    rounds = [(starts[k] + np.arange(len(pair.round)), pair.round) for k, pair in enumerate(nominal.pairs) if pair.round]
+    if not rounds:
         return {}
-    numbers, points = zip(*known, strict=True)
+    numbers, points = zip(*rounds, strict=True)
     return {
         terms.POINT_OF_ROUND: np.concatenate(numbers),
-        **{v: np.concatenate([each.walls[name] for each in points]) for name, v in terms.OF_WALL.items()},
-        **{v: np.concatenate([each.points[name] for each in points]) for name, v in terms.OF_ROUND.items()},
+        **{v: np.concatenate([point.walls[name] for point in points]) for name, v in terms.OF_WALL.items()},
+        **{v: np.concatenate([point.points[name] for point in points]) for name, v in terms.OF_ROUND.items()},
     }
 
 
 def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
-    nominal, every = program.nominal, program.draws.contributors
-    group.createDimension(terms.CONTRIBUTOR, len(every))
+    nominal, contributors = program.nominal, program.draws.contributors
+    group.createDimension(terms.CONTRIBUTOR, len(contributors))
     group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, terms.DEVIATION)
-    write(group, terms.CONTRIBUTOR_LABEL, [each.label for each in every])
-    write(group, terms.CONTRIBUTOR_SOURCE, [each.source for each in every])
-    write(group, terms.CONTRIBUTOR_UNITS, [each.units for each in every])
-    write(group, terms.TOLERANCE_RANGE, [each.range for each in every])
-    write(group, terms.DISTRIBUTION, [each.description for each in every])
-    write(group, terms.MEAN_SHIFT, [each.mean_shift for each in every])
+    write(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
+    write(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
+    write(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
+    write(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
+    write(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
+    write(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
     locators = nominal.locators
     write(group, terms.LOCATOR_LABEL, locators.labels)
     write(group, terms.STIFFNESS, locators.stiffness)
@@ -352,18 +258,3 @@ def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -
     write(group, terms.LOCATOR_POINT, locators.points)
     write(group, terms.LOCATOR_DIRECTION, locators.directions)
     write(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
-
-
-def declaration(program: Program) -> str:
-    """The declared model as JSON."""
-    return json.dumps(to_document(program.nominal.assembly, Writing(program.nominal.triangles, program.tapes)))
-
-
-def versions() -> str:
-    """What computes: names and versions."""
-    return ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)])
-
-
-def now() -> str:
-    """The present time, as history has it."""
-    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,4 +1,4 @@
-"""Whether an archive holds the run that is to be resumed."""
+"""Checks that an archive holds the model and the run that is to be resumed."""
 
 import json
 from collections.abc import Mapping
@@ -9,48 +9,49 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.header import contact_values, declaration
+from tolcontact.archive.header import contact_values
+from tolcontact.archive.settings import declaration
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
 
-SAME = 1e-9  # mm: points may differ by rounding from one machine to the next
+POINT_TOLERANCE = 1e-9  # mm: points may differ by rounding from one machine to the next
 
 
-def check_same_run(there: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
-    """Raise ArchiveError if the archive `there`, in the file `path`, is of another model or another run."""
-    if getattr(there, "format", 1) != terms.FORMAT:
+def check_same_run(file: netCDF4.Dataset, path: Path, program: Program, settings: Mapping[str, Any], surfaces: int) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model or another run."""
+    if getattr(file, "format", 1) != terms.FORMAT:
         raise ArchiveError(f'"{path}" was begun by an earlier version of tolcontact: it can be read, not resumed')
-    if not there.dimensions[terms.REALIZATION].isunlimited():
+    if not file.dimensions[terms.REALIZATION].isunlimited():
         raise ArchiveError(f'"{path}" is a copy that cannot grow; resume the archive that tolcontact wrote')
-    check_same_model(there, path, program)
-    for word, value in settings.items():
-        was = getattr(there, word, None)
-        if word != "samples" and was != value:
+    check_same_model(file, path, program)
+    for name, value in settings.items():
+        was = getattr(file, name, None)
+        if name != "samples" and was != value:
             raise ArchiveError(
-                f'"{path}" was run with {word} = {was}, now it is {value}; resume with the same, or write to a new file'
+                f'"{path}" was run with {name} = {was}, now it is {value}; resume with the same, or write to a new file'
             )
-    room = len(there["surface"].dimensions[terms.CHECKED])
+    room = len(file["surface"].dimensions[terms.CHECKED])
     if room != surfaces:
         raise ArchiveError(f'"{path}" was begun with surfaces = {room}, now it is {surfaces}; resume with the same')
 
 
-def check_same_model(there: netCDF4.Dataset, path: Path, program: Program) -> None:
-    """Raise ArchiveError if the archive `there`, in the file `path`, is of another model."""
-    if _comparable(str(there["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
+def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> None:
+    """Raise ArchiveError if the archive `file`, in the file `path`, is of another model."""
+    if _comparable(str(file["model"][terms.DECLARATION.name][...])) != _comparable(declaration(program)):
         raise ArchiveError(f'"{path}" contains another model than this one; write to a new file')
     for part in program.nominal.parts:
-        if not _same(there[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
+        if not _is_equal(file[f"field/{terms.group_of(part.name)}"][terms.FIELD_VERTICES.name], part.vertices):
             raise ArchiveError(f'"{path}": part "{part.name}" had another shape (was its mesh replaced?); write to a new file')
     for variable, values in contact_values(program.nominal).items():
-        stored = there["contact"].variables.get(variable.name)
-        if stored is None or not (variable.kind is str or _same(stored, values)):  # texts are in the declaration
-            raise ArchiveError(f'"{path}": its contact points differ (it was written by {there.versions}); write to a new file')
+        stored = file["contact"].variables.get(variable.name)
+        if stored is None or not (variable.kind is str or _is_equal(stored, values)):  # texts are in the declaration
+            raise ArchiveError(f'"{path}": its contact points differ (it was written by {file.versions}); write to a new file')
 
 
 def _comparable(declared: str) -> Any:
-    """A declaration without the lines of the script in which its items stand."""
-    return json.loads(declared, object_hook=lambda item: {word: item[word] for word in item if word != "declared_at"})
+    """Return a declaration without the lines of the script that declare its items."""
+    return json.loads(declared, object_hook=lambda item: {key: item[key] for key in item if key != "declared_at"})
 
 
-def _same(stored: netCDF4.Variable, values: Any) -> bool:
-    return stored.shape == np.shape(values) and np.allclose(stored[...], values, rtol=0, atol=SAME)
+def _is_equal(stored: netCDF4.Variable, values: Any) -> bool:
+    return stored.shape == np.shape(values) and np.allclose(stored[...], values, rtol=0, atol=POINT_TOLERANCE)

@@ -22,12 +22,13 @@ from tolcontact import poses
 from tolcontact import vocabulary as terms
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.header import Run, kept_rows, no_field, nothing_touching, now, run_settings, versions, write_header
+from tolcontact.archive.header import no_field, nothing_touching, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.row_checksums import check_rows
+from tolcontact.archive.settings import Run, kept_rows, now, run_settings, versions
 from tolcontact.archive.stored_block import StoredBlock
 from tolcontact.archive.surface_rows import archived_poses, choose, nothing_checked
 from tolcontact.compilation import Program
@@ -72,7 +73,7 @@ class ArchiveWriter:
                 check_rows(results)
             with opened_locked(part, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
-                rows = last_checkpoint(file, path, [own.name for own in program.nominal.parts]).rows
+                rows = last_checkpoint(file, path, [part.name for part in program.nominal.parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
                 check_room(path, program.nominal, kept_rows(run.keep), samples - length)
                 lay_out_rows(file, length, samples)
@@ -91,7 +92,7 @@ class ArchiveWriter:
 
     def _go_on(self, path: Path, nominal: Nominal) -> None:
         self._path, self._parts, self._pairs = path, [part.name for part in nominal.parts], len(nominal.pairs)
-        with _refusals_told(path):
+        with _as_archive_error(path):
             self._values = LaidOut(path)
             with opened_locked(path, "r") as file:
                 self._length, self._block_rows = len(file.dimensions[terms.REALIZATION]), int(file.block_rows)
@@ -111,12 +112,12 @@ class ArchiveWriter:
         return self
 
     def __exit__(self, *error: object) -> None:
-        with _refusals_told(self._path):
+        with _as_archive_error(self._path):
             self._values.close()
 
     def append(self, block: StoredBlock) -> None:
         """Write the rows of a block, and hand them over to the system."""
-        with _refusals_told(self._path):
+        with _as_archive_error(self._path):
             if block.stop > self._length:
                 self._make_room_for_all()
             for variable in self.kept:
@@ -150,7 +151,7 @@ class ArchiveWriter:
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
         """The sums of the fields (state, number) for each part, over all rows so far. A killed run goes on from them."""
-        with _refusals_told(self._path):
+        with _as_archive_error(self._path):
             place = 1 - self._place
             write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)
             self._place = place  # not before: one that is interrupted is written again, the other one stays
@@ -158,7 +159,7 @@ class ArchiveWriter:
 
     def write_fields(self, fields: Sequence[dict[terms.ArchiveVariable, Any]]) -> None:
         """Displacement fields: for each part the values of `FIELDS`."""
-        with _refusals_told(self._path):
+        with _as_archive_error(self._path):
             self._values.overwrite_together(
                 {terms.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)}
             )
@@ -189,13 +190,13 @@ class ArchiveWriter:
         found = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: beside}
         for variable, of_rows in found.items():
             values[variable][: len(rows)] = of_rows
-        with _refusals_told(self._path):
+        with _as_archive_error(self._path):
             self._values.overwrite_together({"surface": values})
 
     def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
         """How often each contact point touches, (point,), with its interval, (point, bound)."""
         if self._values.has("contact", terms.TOUCHING_SHARE):
-            with _refusals_told(self._path):
+            with _as_archive_error(self._path):
                 values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
                 self._values.overwrite_together({"contact": values})
 
@@ -205,7 +206,7 @@ def replacing(path: Path) -> Iterator[Path]:
     """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
     part = path.with_name(f".{path.name}.part")
     try:
-        with _refusals_told(path):
+        with _as_archive_error(path):
             yield part
             part.replace(path)
     finally:
@@ -213,8 +214,8 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextlib.contextmanager
-def _refusals_told(path: Path) -> Iterator[None]:
-    """What the system or the netCDF library refuses (a full disk, say) as an ArchiveError."""
+def _as_archive_error(path: Path) -> Iterator[None]:
+    """Raise errors of the system or the netCDF library (a full disk, for example) as ArchiveError."""
     try:
         yield
     except (OSError, RuntimeError) as error:

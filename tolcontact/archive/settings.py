@@ -1,0 +1,92 @@
+"""The settings of a run, as the attributes of its archive state them."""
+
+import datetime
+import json
+import platform
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from tolcontact import vocabulary as terms
+from tolcontact.compilation import ACCURACY, Program
+from tolcontact.declaration.document import Writing, to_document
+from tolcontact.method import Method
+from tolcontact.simulation import block_rows
+from tolcontact.vocabulary import ArchiveVariable
+
+_LIBRARIES = ("tolcontact", "casadi", "numpy", "scipy", "trimesh", "xarray", "netCDF4")
+
+
+class Run(NamedTuple):
+    """The arguments of a run besides its program.
+
+    keep       the variables of each realization that are archived: one of `KEPT`
+    surfaces   number of realizations that will be checked against the surfaces
+    plan       the sampling plan: one of `PLANS`
+    fields     number of realizations in the magnitude of displacement fields: a number, "some", "all" or "none"
+    """
+
+    seed: int
+    samples: int
+    keep: str
+    surfaces: int
+    fields: str
+    plan: str = terms.MONTE_CARLO
+
+
+def run_settings(program: Program, run: Run) -> dict[str, Any]:
+    """Return the global attributes that determine the rows; a resumed run must agree in all but `samples`."""
+    method = program.method
+    return {
+        "solver": program.plugin.name,
+        "solver_options": json.dumps(program.plugin.options),
+        "solver_second": ", ".join(program.plugin.second),
+        "solver_accuracy": ACCURACY,
+        "resolution": method.resolution,
+        "objective": method.objective,
+        "weighting": method.objective if method.minimizes.counts_points else "none",
+        "regularization": method.regularization,
+        "eta": method.eta,
+        "active_set": method.active_set,
+        "activity": method.activity,
+        "search": method.search,
+        "near_turn": method.near_turn,
+        "near_travel": method.near_travel,
+        "method_from": _method_origin(program),
+        "sampler": run.plan,
+        "seed": np.int64(run.seed),
+        "samples": np.int64(run.samples),
+        "kept": run.keep,
+        "fields": run.fields,
+        "block_rows": np.int64(block_rows(program)),
+    }
+
+
+def _method_origin(program: Program) -> str:
+    """Return whether the method is that of the model, the defaults, or set by options of the run."""
+    declared = program.nominal.assembly.method
+    if program.method == (declared or Method()):
+        return "defaults" if declared is None else "model"
+    return "options"
+
+
+def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
+    """Return the variables that are archived of each realization."""
+    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
+    return tuple(variable for variable in terms.BY_REALIZATION if variable not in left_out[kept])
+
+
+def declaration(program: Program) -> str:
+    """Return the declared model as JSON."""
+    return json.dumps(to_document(program.nominal.assembly, Writing(program.nominal.triangles, program.tapes)))
+
+
+def versions() -> str:
+    """Return the names and versions of the software that computes."""
+    return ", ".join([f"python {platform.python_version()}", *(f"{lib} {version(lib)}" for lib in _LIBRARIES)])
+
+
+def now() -> str:
+    """Return the present time in the format of the history."""
+    return datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
