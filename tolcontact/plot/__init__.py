@@ -1,7 +1,7 @@
 """Pictures by code, for papers and slides: `tc.plot`. A chapter of the guide. Needs `pip install '.[plot]'`.
 
-`tc.plot.histogram` draws with matplotlib into `axes` of yours, or new ones; `tc.plot.assembly` and `tc.plot.field` draw with
-pyvista into a `plotter` of yours, or one that needs no display. So everything of these libraries can be added, and saved:
+`tc.plot.histogram` draws with matplotlib into your `axes` or new ones. `tc.plot.assembly` and `tc.plot.field` draw with pyvista
+into your `plotter`, or into a new one that needs no display. You can add anything that these libraries offer, and save it:
 
     tc.plot.histogram(results, "corner height").figure.savefig("height.pdf")
     tc.plot.field(results, component="z", state="corrected").screenshot("field.png")
@@ -18,7 +18,7 @@ pyvista into a `plotter` of yours, or one that needs no display. So everything o
 >>> axes.get_xlabel(), axes.get_ylabel()
 ('height [mm]', '% of realizations')
 
-Colours are read by the colour-blind: viridis, a diverging map where signs matter, and grey and orange for the states.
+The colours are safe for colour-blind readers: viridis, a diverging map where signs matter, and grey and orange for the states.
 """
 
 import lazy_loader

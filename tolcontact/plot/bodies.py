@@ -1,4 +1,4 @@
-"""The assembly and its displacement fields, with pyvista, which draws without a display, too."""
+"""Pictures of assemblies and displacement fields by pyvista, which also draws without a display."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -21,8 +21,8 @@ STATISTICS = {"mean": terms.FIELD_MEAN, "6 sigma": terms.FIELD_SIX_SIGMA}
 GREYS = ("#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0")
 INK, LOCATOR, FORCE, CONTACT, MEASURE = "#30363d", "#1f5fa8", "#7a3fb0", "#0a7d4f", "#d01c1c"
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
-EDGE = 25.0  # degrees: sharper edges are drawn
-VIEW = (-1.0, -2.4, 1.5)  # from where it is looked at
+MIN_EDGE_ANGLE = 25.0  # degrees: sharper edges are drawn
+VIEWPOINT = (-1.0, -2.4, 1.5)  # the direction from the assembly to the viewer
 
 
 class _Body(NamedTuple):
@@ -34,7 +34,7 @@ class _Body(NamedTuple):
 
 
 def assembly(
-    of: xr.DataTree | Assembly,
+    source: xr.DataTree | Assembly,
     *,
     realization: int | None = None,
     state: str = "corrected",
@@ -42,23 +42,24 @@ def assembly(
     opacity: float = 1.0,
     plotter: Any = None,
 ) -> Any:
-    """The bodies of results or of a declared model, with locators, contact points, measures and forces; a pyvista.Plotter.
+    """Draw the bodies of results or of a declared model, with locators, contact points, measures and forces.
 
-    Nominal, or as in a `realization` of results and its `state`, where marks stay at their nominal places.
-    Raises OptionError for a realization or a state that is not there, ModelError for a model with faults.
+    The bodies stand in their nominal places, or as in a `realization` of results and its `state`; marks always stand in their
+    nominal places. Returns a pyvista.Plotter.
+    Raises OptionError for a realization or a state that does not exist, and ModelError for a model with faults.
     """
-    is_own = plotter is None
-    plotter = _plotter() if is_own else plotter
-    bodies, found = _declared(of) if isinstance(of, Assembly) else (list(_bodies(of)), marks_of(of))
+    is_new = plotter is None
+    plotter = _new_plotter() if is_new else plotter
+    bodies, annotations = _declared(source) if isinstance(source, Assembly) else (list(_bodies(source)), marks_of(source))
     for number, body in enumerate(bodies):
         mesh = _mesh(body)
         if realization is not None:
-            mesh.points = _moved(of, number, realization, state, body.vertices)
+            mesh.points = _moved(source, number, realization, state, body.vertices)
         plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity)
         _add_edges(plotter, mesh)
     if marks:
-        _add_marks(plotter, found, _size(bodies))
-    return _looked_at(plotter) if is_own else plotter
+        _add_marks(plotter, annotations, _size(bodies))
+    return _in_view(plotter) if is_new else plotter
 
 
 def field(
@@ -70,52 +71,53 @@ def field(
     limits: tuple[float, float] | None = None,
     plotter: Any = None,
 ) -> Any:
-    """The displacement field of all parts as colours [mm]; a pyvista.Plotter.
+    """Draw the displacement field of all parts as colours [mm].
 
-    `statistic` is "mean" or "6 sigma". Colours run over `limits`; without them over both states of all parts, so that pictures
-    of both can be compared. Raises OptionError for a word that is not known, or an archive without fields.
+    `statistic` is "mean" or "6 sigma". Colours cover `limits`, or by default the values of both states of all parts, so that
+    pictures of both states can be compared. Returns a pyvista.Plotter.
+    Raises OptionError for an unknown statistic, component or state, and for an archive without fields.
     """
     _expect("statistic", statistic, tuple(STATISTICS))
     _expect("component", component, terms.COMPONENTS)
     _expect("state", state, terms.STATES)
-    of = {terms.COMPONENT: component}
-    values = [group[STATISTICS[statistic].name].sel(of) for group in _groups(results)]
-    every = np.concatenate([each.values.ravel() for each in values])
-    if not np.isfinite(every).any():
+    name, selection = STATISTICS[statistic].name, {terms.COMPONENT: component}
+    fields = [group[name].sel(selection) for group in _groups(results)]
+    values = np.concatenate([array.values.ravel() for array in fields])
+    if not np.isfinite(values).any():
         raise OptionError("the archive has no displacement fields of this kind; run again with --fields")
     is_signed = statistic == "mean" and component != "magnitude"
-    largest = np.nanmax(np.abs(every))
-    low, high = limits or ((-largest, largest) if is_signed else (np.nanmin(every), largest))
-    is_own = plotter is None
-    plotter = _plotter() if is_own else plotter
+    largest = np.nanmax(np.abs(values))
+    low, high = limits or ((-largest, largest) if is_signed else (np.nanmin(values), largest))
+    is_new = plotter is None
+    plotter = _new_plotter() if is_new else plotter
     title = f"{statistic} of displacement, {component} [mm]\n"
-    for body, value in zip(_bodies(results), values, strict=True):
+    for body, array in zip(_bodies(results), fields, strict=True):
         mesh = _mesh(body)
-        mesh["field"] = value.sel({terms.STATE: state}).values
+        mesh["field"] = array.sel({terms.STATE: state}).values
         plotter.add_mesh(
             mesh, scalars="field", clim=(float(low), float(high)), cmap=DIVERGING if is_signed else SEQUENTIAL, lighting=False,
             scalar_bar_args={"title": title, "color": "black", "n_labels": 5, "fmt": "%.3g"},
         )  # fmt: skip
         _add_edges(plotter, mesh)
-    return _looked_at(plotter) if is_own else plotter
+    return _in_view(plotter) if is_new else plotter
 
 
-def _plotter() -> Any:
-    pv.vtk_verbosity("off")  # without a display VTK says so, and goes on
+def _new_plotter() -> Any:
+    pv.vtk_verbosity("off")  # VTK would print a line where there is no display
     plotter = pv.Plotter(off_screen=True, window_size=(1200, 900), line_smoothing=True)
     plotter.set_background("white")
     return plotter
 
 
-def _looked_at(plotter: Any) -> Any:
+def _in_view(plotter: Any) -> Any:
     plotter.enable_parallel_projection()
-    plotter.view_vector(VIEW, viewup=(0, 0, 1))
+    plotter.view_vector(VIEWPOINT, viewup=(0, 0, 1))
     return plotter
 
 
-def _expect(word: str, value: str, known: tuple[str, ...]) -> None:
-    if value not in known:
-        raise OptionError(f"{word} is {value!r}; expected one of: {', '.join(known)}")
+def _expect(option: str, value: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise OptionError(f"{option} is {value!r}; expected one of: {', '.join(choices)}")
 
 
 def _groups(results: xr.DataTree) -> list[xr.Dataset]:
@@ -140,15 +142,15 @@ def _mesh(body: _Body) -> Any:
 def _moved(results: xr.DataTree | Assembly, part: int, realization: int, state: str, vertices: np.ndarray) -> np.ndarray:
     _expect("state", state, terms.STATES)
     if isinstance(results, Assembly):
-        raise OptionError("realizations are those of results; a declared model has none")
+        raise OptionError("a declared model has no realizations; give results instead, or leave out `realization`")
     rows = results.to_dataset()
     if not 0 <= realization < rows.sizes[terms.REALIZATION]:
         raise OptionError(f"realization is {realization}; expected 0 to {rows.sizes[terms.REALIZATION] - 1}")
     if terms.ROTATION.name not in rows:
         raise OptionError("the archive has no poses; run again with --keep poses")
     at = {terms.REALIZATION: realization, terms.STATE: terms.STATES.index(state), terms.PART: part}
-    R, t = (rows[of.name].isel(at).values for of in (terms.ROTATION, terms.TRANSLATION))
-    return np.asarray(vertices @ R.T + t)
+    R, t = (rows[variable.name].isel(at).values for variable in (terms.ROTATION, terms.TRANSLATION))
+    return vertices @ R.T + t
 
 
 def _size(bodies: list[_Body]) -> float:
@@ -156,14 +158,14 @@ def _size(bodies: list[_Body]) -> float:
 
 
 def _add_edges(plotter: Any, mesh: Any) -> None:
-    edges = mesh.extract_feature_edges(EDGE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
+    edges = mesh.extract_feature_edges(MIN_EDGE_ANGLE, boundary_edges=False, non_manifold_edges=False, manifold_edges=False)
     if edges.n_points:
         plotter.add_mesh(edges, color=INK, line_width=1.5)
 
 
 def _add_marks(plotter: Any, marks: Marks, size: float) -> None:
     def arrow(mark: Mark, length: float, colour: str) -> None:
-        """It points at its place."""
+        """Add an arrow that points at the place of the mark."""
         along = np.array(mark["along"]) / np.linalg.norm(mark["along"])
         start = np.array(mark["at"]) - length * along
         plotter.add_mesh(pv.Arrow(start=start, direction=along, scale=length, tip_radius=0.2, shaft_radius=0.08), color=colour)

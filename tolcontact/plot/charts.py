@@ -1,4 +1,4 @@
-"""Charts, with matplotlib."""
+"""Charts by matplotlib."""
 
 import math
 from collections.abc import Sequence
@@ -19,8 +19,8 @@ except ModuleNotFoundError as error:
 
 COLOURS = {"raw": "#7f8894", "corrected": "#d97706"}
 BINS = 60
-LIMIT = "#d01c1c"
-SIGMAS = 4.0  # that a normal curve is drawn to, on either side
+LIMIT_COLOUR = "#d01c1c"
+CURVE_SIGMAS = 4.0  # half the width of a normal curve, in standard deviations
 
 
 def histogram(
@@ -31,43 +31,44 @@ def histogram(
     bins: int = BINS,
     axes: Axes | None = None,
 ) -> Axes:
-    """The distribution of a measure (the only one, if there is one), with its limits, and normal curves of mean and variance.
+    """Draw the distribution of a measure with its limits, and normal curves of the same means and variances.
 
-    Heights are shares of all realizations in a bin, in %; both states have the same bins. Raises OptionError for a measure or a
-    state that is not there, or a measure without numbers.
+    The name may be left out if there is only one measure. Heights are the shares of realizations in each bin, in %; both states
+    have the same bins. Returns the matplotlib axes.
+    Raises OptionError for an unknown measure or state, and for a measure with values that are no numbers.
     """
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     place = _place(rows, measure)
-    of = rows.isel({terms.MEASURE: place})
+    column = rows.isel({terms.MEASURE: place})
     if not states or not set(states) <= set(terms.STATES):
         raise OptionError(f"states are {list(states)}; expected some of: {', '.join(terms.STATES)}")
-    values = {state: of[terms.MEASURED.name].sel({terms.STATE: state}).values for state in states}
-    every = np.concatenate(list(values.values()))
-    name, units = str(of[terms.MEASURE].values), str(of[terms.MEASURE_UNITS.name].values)
-    if not np.isfinite(every).all():
-        raise OptionError(f'measure "{name}" has values that are no numbers; nothing can be drawn of it')
+    values = {state: column[terms.MEASURED.name].sel({terms.STATE: state}).values for state in states}
+    both_states = np.concatenate(list(values.values()))
+    name, units = str(column[terms.MEASURE].values), str(column[terms.MEASURE_UNITS.name].values)
+    if not np.isfinite(both_states).all():
+        raise OptionError(f'measure "{name}" has values that are no numbers, so it cannot be drawn')
     if axes is None:
         axes = plt.figure(layout="constrained").add_subplot()
-    edges = np.histogram_bin_edges(every, bins)
+    edges = np.histogram_bin_edges(both_states, bins)
     for state, x in values.items():
         weights = np.full(len(x), 100 / len(x))
         axes.hist(x, edges.tolist(), weights=weights, color=COLOURS[state], alpha=0.6, label=state)
         mean, sigma = float(x.mean()), float(x.std(ddof=1))
         if sigma > 0:
-            z = np.linspace(-SIGMAS, SIGMAS, 161)
+            z = np.linspace(-CURVE_SIGMAS, CURVE_SIGMAS, 161)
             height = 100 * (edges[1] - edges[0]) / (sigma * math.sqrt(2 * math.pi))
             axes.plot(mean + sigma * z, height * np.exp(-(z**2) / 2), ":", color=COLOURS[state], label=f"normal, {state}")
     for limit in limits(rows)[place]:
         if math.isfinite(limit):
-            axes.axvline(limit, color=LIMIT, label="_limit")
+            axes.axvline(limit, color=LIMIT_COLOUR, label="_limit")
     axes.set(xlabel=f"{name} [{units}]", ylabel="% of realizations", title=results.attrs.get("title", ""))
     axes.legend(frameon=False)
     return axes
 
 
 def _place(rows: xr.Dataset, name: str | None) -> int:
-    """Which of the measures is meant."""
-    names = [str(each) for each in rows[terms.MEASURE].values]
+    """Return the index of a measure; without a name, that of the only one."""
+    names = [str(label) for label in rows[terms.MEASURE].values]
     if name is None and len(names) == 1:
         return 0
     if name not in names:
