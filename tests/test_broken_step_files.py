@@ -6,6 +6,7 @@ import pytest
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.files import read_files, reader
 
@@ -49,10 +50,14 @@ BROKEN = {
 }
 
 
-def test_twenty_broken_files_end_in_a_message_each_or_are_read(tmp_path, monkeypatch):
+NAMED = ("cut off in the middle", "without its data", "without points", "without faces", "without units", "a line twice")
+
+
+@pytest.mark.parametrize("kinds", [NAMED, *nightly([*BROKEN])], ids=len)
+def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path, monkeypatch):
     monkeypatch.setattr(reader, "SECONDS", 8.0)  # in which the whole one is read ten times over
     paths = {}
-    for number, (kind, text) in enumerate(BROKEN.items()):
+    for number, (kind, text) in enumerate((kind, BROKEN[kind]) for kind in kinds):
         paths[kind] = tmp_path / f"{number}.step"
         paths[kind].write_text(text)
     found = {path: content for (path, _), content in read_files([tc.Mesh(path) for path in paths.values()]).items()}

@@ -163,7 +163,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
         "--surfaces",
         4,
         "--samples",
-        400_000,
+        200_000,
         "--keep",
         "poses",
         "--quiet",
@@ -192,7 +192,7 @@ def test_a_scheduler_and_workers_in_shells(dask_processes, tmp_path):
     first = scheduler(dask_processes, port)
     workers = [worker(dask_processes, port) for _ in range(2)]
     address, whole, path = f"tcp://127.0.0.1:{port}", tmp_path / "whole.nc", tmp_path / "run.nc"
-    options = {"samples": 40_000, "solver": "daqp", "surfaces": 4}
+    options = {"samples": 24_000, "solver": "daqp", "surfaces": 4}
     tc.run(cases.stack(), out=whole, **options).close()
     done = call(
         tmp_path, "run", cases.MODELS / "ra1.py", "--solver", "daqp", "--samples", "9000", "--scheduler", address, "--quiet"

@@ -8,6 +8,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 from tolcontact.archive import ArchiveWriter, Run
 from tolcontact.statistics import DisplacementFields
 from tolcontact.testing import assert_gaps_recompute
@@ -58,11 +59,12 @@ def test_files_may_be_closed_by_any_thread_while_rows_are_written(tmp_path, left
 
 
 @pytest.mark.slow
-def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(tmp_path, left):
+@pytest.mark.parametrize("readings", [50, *nightly(150)])
+def test_files_may_be_closed_by_any_thread_while_the_netcdf_library_reads(readings, tmp_path, left):
     program = tc.build(cases.stack(), solver="daqp")
     sizes = DisplacementFields(program.nominal, "none").sizes
     with ArchiveWriter(tmp_path / "stack.nc", program, Run(1, 1000, "all", 8, "none"), sizes) as writer:
         rows = writer.chosen(1)
-        for _ in range(150):
+        for _ in range(readings):
             del left[:1]
             assert (writer.chosen(1) == rows).all()

@@ -35,7 +35,7 @@ def test_a_run_may_be_killed_at_any_of_its_writes(step, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("how", ["resume", "overwrite"])
+@pytest.mark.parametrize("how", ["resume", *nightly("overwrite")])
 def test_an_archive_is_not_taken_from_the_run_that_writes_it(how, tmp_path):
     path = tmp_path / "live.nc"
     with start(script("run_stack", path, 1000, "--step")) as begun:

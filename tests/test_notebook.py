@@ -90,6 +90,7 @@ def test_archives_that_xarray_opens_have_the_verbs_too(archive):
         assert results.tolcontact.summary().attrs["realizations"] == 300
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 def test_the_tour_runs_from_declaration_to_decision(tmp_path, drawing):
     notebook = nbformat.read(TOUR, as_version=4)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import tolcontact as tc
 from tests import referee
-from tests.helpers import R_t, simulate
+from tests.helpers import R_t, nightly, simulate
 from tolcontact.compilation import ACCURACY
 from tolcontact.method import OBJECTIVES
 from tolcontact.vocabulary import CORRECTED, RAW, Status
@@ -65,14 +65,14 @@ def assemblies(draw) -> tc.Assembly:
     return a
 
 
-@settings(max_examples=110, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck), phases=[Phase.generate])
 @given(
     assembly=assemblies(),
     solver=st.sampled_from(["qpoases", "daqp"]),
     resolution=st.sampled_from(["exact", "exact", "linearized"]),
     objective=st.sampled_from(tuple(OBJECTIVES)),
 )
-def test_certificates_hold(assembly, solver, resolution, objective):
+def judge(assembly, solver, resolution, objective):
+    """Resolve a random assembly, and check what its statuses certify."""
     method = tc.Method(resolution=resolution, objective=objective)
     try:
         program, run = simulate(assembly, samples=20, solver=solver, method=method)
@@ -105,3 +105,11 @@ def test_certificates_hold(assembly, solver, resolution, objective):
             for k in range(20):
                 least = referee.gaps(pair, R[k, CORRECTED], t[k, CORRECTED]).min()
                 assert least == pytest.approx(run["gap_min"][k, CORRECTED, index], rel=1e-9, abs=1e-9)
+
+
+SETTINGS = {"deadline": None, "derandomize": True, "suppress_health_check": list(HealthCheck), "phases": [Phase.generate]}
+
+
+@pytest.mark.parametrize("examples", [15, *nightly(110)])
+def test_certificates_hold(examples):
+    settings(max_examples=examples, **SETTINGS)(judge)()

@@ -18,6 +18,7 @@ def test_known_answers_are_computed(problem):
     assert any(figure.verdict == "agrees" for figure in figures)
 
 
+@pytest.mark.nightly
 @pytest.mark.slow
 @pytest.mark.filterwarnings("error::UserWarning:pdoc")
 def test_the_site_is_built(tmp_path, drawing):
