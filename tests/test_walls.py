@@ -25,6 +25,7 @@ ROOMS = {
     "netCDF4": ("archive/",),
     "h5py": ("archive/raw_file.py",),
     "typer": ("cli/",),
+    "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/"),
     "igl": ("geometry/", "report/html/decimation.py"),
     "cascadio": ("geometry/files/worker.py",),
@@ -41,7 +42,6 @@ LAZY = {
     "dask": ("simulation/cluster.py", "simulation/lazy.py"),
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
-    "jsonschema": ("declaration/",),
     "pandas": ("declaration/contributor.py",),
     "scipy.stats": ("declaration/tolerance.py",),
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.compilation import ACCURACY, Program
-from tolcontact.declaration.document import Writing, to_document
+from tolcontact.declaration.document import to_document
 from tolcontact.method import Method
 from tolcontact.simulation import block_rows
 from tolcontact.vocabulary import ArchiveVariable
@@ -79,7 +79,7 @@ def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
 
 def declaration(program: Program) -> str:
     """Return the declared model as JSON."""
-    return json.dumps(to_document(program.nominal.assembly, Writing(program.nominal.triangles, program.tapes)))
+    return json.dumps(to_document(program.nominal.assembly, program.nominal.triangles, program.tapes))
 
 
 def versions() -> str:

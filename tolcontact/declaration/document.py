@@ -3,206 +3,46 @@
 The two differ in three things. An archive has faces as triangles, meshes beside the document, and nothing is left out of it.
 """
 
-import math
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Mapping
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import msgspec
-import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.codec import (
-    CODECS,
-    Choice,
-    Codec,
-    EntryError,
-    Inline,
-    Items,
-    Named,
-    Optional,
-    Place,
-    Plain,
-    Record,
-    Sources,
-)
+from tolcontact.declaration.codec import CODECS, Choice, Inline, Items, Optional, Plain, Record
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
+from tolcontact.declaration.face_entry import (
+    FLOAT,
+    FREE_DIRECTION,
+    INDEX,
+    NOT_NEGATIVE,
+    POSITIVE,
+    UNIT_VECTOR,
+    Document,
+    Wrapped,
+    Writing,
+    floats,
+    indices_of,
+    text_type,
+)
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Part, Point
-from tolcontact.declaration.selection import KINDS as SURFACES
-from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.tape import Tape, tape_of
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
-from tolcontact.declaration.vectors import DIRECTIONS, Vector, direction
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
 from tolcontact.poses import ENTRIES
 
-Document = dict[str, Any]
-UNIT_TOLERANCE = 1e-12  # of the length of a direction
 MAX_FREEDOMS = 7  # of a feature, with its size
-MAX_INDEX = 2**31 - 1  # of triangles, points, faces
-
-
-@dataclass(frozen=True)
-class Writing:
-    """What a document is written with.
-
-    triangles   the indices of the triangles of a face
-    tapes       the steps of the users' own expressions, by measure
-    folder      the folder of a JSON model; None for an archive
-    """
-
-    triangles: Callable[[Face], list[int]]
-    tapes: Mapping[str, Tape]
-    folder: Path | None = None
-
-
-def _text(choices: Iterable[str]) -> Any:
-    """Return the type of a text whose choices the JSON schema lists; its class refuses others."""
-    return Annotated[str, Meta(extra_json_schema={"enum": list(choices)})]
-
-
-def _number(**limits: float) -> Any:
-    """Return the type of a number whose limits the JSON schema states; its class refuses others."""
-    return Annotated[float, Meta(extra_json_schema=limits)]
-
-
-# Limits that msgspec itself would check crash its 0.22 in a union with a list: classes check them, or `_indices`.
-INDEX = Annotated[int, Meta(extra_json_schema={"minimum": 0, "maximum": MAX_INDEX})]
-POSITIVE, NOT_NEGATIVE = _number(exclusiveMinimum=0), _number(minimum=0)
-
-
-def _part(name: str, place: Place) -> Part:
-    """Return the part that an entry names."""
-    if name not in place.sources.parts:
-        raise place.mismatch("the name of a part", name)
-    return place.sources.parts[name]  # type: ignore[no-any-return]
-
-
-def _feature(name: str, place: Place) -> Feature:
-    """Return the feature that an entry names, of the part that its record names."""
-    features = {feature.name: feature for feature in place.part.features}
-    if name not in features:
-        raise place.mismatch(f'the name of a feature of part "{place.part.name}"', name)
-    return features[name]
-
-
-def _unit_vector(value: Any, place: Place) -> Vector:
-    is_unit = not isinstance(value, str) and abs(math.hypot(*value) - 1) <= UNIT_TOLERANCE
-    return value if is_unit else direction(value)
-
-
-def _floats(value: Any, writing: Writing) -> Any:
-    if isinstance(value, Mapping):
-        return {key: float(item) for key, item in value.items()}
-    if isinstance(value, tuple):
-        return [None if item is None else float(item) for item in value]
-    return None if value is None else float(value)
-
-
-def _indices(value: Any, place: Place) -> Any:
-    """Return indices, or what else stands for them. Raises EntryError for one that no triangle, point or face can have."""
-    for k, index in enumerate(value) if isinstance(value, tuple) else [(None, value)]:
-        if isinstance(index, int) and not 0 <= index <= MAX_INDEX:
-            raise (place if k is None else place[k]).mismatch(f"a whole number from 0 to {MAX_INDEX}", index)
-    return value
-
-
-def _brep(value: Any, place: Place) -> Any:
-    """Return the number, the name or the point of a B-rep face."""
-    return value if isinstance(value, tuple) else _indices(value, place)
-
-
-def _array(rows: list[list[float]], place: Place) -> np.ndarray:
-    """Return rows of equal length as an array (row, column)."""
-    for k, row in enumerate(rows):
-        if len(row) != len(rows[0]):
-            raise place[k].mismatch(f"a list of {len(rows[0])}", row)
-    return np.array(rows, dtype=float).reshape(len(rows), len(rows[0]) if rows else 0)
-
-
-class AxisFace(Plain):
-    """Criteria that are one of six directions, without an angle."""
-
-    def __init__(self) -> None:
-        super().__init__(
-            _text(DIRECTIONS), lambda face, writing: face.direction, lambda text, place: place.checked(Facing(text))
-        )
-
-    def holds(self, value: Any) -> bool:
-        return isinstance(value, Facing) and isinstance(value.direction, str) and value == Facing(value.direction)
-
-
-class Wrapped(Codec):
-    """Entries with one value, under the key `mark`."""
-
-    def __init__(self, mark: str, codec: Codec) -> None:
-        self.mark, self.codec, self.cls = mark, codec, codec.cls
-        self.struct = msgspec.defstruct(mark.title(), [(mark, codec.wire)], forbid_unknown_fields=True)
-        schema = msgspec.json.schema_components([self.struct])[1][mark.title()]
-        self.wire = Annotated[Any, Meta(extra_json_schema=schema)]
-
-    def encode(self, value: Any, writing: Writing) -> Document:
-        return {self.mark: self.codec.encode(value, writing)}
-
-    def decode(self, entry: Any, place: Place, **arguments: Any) -> Any:
-        return self.codec.decode(getattr(place.converted(entry, self.struct), self.mark), place[self.mark])
-
-    def fits(self, entry: Any) -> bool:
-        return isinstance(entry, dict) and self.mark in entry
-
-
-class Faces(Named):
-    """Faces: their criteria in a JSON model; a direction or triangles, and boxes, in an archive."""
-
-    cls = Face
-
-    def __init__(self) -> None:
-        super().__init__("Face")
-        self.struct = msgspec.defstruct("Face", [
-            ("part", str), ("select", list[CRITERION.wire] | UnsetType, UNSET),  # type: ignore[name-defined]
-            ("direction", AXIS.wire | UnsetType, UNSET), ("triangles", TRIANGLES.wire | UnsetType, UNSET),
-            ("inside", BOXES.wire, ()),
-        ], forbid_unknown_fields=True)  # fmt: skip
-
-    def encode(self, value: Face, writing: Writing) -> Document:
-        if writing.folder is not None:
-            return {
-                "part": value.part.name,
-                "select": [_criterion(value, criterion, writing) for criterion in value.selections],
-            }
-        boxes = [[box.lower, box.upper] for box in value.selections if isinstance(box, Inside)]
-        others = [criterion for criterion in value.selections if not isinstance(criterion, Inside)]
-        is_axis = len(others) == 1 and AXIS.holds(others[0])
-        triangles = {"direction": str(others[0])} if is_axis else {"triangles": writing.triangles(value)}
-        return {"part": value.part.name, **triangles, "inside": boxes}
-
-    def decode(self, entry: Any, place: Place, **arguments: Any) -> Face:
-        struct = place.converted(entry, self.struct)
-        part, criteria = _part(struct.part, place["part"]), []
-        if struct.select is not UNSET:
-            criteria = [CRITERION.decode(item, place["select"][k]) for k, item in enumerate(struct.select)]
-        if struct.direction is not UNSET:
-            criteria.append(AXIS.decode(struct.direction, place["direction"]))
-        if struct.triangles is not UNSET:
-            criteria.append(Triangles(TRIANGLES.decode(struct.triangles, place["triangles"])))
-        criteria += [Inside(*box) for box in BOXES.decode(struct.inside, place["inside"])]
-        return place.checked(Face(part, tuple(criteria)))  # type: ignore[no-any-return]
-
-
-def _criterion(face: Face, criterion: Any, writing: Writing) -> Any:
-    """Return the entry of a criterion; what a function picks are triangles."""
-    if isinstance(criterion, Picked):
-        criterion = Triangles(tuple(map(int, writing.triangles(Face(face.part, (criterion,))))))
-    return CRITERION.encode(criterion, writing)
 
 
 class Shape(Choice):
@@ -234,7 +74,7 @@ def _distribution_entries(thing: Any, writing: Writing) -> Document:
     if isinstance(thing.distribution, str):
         return {"distribution": thing.distribution}
     frozen = thing.distribution
-    return {"scipy": frozen.dist.name, "args": _floats(tuple(frozen.args), writing), "kwds": _floats(frozen.kwds, writing)}
+    return {"scipy": frozen.dist.name, "args": floats(tuple(frozen.args), writing), "kwds": floats(frozen.kwds, writing)}
 
 
 def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
@@ -275,52 +115,27 @@ def _tolerance_record(cls: Any) -> Record:
     keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
     return Record(
         cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
-        zone=Plain(_text(ZONES) | None), along=Optional(FREE_DIRECTION),
-        material=Plain(_text(MATERIALS)), bonus=Plain(_text(BONUSES)), rule=Plain(_text(RULES)),
+        zone=Plain(text_type(ZONES) | None), along=Optional(FREE_DIRECTION),
+        material=Plain(text_type(MATERIALS)), bonus=Plain(text_type(BONUSES)), rule=Plain(text_type(RULES)),
     )  # fmt: skip
 
 
-UNIT_VECTOR = Plain(_text([*DIRECTIONS, "x", "y", "z"]) | Vector, read=_unit_vector)
-FREE_DIRECTION = Plain(_text([*DIRECTIONS, "x", "y", "z"]) | Vector, write=lambda value, writing: direction(value))
-AXIS = AxisFace()
-TRIANGLES = Plain(tuple[INDEX, ...], lambda indices, writing: list(map(int, indices)), _indices)
-BOXES = Plain(tuple[tuple[Vector, Vector], ...])
-FLOAT, ARGUMENTS, KEYWORDS = Plain(float, write=_floats), Plain(tuple[float, ...]), Plain(Mapping[str, float])
-CODECS |= {
-    Part: Plain(str, lambda part, writing: part.name, _part),
-    Feature: Plain(str, lambda feature, writing: feature.name, _feature),
-    np.ndarray: Plain(list[list[float]], lambda array, writing: array.tolist(), _array),
-}
-CRITERION = Choice(
-    "Criterion",
-    "a direction, or one of facing, inside, near, brep, cylinder, largest, triangles",
-    AXIS,
-    Record(Facing, "facing=direction angle", mark="facing", facing=FREE_DIRECTION, angle=Plain(POSITIVE)),
-    Record(Inside, "inside=lower+upper", mark="inside"),
-    Record(Near, "near=part within", mark="near", near=CODECS[Part], within=Plain(POSITIVE)),
-    Record(Brep, "brep=which", mark="brep", brep=Plain(INDEX | str | Vector, read=_brep)),
-    Wrapped("cylinder", Record(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
-    Record(
-        Largest, "largest=kind direction?", mark="largest", largest=Plain(_text(SURFACES)), direction=Optional(FREE_DIRECTION)
-    ),
-    Record(Triangles, "triangles=indices", mark="triangles", triangles=TRIANGLES),
-)
-CODECS[Face] = Faces()
+ARGUMENTS, KEYWORDS = Plain(tuple[float, ...]), Plain(Mapping[str, float])
 POINT = CODECS[Point] = Record(Point, "part on? end? position?")
 DISTRIBUTION = Inline(
-    {"distribution": _text(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
+    {"distribution": text_type(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
     _distribution_entries,
     _distribution,
 )
 ZONE = Record(
     Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | None), distribution=DISTRIBUTION,
-    shift=FLOAT, cp=Plain(POSITIVE | None, write=_floats), cpk=Plain(float | None, write=_floats),
+    shift=FLOAT, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
 )  # fmt: skip
 WIDTH = Plain(NOT_NEGATIVE, read=lambda width, place: place.checked(Tolerance(width)))
 CODECS[Tolerance] = Choice("Tolerance", "a width in mm, or named values", ZONE, WIDTH)
 SIZE = Record(
     Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), lower=Plain(float | None),
-    moves=Plain(_text(MOVES)), distribution=DISTRIBUTION,
+    moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
@@ -331,25 +146,26 @@ SHAPE = Shape(
     "a box, or a file",
     Record(Box, "box=x+y+z", mark="box"),
     Record(
-        Mesh, "file=source units? body? chord?", mark="file", units=Plain(_text(UNITS) | None), chord=Plain(POSITIVE | None),
-        file=Plain(Annotated[str, Meta(description="path, from the folder of this file")], _file_name, _file),
+        Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
+        chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")], _file_name, _file),
     ),
     Wrapped("mesh", Plain(str, read=lambda text, place: _mesh(place))),
 )  # fmt: skip
 LOCATOR = Record(
     Locator, "name point direction one_sided stiffness tolerance on?",
-    direction=UNIT_VECTOR, stiffness=Plain(POSITIVE, write=_floats),
+    direction=UNIT_VECTOR, stiffness=Plain(POSITIVE, write=floats),
 )  # fmt: skip
 SCHEME = Choice(
     "Scheme",
     "a list of locators, or a 3-2-1 scheme",
     Items(LOCATOR),
-    Record(ThreeTwoOne, "three_two_one=primary+secondary+tertiary inset", inset=Plain(NOT_NEGATIVE, write=_floats)),
+    Record(ThreeTwoOne, "three_two_one=primary+secondary+tertiary inset", inset=Plain(NOT_NEGATIVE, write=floats)),
 )
 METHOD = Record(
-    Method, " ".join(member.name for member in fields(Method)), resolution=Plain(_text(RESOLUTIONS)),
-    objective=Plain(_text(OBJECTIVES)), regularization=Plain(_text(REGULARIZATIONS)), active_set=Plain(_text(ACTIVE_SETS)),
-    search=Plain(_text(SEARCHES)),
+    Method, " ".join(member.name for member in fields(Method)),
+    resolution=Plain(text_type(RESOLUTIONS)),
+    objective=Plain(text_type(OBJECTIVES)), regularization=Plain(text_type(REGULARIZATIONS)), active_set=Plain(text_type(ACTIVE_SETS)),
+    search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
@@ -362,7 +178,7 @@ LISTS = {
     "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
-        points=Plain(INDEX | _text([VERTICES]) | None, read=_indices),
+        points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
         spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None),
     ),
     "measures": Record(
@@ -370,10 +186,10 @@ LISTS = {
             {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
         ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | None),
-        limits=Plain(tuple[float | None, float | None] | None, write=_floats),
+        limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
     "forces": Record(Force, "at name vector declared_at"),
-    "variables": Record(Variable, "tolerance drives name units declared_at", drives=Plain(Mapping[str, float], write=_floats)),
+    "variables": Record(Variable, "tolerance drives name units declared_at", drives=Plain(Mapping[str, float], write=floats)),
     "correlations": Record(Correlation, "labels matrix declared_at"),
     "populations": Record(Population, "values columns source declared_at"),
 }  # fmt: skip
@@ -384,8 +200,11 @@ DOCUMENT = msgspec.defstruct("Document", [
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
 
-def to_document(assembly: Assembly, writing: Writing) -> Document:
-    """Return the document of an assembly, for an archive or a JSON model."""
+def to_document(
+    assembly: Assembly, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape], folder: Path | None = None
+) -> Document:
+    """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
+    writing = Writing(triangles, tapes, folder)
     lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in LISTS.items()}
     return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **lists}
 
@@ -417,7 +236,7 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in LISTS if name not in ("parts", "measures")]:
         things[name] = Items(LISTS[name]).decode(getattr(struct, name), place[name])
-    locators = sum(len(each.scheme) if isinstance(each.scheme, tuple) else 6 for each in things["locations"])
+    locators = sum(len(location.scheme) if isinstance(location.scheme, tuple) else 6 for location in things["locations"])
     deviations = locators + MAX_FREEDOMS * sum(len(part.features) for part in parts) + len(things["variables"])
     sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
     things["measures"] = Items(LISTS["measures"]).decode(struct.measures, Place(sources)["measures"])

@@ -8,10 +8,11 @@ from typing import Any
 import msgspec
 
 from tolcontact.declaration.assembly import Assembly
-from tolcontact.declaration.codec import EntryError, Sources, definitions
-from tolcontact.declaration.document import DOCUMENT, Writing, assembly_of, to_document
+from tolcontact.declaration.codec import definitions
+from tolcontact.declaration.document import DOCUMENT, assembly_of, to_document
 from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.part import Face
+from tolcontact.declaration.place import EntryError, Sources
 from tolcontact.declaration.tape import Tape
 from tolcontact.errors import ScriptError
 
@@ -42,7 +43,7 @@ def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[
     for part in assembly.parts:
         if isinstance(part.geometry, Mesh) and not isinstance(part.geometry.source, str | Path):
             raise ScriptError(f'part "{part.name}": its mesh is no file, so JSON cannot name it; save it as STL first')
-    document = to_document(assembly, Writing(triangles, tapes, path.resolve().parent))
+    document = to_document(assembly, triangles, tapes, path.resolve().parent)
     text = json.dumps({"$schema": SCHEMA_NAME, **document}, indent=1, ensure_ascii=False)
     path.write_text(text + "\n", encoding="utf-8")
 

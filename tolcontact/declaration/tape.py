@@ -7,7 +7,7 @@ value.
 
 from typing import Any
 
-from tolcontact.declaration.codec import MAX_NUMBER, Place
+from tolcontact.declaration.place import MAX_NUMBER, Place
 
 Tape = tuple[tuple[Any, ...], ...]
 
