@@ -147,7 +147,8 @@ SHAPE = Shape(
     Record(Box, "box=x+y+z", mark="box"),
     Record(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
-        chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")], _file_name, _file),
+        chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],
+        _file_name, _file),
     ),
     Wrapped("mesh", Plain(str, read=lambda text, place: _mesh(place))),
 )  # fmt: skip
@@ -164,7 +165,8 @@ SCHEME = Choice(
 METHOD = Record(
     Method, " ".join(member.name for member in fields(Method)),
     resolution=Plain(text_type(RESOLUTIONS)),
-    objective=Plain(text_type(OBJECTIVES)), regularization=Plain(text_type(REGULARIZATIONS)), active_set=Plain(text_type(ACTIVE_SETS)),
+    objective=Plain(text_type(OBJECTIVES)), regularization=Plain(text_type(REGULARIZATIONS)),
+    active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
 # A part is read without its features, whose faces may refer to all parts.
