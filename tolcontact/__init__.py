@@ -23,8 +23,9 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | stage | chapter | subject |
 |---|---|---|
 | declare | `tolcontact.declaration` | parts, faces, locators, features, tolerances, contact pairs, forces, measures |
+| read shapes | `tolcontact.geometry` | meshes, STEP files, faces and their surfaces |
 | tolerances of a drawing | `tolcontact.features` | kinds of features and tolerances, datums |
-| discretize | `tolcontact.discretization` | meshes and STEP files, contact points, warnings |
+| discretize | `tolcontact.discretization` | contact points, balls and shafts, warnings |
 | draw | `tolcontact.variation` | from tolerances and zones to deviations; seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |

@@ -11,7 +11,7 @@ Lengths are in mm, angles in rad, forces in N. Points, faces and locators are gi
 `part(name, shape, at=..., rotation=...)` places a shape in the nominal assembly: the point p of its own frame lies at
 `rotation * p + at`, where `rotation` is a rotation vector. A shape is a `tc.Box(x, y, z)`, which reaches from the origin of
 its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
-`trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.discretization`).
+`trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.geometry`).
 
 >>> base = clamp.part("base", tc.Box(100, 50, 10), fixed=True)
 >>> plate = clamp.part("plate", tc.Box(60, 40, 8), at=(20, 5, 10))
@@ -109,7 +109,7 @@ after.
 spread evenly, and more where the rims of flat faces cross or faces are curved; `points=` sets their number, `spacing=` their
 distance, and `points="vertices"` takes the vertices of the mesh. A point takes part if the reference face lies within
 `within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part). A ball or a shaft beside
-walls needs no sampled points (see Round faces in `tolcontact.discretization`), unless you ask for some.
+walls needs no sampled points (see Balls and shafts in `tolcontact.discretization`), unless you ask for some.
 
 >>> pair = clamp.contact("seat", moving=plate.face("-z"), reference=base.face("+z"), spacing=5)
 >>> print(pair)

@@ -1,6 +1,7 @@
 """Discretize: shapes become surfaces, contact points and locator points in the nominal assembly frame. A chapter of the guide.
 
-`tc.build(model)` reads the shapes, finds the faces, and spreads contact points. They are the same in all realizations.
+`tc.build(model)` reads the shapes, finds the faces (see `tolcontact.geometry`) and spreads contact points, which are the same
+in all realizations.
 
 >>> import tolcontact as tc
 >>> stand = tc.Assembly("stand")
@@ -49,23 +50,7 @@ contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat tria
 A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, by itself (below 1 mm, above 10 m) or
 beside a part that it touches. It also names a mesh if a locator, measure or force is farther from it than its own size.
 
-## Meshes
-
-`tc.Mesh(source, units=...)` states the units of the source: "um", "mm", "cm", "m", "in" or "ft". Without it, a STEP file
-states its own, a GLB file is in m, `mesh.units` of a Trimesh applies if it is set, and all others are in mm.
-
-Meshes may be open, or hold several bodies. A surface whose outside is undefined is rejected: neighbouring triangles oriented
-inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles
-and extend to 10 km from its origin. On curved faces normals are interpolated between the corners of the triangles. Triangles
-that meet at more than 30 degrees form an edge.
-
-## Round faces
-
-A face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. It is also known where a cylinder,
-cone or sphere fits all vertices of a smooth piece of a mesh to within 1 um; the piece has at least five facets, with turns of
-at most 30 degrees between them. Contact points, their feet and normals then lie on that surface, not on its triangles. So a
-prism of many sides counts as a cylinder: `tolcontact check` says how far the triangles lie inside. Other curved faces are as
-round as their triangles.
+## Balls and shafts
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
 beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a
@@ -90,29 +75,6 @@ Diameters of features vary exactly in these contacts: the radius of the ball, th
 
 The ends of the faces are those of the nominal assembly. A shaft that is pushed out of its hole, or a ball beyond the end of its
 wall, is not detected at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).
-
-## STEP files
-
-STEP needs the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um (or 5e-6 of the extent of the
-file, beyond 0.4 m) and 0.1 rad; with `tc.Mesh(file, chord=0.1)` to within 0.1 mm. Contact on surfaces that the file states does
-not depend on this. Faces keep their boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where
-the file states a plane, cylinder, cone, sphere or torus, vertices are put onto it in double precision (as near as the surfaces
-that meet in a vertex come to each other). Elsewhere they have single precision, 1e-5 mm at 100 mm and 2e-4 mm at 1 m. If there
-would be more than a million triangles, or if it takes too long, faces are triangulated 30 times as coarsely, and to 0.5 rad; a
-warning says so.
-
-A file of an assembly holds several bodies: `tolcontact bodies FILE.stp` and `tc.bodies_in` list them. `tc.Mesh(file,
-body=...)` is one of the bodies in the frame of its product, and `tc.parts_from(model, file)` declares all bodies, or the named
-ones, as parts in their places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their
-numbers, kinds, directions, radii and areas, and with the names that the file gives them: `tc.Brep("...")` chooses by these.
-(If the faces of a body have several colours, they are out of the file's order and their names are unknown.) Where a file
-states no simple surface, a plane, cylinder, cone or sphere is fitted if it is within 1 um of all vertices, and its distance is
-stated. References to other files are rejected.
-
-## Files from others
-
-Shape files are read by a separate process with a limit on time (30 s, and 20 s for each MB) and memory (6 GiB). A damaged
-file therefore ends in one message that names the file and says what to do.
 """
 
 from tolcontact.discretization.discretizing import discretize
