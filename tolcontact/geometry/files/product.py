@@ -14,7 +14,7 @@ from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.files.bodies import Body, Place, Triangles, bodies, listed
+from tolcontact.geometry.files.bodies import Body, ShapePlace, StepMesh, bodies, listed
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText
 
@@ -129,14 +129,14 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         vertices[used] = onto(own, faces, brep[chosen], known[-1], off)
     mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
     places = [
-        Place(int(stands), _in_mm(path, transform), tuple(json.loads(str(names))))
+        ShapePlace(int(stands), _in_mm(path, transform), tuple(json.loads(str(names))))
         for stands, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
     ]
-    triangles = Triangles(
+    step_mesh = StepMesh(
         np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"],
         known, text.unit,
     )  # fmt: skip
-    return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(triangles, places, text.solids)), text)
+    return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(step_mesh, places, text.solids)), text)
 
 
 def _mended(path: Path, faces: np.ndarray) -> np.ndarray:
