@@ -78,7 +78,7 @@ def test_results_and_models_have_the_same_marks(results, drawing):
         (lambda r: tc.plot.field(r, component="w"), "expected one of: x, y, z, magnitude"),
         (lambda r: tc.plot.assembly(r, realization=300), "expected 0 to 299"),
         (lambda r: tc.plot.assembly(r, realization=1, state="first"), "expected one of: raw, corrected"),
-        (lambda r: tc.plot.assembly(cases.ra1(), realization=1), "a declared model has none"),
+        (lambda r: tc.plot.assembly(cases.ra1(), realization=1), "a declared model has no realizations"),
     ],
 )
 def test_what_cannot_be_drawn_is_said(draw, said, results, drawing):
