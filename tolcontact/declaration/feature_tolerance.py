@@ -34,30 +34,16 @@ class Size(Readable):
 
     nominal: float
     upper: float
-    lower: float
+    lower: float = None  # type: ignore[assignment]  # -upper by default
     _: KW_ONLY
-    distribution: Any
-    cp: float | None
-    cpk: float | None
-    moves: str
+    distribution: Any = "normal"
+    cp: float | None = None
+    cpk: float | None = None
+    moves: str = "both"
 
-    def __init__(
-        self,
-        nominal: float,
-        upper: float,
-        lower: float | None = None,
-        *,
-        distribution: Any = "normal",
-        cp: float | None = None,
-        cpk: float | None = None,
-        moves: str = "both",
-    ) -> None:
-        lower = -upper if lower is None and is_length(upper) else lower
-        for name, value in (
-            ("nominal", nominal), ("upper", upper), ("lower", lower), ("distribution", distribution), ("cp", cp), ("cpk", cpk),
-            ("moves", moves),
-        ):  # fmt: skip
-            object.__setattr__(self, name, value)
+    def __post_init__(self) -> None:
+        if self.lower is None and is_length(self.upper):
+            object.__setattr__(self, "lower", -self.upper)
 
     @property
     def tolerance(self) -> Tolerance:
