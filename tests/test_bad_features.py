@@ -138,10 +138,8 @@ def test_how_far_a_face_is_off_the_nearest_simple_one_is_said(tolerance):
 
 
 def test_a_datum_that_locks_nothing_is_named():
-    a = toleranced.ball_with()
+    a = toleranced.ball_with(letter="S")
     part = a.parts[0]
-    part.feature("centre", part.face(lambda c, n: np.linalg.norm(c - (3, 2, 20), axis=1) < 7), datum="S")
-    del part._features[-2]  # the ball without a letter
     part.feature("over", part.face("+x", lambda c, n: abs(c[:, 0] - 20) < 1e-9), tc.Parallelism(0.1, "S"))
     (fault,) = [each for each in tc.check(a) if "lock" in each]
     assert "parallelism: the datum system S does not lock any of what is toleranced; add the datum that does" in fault

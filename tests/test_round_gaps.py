@@ -24,7 +24,7 @@ def check_gaps(points, rng, turn):
     for _ in range(3):
         R, t = Rotation.from_rotvec(rng.normal(scale=turn, size=3)).as_matrix(), rng.normal(scale=0.2, size=3)
         X, grown, reactions = np.concatenate([R.ravel(), t]), heights.normal(scale=0.01, size=2), rng.uniform(size=count)
-        gaps, slopes, bow, wrap = (each.full() for each in evaluate(X, grown, reactions))
+        gaps, slopes, bow, wrap, _ = (each.full() for each in evaluate(X, grown, reactions))
         archived = np.array([point.gaps(R, t, *grown) for point in again])
         # A fixed tangent of a hollow wall is the nearest one where the two are in one direction.
         replaced = (gaps.ravel()[:, None] == gaps.ravel()).sum(axis=1) > 1
@@ -119,6 +119,8 @@ def test_curvature_on_an_axis_is_that_of_some_room_beside_it():
         (Cylinder(np.zeros(3), axis, radius=2.0), np.zeros(3), 1.0),  # as large as the ball: it has no room at all
     ):
         evaluate = round_gaps(RoundPoints.of([RoundPoint(wall, True, centre, NONE, NONE, 2.0, True, x, np.pi)]))
-        *_, bow, wrap = (each.full() for each in evaluate(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), [1]))
+        _, _, bow, wrap, _ = (
+            each.full() for each in evaluate(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), np.zeros(2), [1])
+        )
         assert np.isfinite(bow).all()
         assert np.abs(wrap)[9:, 9:].max() == pytest.approx(expected / (1e-3 * 2.0), rel=1e-6)

@@ -38,16 +38,16 @@ def ring_with(feature: str, *tolerances, frame: Frame = STILL) -> tc.Assembly:
     return a
 
 
-def ball_with(*tolerances, frame: Frame = STILL) -> tc.Assembly:
+def ball_with(*tolerances, frame: Frame = STILL, letter: str | None = None) -> tc.Assembly:
     """A fixed block with a ball on it, which is toleranced to its faces."""
     a = tc.Assembly("ball")
     base = trimesh.creation.box(extents=(40, 40, 10))
     sphere = trimesh.creation.icosphere(subdivisions=3, radius=6).apply_translation((3, 2, 20))
     part = a.part("base", tc.Mesh(trimesh.util.concatenate([base, sphere])), **frame.place(0, 0, 0), fixed=True)
-    for letter, (direction, height) in {"A": ("-z", 5), "B": ("-x", 20), "C": ("-y", 20)}.items():
+    for datum, (direction, height) in {"A": ("-z", 5), "B": ("-x", 20), "C": ("-y", 20)}.items():
         axis = "xyz".index(direction[1])
-        part.feature(letter, part.face(direction, lambda c, n, k=axis, h=height: abs(c[:, k] + h) < 1e-9), datum=letter)
-    own = part.feature("ball", part.face(lambda c, n: np.linalg.norm(c - (3, 2, 20), axis=1) < 7), *tolerances)
+        part.feature(datum, part.face(direction, lambda c, n, k=axis, h=height: abs(c[:, k] + h) < 1e-9), datum=datum)
+    own = part.feature("ball", part.face(lambda c, n: np.linalg.norm(c - (3, 2, 20), axis=1) < 7), *tolerances, datum=letter)
     a.measure("x", own.axis(0), along=frame.along(1, 0, 0))
     return a
 
