@@ -1,8 +1,8 @@
-"""The region that a worst case may come from: what drawings allow, whatever the shares.
+"""The region that a worst case may come from: all combinations of deviations that the drawings allow, however unlikely.
 
-Each contributor's own deviation lies in its zone: a range about its middle, the limits of a size, the support of a scipy.stats
-distribution (its middle 99.73 % where it has no end). Components of features lie in the zones of their tolerances together,
-with the bonus that their size leaves; those of measured parts are one of the rows. Correlations are not regarded.
+The deviation of each contributor lies in its zone: a range about its middle, the limits of a size, or the support of a
+scipy.stats distribution (its middle 99.73 % where it has no end). The components of a feature lie together in the zones of its
+tolerances, with the bonus that its size leaves. Measured parts are one of their rows. Correlations are not regarded.
 """
 
 import numpy as np
@@ -12,25 +12,26 @@ from tolcontact.declaration import Tolerance
 from tolcontact.variation.contributors import TAIL, ComponentZone, Contributor
 from tolcontact.variation.draws import Draws
 
-AROUND = 32  # random directions in which the extreme points of a zone are looked up, beside those along its components
-CUTS = 40  # tangents of a round zone, one after the other
-CLOSE = 1e-9  # of a zone's width: what lies farther outside is outside
-FINELY = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
-ROUGHLY, EXACTLY = 1e-2, 1e-7  # of a zone's width: how far tangents of a round zone may leave it
+RANDOM_DIRECTIONS = 32  # in which the extreme points of a zone are searched, beside those along its components
+MAX_CUTS = 40  # tangents of a round zone, one after the other
+TOLERANCE = 1e-9  # of a zone's width: points farther outside are outside
+LP_TOLERANCES = {"primal_feasibility_tolerance": 1e-10, "dual_feasibility_tolerance": 1e-10}
+COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-7  # of a zone's width: distance between tangents and a round zone
 
 
 class Region:
-    """What the contributors of a model may be. Own deviations (n, contributor) are those before shared causes drive them.
+    """The region of a model. A point (contributor,) is a combination of deviations before shared causes drive them.
 
-    lower, upper   (contributor,) of own deviations, each by itself
+    lower, upper   (contributor,) bounds of points
     varies         columns that are not one number
+    moves          columns that vary continuously: not those of measured parts
     """
 
     def __init__(self, draws: Draws, *, seed: int) -> None:
-        every = draws.contributors
-        bounds = np.array([_bounds(each) for each in every]).reshape(-1, 2)
+        contributors = draws.contributors
+        bounds = np.array([_bounds(contributor) for contributor in contributors]).reshape(-1, 2)
         self.lower, self.upper = bounds.T.copy()
-        self._drive = np.eye(len(every)) + draws.drive_matrix
+        self._drive = np.eye(len(contributors)) + draws.drive_matrix
         self._populations = draws.populations
         measured = [column for columns, _ in self._populations for column in columns]
         for columns, values in self._populations:
@@ -40,78 +41,81 @@ class Region:
             self._enclose(zone)
         self._joined = [(np.array(columns), values) for columns, values in self._populations]
         rng = np.random.default_rng(seed)
-        for columns in self._together():
+        for columns in self._joint_columns():
             self._joined.append((columns, self._extremes(columns, rng)))
         self.varies = np.flatnonzero(self.upper > self.lower)
-        self.moves = np.setdiff1d(self.varies, measured)  # what measured parts are is not between their rows
+        self.moves = np.setdiff1d(self.varies, measured)  # between the rows of measured parts there is nothing
 
-    def deviations(self, own: np.ndarray) -> np.ndarray:
-        """Deviations (n, contributor), as a Program takes them."""
-        return np.asarray(own @ self._drive)
+    def deviations(self, points: np.ndarray) -> np.ndarray:
+        """Return deviations (n, contributor), as a Program takes them, of points (n, contributor)."""
+        return np.asarray(points @ self._drive)
 
     def slopes(self, slopes: np.ndarray) -> np.ndarray:
-        """Derivatives by own deviations (..., contributor), of those by deviations."""
+        """Return derivatives by points (..., contributor), from derivatives by deviations."""
         return np.asarray(slopes @ self._drive.T)
 
     @property
     def middle(self) -> np.ndarray:
-        """Own deviations (contributor,) in the middle of all ranges and zones."""
-        found = (self.lower + self.upper) / 2
+        """The point (contributor,) in the middle of all ranges and zones."""
+        middle = (self.lower + self.upper) / 2
         for columns, values in self._populations:
-            found[columns] = values[0]
-        return np.asarray(found)
+            middle[columns] = values[0]
+        return np.asarray(middle)
 
     def farthest(self, direction: np.ndarray) -> np.ndarray:
-        """Own deviations (n, contributor) that go farthest in directions (n, contributor); of zones among some of their
-        extreme points."""
-        found: np.ndarray = np.where(direction > 0, self.upper, np.where(direction < 0, self.lower, self.middle))
+        """Return the farthest points (n, contributor) in directions (n, contributor); in zones, among some extreme points."""
+        ends: np.ndarray = np.where(direction > 0, self.upper, np.where(direction < 0, self.lower, self.middle))
         for columns, points in self._joined:
-            found[:, columns] = points[(direction[:, columns] @ points.T).argmax(axis=1)]
-        return found
+            ends[:, columns] = points[(direction[:, columns] @ points.T).argmax(axis=1)]
+        return ends
 
     def exactly_farthest(self, direction: np.ndarray) -> np.ndarray:
-        """Own deviations (contributor,) that go farthest in a direction (contributor,), in round zones to within rounding."""
-        found = np.array(self.farthest(direction[None])[0])
-        for columns in self._together():
+        """Return the farthest point (contributor,) in a direction (contributor,), in round zones to within rounding."""
+        end = np.array(self.farthest(direction[None])[0])
+        for columns in self._joint_columns():
             if direction[columns].any():
-                found[columns] = self._farthest_of(columns, direction[columns], EXACTLY)
-        return found
+                end[columns] = self._farthest_of(columns, direction[columns], FINE_TOLERANCE)
+        return end
 
     def scattered(self, rng: np.random.Generator, count: int) -> np.ndarray:
-        """Own deviations (count, contributor): half of them at random extremes, half of them at random between two such."""
+        """Return random points (count, contributor): half of them extreme points, half of them between two of these."""
         ends = self.farthest(rng.standard_normal((2 * count, len(self.lower))))
         share = rng.random((count, 1)) * (np.arange(count) % 2)[:, None]
-        found = ends[:count] + share * (ends[count:] - ends[:count])
+        points = ends[:count] + share * (ends[count:] - ends[:count])
         for columns, _ in self._populations:
-            found[:, columns] = ends[:count, columns]
-        return np.asarray(found)
+            points[:, columns] = ends[:count, columns]
+        return np.asarray(points)
 
-    def reach(self, own: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """How many (n,) of the steps (n, contributor) can be taken from (n, contributor) before the region ends, at most 1."""
+    def reach(self, points: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Return the shares (n,), at most 1, of steps (n, contributor) from points (n, contributor) that stay in the region."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            room = np.where(step > 0, (self.upper - own) / step, np.where(step < 0, (self.lower - own) / step, np.inf))
-        found = np.minimum(1.0, room.min(axis=1, initial=np.inf))
+            room = np.where(step > 0, (self.upper - points) / step, np.where(step < 0, (self.lower - points) / step, np.inf))
+        shares = np.minimum(1.0, room.min(axis=1, initial=np.inf))
         for zone in self.zones:
-            start, along = self._lengths(zone, own), np.einsum("pec,nc->npe", zone.rows, step[:, zone.columns])
-            found = np.minimum(found, _first_crossing(start, along, self._half(zone, own), self._half(zone, own + step)))
-        return np.asarray(np.maximum(found, 0.0))
+            start, along = self._lengths(zone, points), np.einsum("pec,nc->npe", zone.rows, step[:, zone.columns])
+            half, half_after = self._half(zone, points), self._half(zone, points + step)
+            shares = np.minimum(shares, _first_crossing(start, along, half, half_after))
+        return np.asarray(np.maximum(shares, 0.0))
 
-    def is_inside(self, own: np.ndarray) -> np.ndarray:
-        """Whether own deviations (n, contributor) lie in the region."""
-        slack = CLOSE * (self.upper - self.lower)
-        found = ((own >= self.lower - slack) & (own <= self.upper + slack)).all(axis=1)
+    def is_inside(self, points: np.ndarray) -> np.ndarray:
+        """Return whether points (n, contributor) lie in the region."""
+        slack = TOLERANCE * (self.upper - self.lower)
+        inside = ((points >= self.lower - slack) & (points <= self.upper + slack)).all(axis=1)
         for zone in self.zones:
-            longest = np.linalg.norm(self._lengths(zone, own), axis=2).max(axis=1, initial=0.0)
-            found &= longest <= self._half(zone, own) + CLOSE * zone.width
-        return np.asarray(found)
+            longest = np.linalg.norm(self._lengths(zone, points), axis=2).max(axis=1, initial=0.0)
+            inside &= longest <= self._half(zone, points) + TOLERANCE * zone.width
+        return np.asarray(inside)
 
-    def planes(self, own: np.ndarray | None = None, slack: float = CLOSE) -> tuple[np.ndarray, np.ndarray]:
-        """Half-spaces (row, contributor), (row,) that contain the region: a @ own <= b. Tangents where own deviations
-        (contributor,) leave a zone by more than `slack` of its width; without these, around all zones."""
+    def planes(self, point: np.ndarray | None = None, slack: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
+        """Return half-spaces (row, contributor), (row,) that contain the region: a @ point <= b.
+
+        They are tangents where a point (contributor,) leaves a zone by more than `slack` of its width. Without a point they
+        stand around all zones.
+        """
         rows, ends = [], []
         for zone in self.zones:
             for row in zone.rows:
-                for normal in _normals(row, None if own is None else row @ (own[zone.columns] - zone.middle)):
+                for normal in _normals(row, None if point is None else row @ (point[zone.columns] - zone.middle)):
                     plane = np.zeros(len(self.lower))
                     plane[zone.columns] = normal @ row
                     end = zone.width / 2 + plane[zone.columns] @ zone.middle
@@ -119,102 +123,101 @@ class Region:
                         # |row| <= (width + growth (size - limit)) / 2, of the size as it is driven
                         plane -= zone.growth / 2 * self._drive[:, zone.size]
                         end -= zone.growth / 2 * zone.limit
-                    if own is None or plane @ own > end + slack * zone.width:
+                    if point is None or plane @ point > end + slack * zone.width:
                         rows.append(plane)
                         ends.append(end)
         return np.array(rows).reshape(-1, len(self.lower)), np.array(ends)
 
-    def _half(self, zone: ComponentZone, own: np.ndarray) -> np.ndarray:
-        """Half of what width a zone has (n,), with its bonus."""
+    def _half(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
+        """Return half the width (n,) of a zone, with its bonus."""
         if zone.size is None:
-            return np.full(len(own), zone.width / 2)
-        return np.asarray((zone.width + zone.growth * (own @ self._drive[:, zone.size] - zone.limit)) / 2)
+            return np.full(len(points), zone.width / 2)
+        return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.size] - zone.limit)) / 2)
 
-    def _lengths(self, zone: ComponentZone, own: np.ndarray) -> np.ndarray:
-        """Rows of a zone (n, point, entry) at own deviations."""
-        return np.asarray(np.einsum("pec,nc->npe", zone.rows, own[:, zone.columns] - zone.middle))
+    def _lengths(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
+        """Return the rows of a zone (n, point, entry) at points of the region."""
+        return np.asarray(np.einsum("pec,nc->npe", zone.rows, points[:, zone.columns] - zone.middle))
 
     def _enclose(self, zone: ComponentZone) -> None:
-        """Bounds of components, each by itself: as far as any direction of the zone lets them be."""
+        """Bound each component by the extent of its zone."""
         widest = zone.width
         if zone.size is not None:
             ends = np.array([self.lower, self.upper])[:, zone.size]
             widest += float((zone.growth * (ends - zone.limit)).max())
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
-        far = np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2
-        known = self.upper[zone.columns] > self.lower[zone.columns]  # a narrower tolerance says it already
-        columns = zone.columns[~known]
-        self.lower[columns], self.upper[columns] = (zone.middle - far)[~known], (zone.middle + far)[~known]
+        extent = np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2
+        is_bounded = self.upper[zone.columns] > self.lower[zone.columns]  # by a narrower tolerance
+        columns = zone.columns[~is_bounded]
+        self.lower[columns], self.upper[columns] = (zone.middle - extent)[~is_bounded], (zone.middle + extent)[~is_bounded]
 
-    def _together(self) -> list[np.ndarray]:
-        """Columns of zones that share some, set by set, with the sizes that they grow with."""
+    def _joint_columns(self) -> list[np.ndarray]:
+        """Return sets of columns: zones with common columns are one set, with the sizes that they grow with."""
         sets: list[set[int]] = []
         for zone in self.zones:
             joined = {int(column) for column in zone.columns} | (set() if zone.size is None else {zone.size})
-            for other in [other for other in sets if other & joined]:
-                sets.remove(other)
-                joined |= other
+            for overlapping in [columns for columns in sets if columns & joined]:
+                sets.remove(overlapping)
+                joined |= overlapping
             sets.append(joined)
         return [np.array(sorted(joined)) for joined in sets]
 
     def _extremes(self, columns: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Points (point, column) at the ends of zones."""
+        """Return extreme points (point, column) of zones."""
         count = len(columns)
-        directions = np.vstack([np.eye(count), -np.eye(count), rng.standard_normal((AROUND, count))])
-        return np.unique([self._farthest_of(columns, direction, ROUGHLY) for direction in directions], axis=0)
+        directions = np.vstack([np.eye(count), -np.eye(count), rng.standard_normal((RANDOM_DIRECTIONS, count))])
+        return np.unique([self._farthest_of(columns, direction, COARSE_TOLERANCE) for direction in directions], axis=0)
 
     def _farthest_of(self, columns: np.ndarray, direction: np.ndarray, slack: float) -> np.ndarray:
-        """The point (column,) of zones that goes farthest in a direction (column,), by cutting planes (Kelley, 1960)."""
-        own = self.middle
+        """Return the farthest point (column,) of zones in a direction (column,), by cutting planes (Kelley, 1960)."""
+        point = self.middle
         planes, ends = self.planes()
-        others = np.setdiff1d(np.arange(len(own)), columns)
+        fixed = np.setdiff1d(np.arange(len(point)), columns)
         scale = float((self.upper - self.lower)[columns].max())  # the solver's tolerances are absolute
         bounds = np.column_stack([self.lower, self.upper])[columns] / scale
-        for _ in range(CUTS):
-            here = np.flatnonzero(np.abs(planes[:, columns]).any(axis=1))
-            left = ends[here] - planes[np.ix_(here, others)] @ own[others]
-            found = linprog(
-                -direction / np.abs(direction).max(), planes[np.ix_(here, columns)], left / scale, bounds=bounds, options=FINELY
-            )
-            own[columns] = scale * found.x
-            more, their_ends = self.planes(own, slack)
-            if not len(more):
+        for _ in range(MAX_CUTS):
+            rows = np.flatnonzero(np.abs(planes[:, columns]).any(axis=1))
+            limits = ends[rows] - planes[np.ix_(rows, fixed)] @ point[fixed]
+            goal = -direction / np.abs(direction).max()
+            solution = linprog(goal, planes[np.ix_(rows, columns)], limits / scale, bounds=bounds, options=LP_TOLERANCES)
+            point[columns] = scale * solution.x
+            tangents, tangent_ends = self.planes(point, slack)
+            if not len(tangents):
                 break
-            planes, ends = np.vstack([planes, more]), np.concatenate([ends, their_ends])
+            planes, ends = np.vstack([planes, tangents]), np.concatenate([ends, tangent_ends])
         middle = self.middle
-        return np.asarray(middle[columns] + self.reach(middle[None], (own - middle)[None])[0] * (own - middle)[columns])
+        return np.asarray(middle[columns] + self.reach(middle[None], (point - middle)[None])[0] * (point - middle)[columns])
 
 
-def _bounds(each: Contributor) -> tuple[float, float]:
-    """What a contributor may be by itself."""
-    if each.tolerance is None:
-        return 0.0, 0.0  # its zone says it
-    own: Tolerance = each.tolerance
-    if own.range is not None:
-        return own.shift - own.range / 2, own.shift + own.range / 2
-    ends = own.distribution.support()
-    quantiles = own.distribution.ppf([TAIL, 1 - TAIL])
+def _bounds(contributor: Contributor) -> tuple[float, float]:
+    """Return the bounds of a contributor by itself."""
+    if contributor.tolerance is None:
+        return 0.0, 0.0  # its zone bounds it
+    tolerance: Tolerance = contributor.tolerance
+    if tolerance.range is not None:
+        return tolerance.shift - tolerance.range / 2, tolerance.shift + tolerance.range / 2
+    ends = tolerance.distribution.support()
+    quantiles = tolerance.distribution.ppf([TAIL, 1 - TAIL])
     lower, upper = (float(end if np.isfinite(end) else q) for end, q in zip(ends, quantiles, strict=True))
-    return own.shift + lower, own.shift + upper
+    return tolerance.shift + lower, tolerance.shift + upper
 
 
-def _normals(row: np.ndarray, at: np.ndarray | None) -> np.ndarray:
-    """Unit vectors (n, entry) across a zone: all around, or outwards where `at` (entry,) is."""
+def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:
+    """Return unit vectors (n, entry) across a zone: all around, or the one towards a position (entry,)."""
     entries = len(row)
     if entries == 1:
         return np.array([[1.0], [-1.0]])
-    if at is not None:
-        length = np.linalg.norm(at)
-        return at[None] / length if length else np.zeros((0, entries))
+    if position is not None:
+        length = np.linalg.norm(position)
+        return position[None] / length if length else np.zeros((0, entries))
     if entries == 2:
         angles = np.arange(16) * np.pi / 8
         return np.column_stack([np.cos(angles), np.sin(angles)])
     return np.vstack([np.eye(entries), -np.eye(entries)])
 
 
-def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, then: np.ndarray) -> np.ndarray:
-    """The least t (n,) at which a |start + t along| (n, point, entry) is half + t (then - half) (n,); 1 if that is less."""
-    grows = (then - half)[:, None]
+def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, half_after: np.ndarray) -> np.ndarray:
+    """Return the least t (n,), at most 1, at which a |start + t along| (n, point, entry) is half + t (half_after - half)."""
+    grows = (half_after - half)[:, None]
     a = (along**2).sum(axis=2) - grows**2
     b = (start * along).sum(axis=2) - half[:, None] * grows
     c = (start**2).sum(axis=2) - half[:, None] ** 2

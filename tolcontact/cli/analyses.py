@@ -17,24 +17,7 @@ from tolcontact.analyses.relocate import relocate
 from tolcontact.analyses.sensitivities import sensitivities
 from tolcontact.analyses.tails import tails
 from tolcontact.analyses.worst_case import worst_case
-from tolcontact.cli.app import (
-    AsCsv,
-    AsJson,
-    Into,
-    Model,
-    Objective,
-    Quiet,
-    Resolution,
-    Scheduler,
-    Seed,
-    Solver,
-    Workers,
-    app,
-    chosen,
-    examples,
-    only_one,
-    or_,
-)
+from tolcontact.cli import app as common
 from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
 from tolcontact.declaration.script import load_model
@@ -44,13 +27,14 @@ from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.models import DEFAULT_SOLVER
 
 SHARED = {  # options of every analysis, with their defaults
-    "seed": (Seed, 1), "solver": (Solver, DEFAULT_SOLVER), "resolution": (Resolution, None), "objective": (Objective, None),
-    "as_json": (AsJson, False), "as_csv": (AsCsv, False), "into": (Into, None), "workers": (Workers, None),
-    "scheduler": (Scheduler, None), "quiet": (Quiet, False),
+    "seed": (common.Seed, 1), "solver": (common.Solver, DEFAULT_SOLVER), "resolution": (common.Resolution, None),
+    "objective": (common.Objective, None), "as_json": (common.AsJson, False), "as_csv": (common.AsCsv, False),
+    "into": (common.Into, None), "workers": (common.Workers, None), "scheduler": (common.Scheduler, None),
+    "quiet": (common.Quiet, False),
 }  # fmt: skip
 CORNER = "X,Y,Z"
 REQUIRED = inspect.Parameter.empty
-By = Annotated[str, typer.Option(help=f"How contributors are grouped: {or_(terms.GROUPED_BY)}.")]
+By = Annotated[str, typer.Option(help=f"How contributors are grouped: {common.or_(terms.GROUPED_BY)}.")]
 Frame = Callable[[xr.Dataset], Any]
 
 
@@ -78,7 +62,7 @@ class AnalysisCommand:
         """Add the command to the application."""
         samples = Annotated[int, typer.Option(help=self.samples)]
         default = inspect.signature(self.analysis).parameters["samples"].default
-        options = {"model": (Model, REQUIRED), **self.options, "samples": (samples, default), **SHARED}
+        options = {"model": (common.Model, REQUIRED), **self.options, "samples": (samples, default), **SHARED}
         command = functools.partial(self._run)
         command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
             [
@@ -87,19 +71,19 @@ class AnalysisCommand:
             ]
         )
         command.__annotations__ = {}  # type: ignore[attr-defined]
-        app.command(self.name, help=self.purpose, epilog=examples(*self.examples))(command)
+        common.app.command(self.name, help=self.purpose, epilog=common.examples(*self.examples))(command)
 
     def _run(
         self, *, model: Path, resolution: str | None, objective: str | None, as_json: bool, as_csv: bool, workers: int | None,
         scheduler: str | None, quiet: bool, **options: Any,
     ) -> None:  # fmt: skip
-        only_one(json=as_json, csv=as_csv)
+        common.only_one(json=as_json, csv=as_csv)
         arguments = self.arguments(options)
         with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
+            method = common.chosen(resolution=resolution, objective=objective)
             dataset = self.analysis(
-                functools.partial(load_model, model), method=chosen(resolution=resolution, objective=objective), client=client,
-                progress=show, **arguments,
-            )  # fmt: skip
+                functools.partial(load_model, model), method=method, client=client, progress=show, **arguments
+            )
         if as_json:
             print_data(dataset)
         elif as_csv:
