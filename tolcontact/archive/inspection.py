@@ -1,7 +1,8 @@
-"""Whether a file is an archive, and whole, before anything in it is believed.
+"""Inspection of a file before anything in it is trusted: is it an archive, and undamaged?
 
-The netCDF library itself can fail on a damaged file, or never end. So another process looks first (this file, as a script),
-with little memory and little time. It reads everything but the realizations, whose checksums are looked at when they are read.
+The netCDF library itself can fail on a damaged file, or never return. So a separate process inspects the file first (this
+module, as a script), with limits on memory and time. It reads all but the realizations, whose checksums are checked when they
+are read.
 """
 
 import json
@@ -31,7 +32,7 @@ GROUPS = ("model", "contact", "sample", "field")
 ADDED = ("surface",)  # groups that archives of format 1 may not have
 LABELS = (terms.PART, terms.PAIR, terms.MEASURE, terms.ROW_VARIABLE)
 CHANGES_VALUES = ("scale_factor", "add_offset", "missing_value", "_Unsigned", "calendar")  # when xarray reads them
-SAID = ("title", "history", "versions", "resolution", "objective", "active_set")  # texts that a summary repeats
+TEXT_ATTRIBUTES = ("title", "history", "versions", "resolution", "objective", "active_set")  # texts that a summary repeats
 OF_FIELD = (terms.FIELD_VERTICES, terms.FIELD_FACES, terms.FIELD_MEAN, terms.FIELD_SIX_SIGMA, terms.FIELD_INTERVAL)
 OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
 OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
@@ -63,7 +64,7 @@ def check_name(path: Path) -> None:
 
 
 class DamagedError(Exception):
-    """What is wrong with a file."""
+    """A fault of a file."""
 
 
 def inspect(path: Path) -> None:
@@ -71,15 +72,15 @@ def inspect(path: Path) -> None:
     check_name(path)
     gigabytes = path.stat().st_size / 1e9
     try:
-        found = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
+        fault = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
     except ChildDiedError as error:
         raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
-    if found:
-        raise ArchiveError(f'"{path}" {found}')
+    if fault:
+        raise ArchiveError(f'"{path}" {fault}')
 
 
-def _look(path: Path) -> str:
-    """What is wrong with a file; nothing if it is an archive."""
+def _fault(path: Path) -> str:
+    """Return the fault of a file; an empty text if it is an undamaged archive."""
     try:
         file = netCDF4.Dataset(path)
     except (OSError, RuntimeError, ValueError, AttributeError) as error:
@@ -128,12 +129,12 @@ def _check_group(group: netCDF4.Dataset, size: int) -> None:
     _check_attributes(group)
     for name, variable in group.variables.items():
         where = f"{group.path.rstrip('/')}/{name}"
-        own = isinstance(variable.datatype, netCDF4.VLType | netCDF4.CompoundType | netCDF4.EnumType)
-        if own or not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
+        is_compound = isinstance(variable.datatype, netCDF4.VLType | netCDF4.CompoundType | netCDF4.EnumType)
+        if is_compound or not (variable.dtype is str or np.dtype(variable.dtype).kind in "iufS"):
             raise DamagedError(f"is not an archive of tolcontact: {where} holds neither numbers nor text")
-        least = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
-        packed = any((variable.filters() or {}).get(word) for word in ("zlib", "szip", "zstd", "bzip2", "blosc"))
-        if math.prod(variable.shape) * least > size * (DEFLATED if packed else 1):
+        itemsize = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
+        is_packed = any((variable.filters() or {}).get(name) for name in ("zlib", "szip", "zstd", "bzip2", "blosc"))
+        if math.prod(variable.shape) * itemsize > size * (DEFLATED if is_packed else 1):
             raise DamagedError(f"is damaged: {where} claims {_times(variable.shape)} values, more than the file can hold")
         _check_attributes(variable)
 
@@ -162,18 +163,18 @@ def _check_text(name: str, text: str) -> None:
 def _check_archive(file: netCDF4.Dataset) -> None:
     optional = (*terms.POSES, *terms.ADDED)
     missing = [v.name for v in terms.ROWS if v not in optional and v.name not in file.variables]
-    first = getattr(file, "format", 1) == 1
-    missing += [group for group in (GROUPS if first else (*GROUPS, *ADDED)) if group not in file.groups]
-    missing += [word for word in SAID if not isinstance(getattr(file, word, None), str)]
+    is_format_1 = getattr(file, "format", 1) == 1
+    missing += [group for group in (GROUPS if is_format_1 else (*GROUPS, *ADDED)) if group not in file.groups]
+    missing += [name for name in TEXT_ATTRIBUTES if not isinstance(getattr(file, name, None), str)]
     if missing:
         raise DamagedError(f"is not an archive of tolcontact: it has no {', '.join(missing)}")
     accuracy, samples = getattr(file, "solver_accuracy", None), getattr(file, "samples", None)
     if not (isinstance(accuracy, float | np.floating) and isinstance(samples, int | np.integer) and 0 <= samples < 2**63):
         raise DamagedError("is damaged: its attributes solver_accuracy and samples are not numbers")
-    for name, known in ONCE.items():
+    for name, variables in ONCE.items():
         parent = file.groups.get(name) if name else file
         for group in [] if parent is None else (parent.groups.values() if name == "field" else [parent]):
-            for variable in known:
+            for variable in variables:
                 _check_variable(group, variable)
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
@@ -210,7 +211,7 @@ def _check_variable(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
 
 
 def _check_needed(file: netCDF4.Dataset) -> None:
-    """What summaries and models are read from."""
+    """Check that everything is there that summaries and models are read from."""
     _need_together(file["contact"], terms.ROUND)
     if any(variable.name in file["contact"].variables for variable in terms.FEATURE_FACES):
         _need(file["contact"], terms.FEATURE_FACES)
@@ -220,8 +221,8 @@ def _check_needed(file: netCDF4.Dataset) -> None:
     if getattr(file, "format", 1) > 1:
         _need(file, (terms.ROW_CHECKSUM, terms.ROW_VARIABLE_LABEL, terms.SUMMED_ROWS))
         summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][...])
-        most = len(file.dimensions[terms.BLOCK]) * int(file.block_rows)
-        if (summed < terms.UNFINISHED).any() or (summed > most).any():
+        max_rows = len(file.dimensions[terms.BLOCK]) * int(file.block_rows)
+        if (summed < terms.UNFINISHED).any() or (summed > max_rows).any():
             raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
     if tuple(_texts(file[terms.STATE])) != terms.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
@@ -239,7 +240,7 @@ def _need(group: netCDF4.Dataset, needed: tuple[ArchiveVariable, ...]) -> None:
 
 
 def _need_together(group: netCDF4.Dataset, variables: tuple[ArchiveVariable, ...]) -> None:
-    """Variables that a group has all of, or none; the second of them are kinds of surfaces."""
+    """Check that a group has all of these variables or none; the second variable holds kinds of surfaces."""
     if any(variable.name in group.variables for variable in variables):
         _need(group, variables)
         kinds = np.ma.getdata(group[variables[1].name][...])
@@ -248,34 +249,34 @@ def _need_together(group: netCDF4.Dataset, variables: tuple[ArchiveVariable, ...
 
 
 def _texts(stored: netCDF4.Variable) -> list[str]:
-    """Texts, one for each entry of the variable's own dimensions."""
+    """Return the texts of a variable, one for each entry of its dimensions."""
     if stored.dtype is str:
-        found = [str(text) for text in np.ravel(stored[...])]
+        texts = [str(text) for text in np.ravel(stored[...])]
     else:
         stored.set_auto_chartostring(False)
         letters = np.ma.getdata(stored[...])
         rows = letters.reshape(math.prod(letters.shape[:-1]), letters.shape[-1])
-        found = [row.tobytes().rstrip(b"\0").decode("utf-8") for row in rows]
-    for text in found:
+        texts = [row.tobytes().rstrip(b"\0").decode("utf-8") for row in rows]
+    for text in texts:
         _check_text(stored.name, text)
-    return found
+    return texts
 
 
 def _check_sums(group: netCDF4.Dataset) -> None:
-    """Whether what is written once, or in one go, has the checksum that is stored beside it."""
+    """Check the stored checksums of variables that are written once, and of groups that are overwritten together."""
     kind = group.path.split("/")[1]
-    known = {v.name: v for v in (IN_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
+    variables = {v.name: v for v in (IN_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
     for name, stored in group.variables.items():
-        if terms.CHECKSUM in stored.ncattrs() and name in known:
-            values = _declaration(stored) if known[name] is terms.DECLARATION else _values(stored, known[name])
-            if crc32(known[name], values) != int(stored.getncattr(terms.CHECKSUM)):
+        if terms.CHECKSUM in stored.ncattrs() and name in variables:
+            values = _declaration(stored) if variables[name] is terms.DECLARATION else _values(stored, variables[name])
+            if crc32(variables[name], values) != int(stored.getncattr(terms.CHECKSUM)):
                 raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{name} is not what was written")
     if terms.GROUP_CHECKSUM.name in group.variables:
-        said, found = int(group[terms.GROUP_CHECKSUM.name][...]), 0
+        expected, checksum = int(group[terms.GROUP_CHECKSUM.name][...]), 0
         for variable in {"surface": terms.SURFACE, "contact": terms.TOUCHING}.get(kind, terms.FIELDS):
             if variable.name in group.variables:  # magnitude_realizations is not in archives of format 2
-                found = crc32(variable, _values(group[variable.name], variable), found)
-        if said not in (terms.UNFINISHED, found):
+                checksum = crc32(variable, _values(group[variable.name], variable), checksum)
+        if expected not in (terms.UNFINISHED, checksum):
             raise DamagedError(f"is damaged: group {group.path} does not hold what was written")
 
 
@@ -304,4 +305,4 @@ def _check_declaration(file: netCDF4.Dataset) -> None:
 if __name__ == "__main__":
     _file = Path(sys.argv[1])
     limit_resources(MEMORY + 4 * _file.stat().st_size)
-    sys.stdout.write(_look(_file))
+    sys.stdout.write(_fault(_file))

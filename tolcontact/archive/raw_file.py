@@ -31,19 +31,19 @@ class LaidOut:
         """Raises OSError if the file cannot be read and written."""
         self._places: dict[str, Place] = {}
         with h5py.File(path, "r", locking=False) as file:
-            file.visititems(self._find)
+            file.visititems(self._add_place)
         self._file = path.open("r+b", buffering=0)
 
-    def _find(self, name: str, found: h5py.Group | h5py.Dataset) -> None:
-        if not isinstance(found, h5py.Dataset):
+    def _add_place(self, name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if not isinstance(item, h5py.Dataset):
             return
-        if found.chunks is None:
-            offset = found.id.get_offset()
-            self._places[name] = Place(found.dtype, max((1, *found.shape[:1])), [] if offset is None else [offset])
+        if item.chunks is None:
+            offset = item.id.get_offset()
+            self._places[name] = Place(item.dtype, max((1, *item.shape[:1])), [] if offset is None else [offset])
             return
         chunks: list[tuple[int, int]] = []
-        found.id.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
-        self._places[name] = Place(found.dtype, found.chunks[0], [offset for _, offset in sorted(chunks)])
+        item.id.chunk_iter(lambda chunk: chunks.append((chunk.chunk_offset[0], chunk.byte_offset)))
+        self._places[name] = Place(item.dtype, item.chunks[0], [offset for _, offset in sorted(chunks)])
 
     def close(self) -> None:
         self._file.close()
@@ -51,15 +51,15 @@ class LaidOut:
     def has(self, group: str, variable: ArchiveVariable) -> bool:
         return f"{group}/{variable.name}".lstrip("/") in self._places
 
-    def overwrite(self, group: str, variable: ArchiveVariable, rows: Any, first: int = 0) -> None:
-        """Overwrite some rows, from `first` on, of a variable in the group of that path."""
-        kind, together, offsets = self._places[f"{group}/{variable.name}".lstrip("/")]
+    def overwrite(self, group: str, variable: ArchiveVariable, rows: Any, start: int = 0) -> None:
+        """Overwrite rows of a variable, from row `start` on, in the group of that path."""
+        kind, chunk_rows, offsets = self._places[f"{group}/{variable.name}".lstrip("/")]
         values = np.atleast_1d(np.ascontiguousarray(rows, dtype=kind))
         width, done = values.nbytes // max(len(values), 1), 0
         data = values.reshape(-1).view(np.uint8).data
         while width and done < len(values):
-            chunk, inside = divmod(first + done, together)
-            count = min(together - inside, len(values) - done)
+            chunk, inside = divmod(start + done, chunk_rows)
+            count = min(chunk_rows - inside, len(values) - done)
             self._write(offsets[chunk] + inside * width, data[done * width : (done + count) * width])
             done += count
 
@@ -69,14 +69,14 @@ class LaidOut:
             data = data[self._file.write(data) :]
 
     def overwrite_together(self, values: Mapping[str, Mapping[ArchiveVariable, Any]]) -> None:
-        """Overwrite what the checksums of some groups are of; `values` by their paths. A run killed meanwhile leaves -1."""
+        """Overwrite the values of groups, by their paths, and their checksums. A run that is killed meanwhile leaves -1."""
         for group in values:
             self.overwrite(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
-        for group, of_group in values.items():
-            for variable, of_all in of_group.items():
-                self.overwrite(group, variable, of_all)
-        for group, of_group in values.items():
-            found = 0
-            for variable, of_all in of_group.items():
-                found = crc32(variable, of_all, found)
-            self.overwrite(group, terms.GROUP_CHECKSUM, found)
+        for group, variables in values.items():
+            for variable, array in variables.items():
+                self.overwrite(group, variable, array)
+        for group, variables in values.items():
+            checksum = 0
+            for variable, array in variables.items():
+                checksum = crc32(variable, array, checksum)
+            self.overwrite(group, terms.GROUP_CHECKSUM, checksum)

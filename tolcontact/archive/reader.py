@@ -1,4 +1,4 @@
-"""An archive is read with xarray, and holds its model."""
+"""Reading an archive with xarray, and rebuilding its model."""
 
 import json
 from pathlib import Path
@@ -17,7 +17,7 @@ from tolcontact.geometry import surfaces_of, with_known_surfaces
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
-    """An archive as a tree of labelled datasets, read on demand.
+    """Return an archive as a tree of labelled datasets that are read on demand.
 
     Raises ArchiveError if the file is missing, is not an archive of tolcontact, or is damaged: all but the realizations is
     read and compared with its checksums; those of the realizations are looked at by `summarize`.
@@ -30,7 +30,7 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 
 def opened(path: Path) -> xr.DataTree:
-    """An archive that is known to be whole."""
+    """Open an archive that is known to be undamaged."""
     try:
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
@@ -42,7 +42,7 @@ def opened(path: Path) -> xr.DataTree:
 
 
 def model_of(results: xr.DataTree) -> Assembly:
-    """The declared assembly, rebuilt from an archive."""
+    """Return the declared assembly, rebuilt from an archive."""
     try:
         document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:
@@ -50,9 +50,9 @@ def model_of(results: xr.DataTree) -> Assembly:
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():
-            of = group.to_dataset()
+            mesh = group.to_dataset()
             # Groups of format 1 do not say the part's name: it was their own.
-            meshes[str(of.attrs.get("part", name))] = _mesh(of)
+            meshes[str(mesh.attrs.get("part", name))] = _mesh(mesh)
     return from_document(document, meshes)
 
 
@@ -61,18 +61,18 @@ class _Triangles:
         self.vertices, self.faces = vertices, faces
 
 
-def _mesh(of: xr.Dataset) -> Any:
-    """The mesh of a part, with the surfaces of its B-rep faces if it has any."""
-    vertices, faces = of[terms.MESH_VERTICES.name].values, of[terms.MESH_FACES.name].values
-    if any(variable.name not in of for variable in terms.KNOWN_SURFACES):
+def _mesh(mesh: xr.Dataset) -> Any:
+    """Return the mesh of a part, with the surfaces of its B-rep faces if there are any."""
+    vertices, faces = mesh[terms.MESH_VERTICES.name].values, mesh[terms.MESH_FACES.name].values
+    if any(variable.name not in mesh for variable in terms.KNOWN_SURFACES):
         return _Triangles(vertices, faces)
-    brep = of[terms.BREP_OF_FACE.name].values
-    arrays = {name: of[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
+    brep = mesh[terms.BREP_OF_FACE.name].values
+    arrays = {name: mesh[variable.name].values for name, variable in terms.OF_BREP_FACE.items()}
     kinds = arrays["kind"]
     sound = all(np.isfinite(values).all() for values in arrays.values())
     sound = sound and bool((kinds >= -1).all()) and bool((kinds < len(terms.SURFACE_KINDS)).all())
     if not sound or (len(brep) and not 0 <= brep.min() <= brep.max() < len(kinds)):
         raise ArchiveError("the surfaces of a mesh in the archive are damaged")
     named = terms.NAME_OF_BREP_FACE.name
-    names = tuple(map(str, of[named].values)) if named in of else ()
+    names = tuple(map(str, mesh[named].values)) if named in mesh else ()
     return with_known_surfaces(vertices, faces, brep, surfaces_of(arrays), names)

@@ -1,4 +1,4 @@
-"""Whether the realizations of an archive are what was written."""
+"""Check that the realizations of an archive are what was written."""
 
 from collections.abc import Iterator
 
@@ -19,21 +19,21 @@ def check_rows(results: xr.DataTree) -> None:
     """
     stored = results.to_dataset()
     count, rows = stored.sizes[terms.REALIZATION], int(stored.attrs.get("block_rows", terms.BLOCK_ROWS))
-    begun_for = int(stored.attrs["samples"])
-    if terms.ROW_CHECKSUM.name not in stored or count not in (begun_for, min(begun_for, terms.FIRST_ROWS)):
+    samples = int(stored.attrs["samples"])
+    if terms.ROW_CHECKSUM.name not in stored or count not in (samples, min(samples, terms.FIRST_ROWS)):
         return
     try:
         for name, block in _damaged(results, stored, rows):
-            first, last = block * rows, min((block + 1) * rows, count) - 1
+            start, end = block * rows, min((block + 1) * rows, count) - 1
             raise ArchiveError(
-                f'the archive is damaged: "{name}" of realizations {first} to {last} is not what was written; run it again'
+                f'the archive is damaged: "{name}" of realizations {start} to {end} is not what was written; run it again'
             )
     except (OSError, RuntimeError) as error:
         raise ArchiveError(f"the archive is damaged: its realizations cannot be read ({error}); run it again") from error
 
 
 def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tuple[str, int]]:
-    """Variables and blocks, of so many `rows`, that do not have their checksums."""
+    """Yield the variables and blocks of `rows` realizations whose values do not match their checksums."""
     done = finished(results)
     whole = done if done == stored.sizes[terms.REALIZATION] else done // rows * rows
     # Blocks are finished in order: none behind the one that is being written.
@@ -45,15 +45,15 @@ def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tu
     for variable in terms.BY_REALIZATION:
         if variable.name in names:
             values = (results["sample"].to_dataset() if variable is terms.DEVIATION else stored)[variable.name][:whole]
-            found, expected = _checksums(variable, values, rows), sums[: -(-whole // rows), names.index(variable.name)]
-            wrong = np.flatnonzero(found != expected)
+            actual, expected = _checksums(variable, values, rows), sums[: -(-whole // rows), names.index(variable.name)]
+            wrong = np.flatnonzero(actual != expected)
             yield from ((variable.name, int(block)) for block in wrong[:1])
 
 
 def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
-    """Checksums (block,) of the values of a variable in blocks of so many `rows`."""
-    found, at_once = [], -(-terms.PIECE_ROWS // rows) * rows
-    for first in range(0, len(values), at_once):
-        piece = values[first : first + at_once].values
-        found += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]
-    return np.array(found, dtype=np.int64)
+    """Return the checksums (block,) of the values of a variable in blocks of `rows` realizations."""
+    checksums, step = [], -(-terms.PIECE_ROWS // rows) * rows
+    for start in range(0, len(values), step):
+        piece = values[start : start + step].values
+        checksums += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]
+    return np.array(checksums, dtype=np.int64)

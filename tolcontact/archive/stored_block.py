@@ -1,4 +1,4 @@
-"""A block of realizations as it will be stored: by whoever simulated it, so that the writer only writes."""
+"""A block of realizations as it will be stored; the worker that simulated it converts it, so that the writer only writes."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -20,7 +20,7 @@ class StoredBlock(NamedTuple):
 
 
 def stored(block: Block, kept: Sequence[str]) -> StoredBlock:
-    """A block, converted once for the file and for its checksums; `kept` are names of variables."""
+    """Return a block, converted once for the file and for its checksums; `kept` are names of variables."""
     values = row_values(block, kept)
     checksums = [crc32(variable, values[variable.name]) for variable in terms.BY_REALIZATION if variable.name in values]
     return StoredBlock(block.start, block.start + len(block), values, checksums)

@@ -1,4 +1,4 @@
-"""Which realizations of an archive are checked against the surfaces themselves, and what that found."""
+"""Realizations of an archive that are checked against the surfaces themselves."""
 
 from collections.abc import Iterator
 
@@ -11,31 +11,31 @@ from tolcontact.vocabulary import ArchiveVariable
 
 
 def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
-    """Numbers (row,) of certified realizations, `count` at most, in order.
+    """Return the numbers (row,) of at most `count` certified realizations, in order.
 
-    A third of them penetrate most at their contact points, a third have most points that carry, the rest are drawn.
+    A third are those that penetrate most at contact points, a third those with most carrying points; the others are random.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
-    deepest, busiest, drawn = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
+    deepest, busiest, random = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
     lot = np.random.default_rng([seed, rows])
-    for first, status, gap, carrying in _pieces(file, rows):
-        number = first + np.flatnonzero(np.isin(status, terms.CERTIFIED))
-        inside = -gap[number - first, 1].min(axis=1, initial=np.inf)
+    for start, status, gap, carrying in _pieces(file, rows):
+        number = start + np.flatnonzero(np.isin(status, terms.CERTIFIED))
+        inside = -gap[number - start, 1].min(axis=1, initial=np.inf)
         # Only what exceeds rounding is deeper than anything else.
         deepest.add(number, np.where(inside > terms.ROUNDED, inside, 0.0))
-        busiest.add(number, carrying[number - first].sum(axis=1))
-        drawn.add(number, lot.random(len(number)))
-    chosen = list(dict.fromkeys([*deepest.numbers, *busiest.numbers, *drawn.numbers]))
-    return np.sort(chosen[:count]).astype(np.int64)
+        busiest.add(number, carrying[number - start].sum(axis=1))
+        random.add(number, lot.random(len(number)))
+    numbers = list(dict.fromkeys([*deepest.numbers, *busiest.numbers, *random.numbers]))
+    return np.sort(numbers[:count]).astype(np.int64)
 
 
 def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
-    for first in range(0, rows, terms.PIECE_ROWS):
-        some = slice(first, min(first + terms.PIECE_ROWS, rows))
+    for start in range(0, rows, terms.PIECE_ROWS):
+        rows_of_piece = slice(start, min(start + terms.PIECE_ROWS, rows))
         status, gap, carrying = (
-            np.ma.getdata(file[variable.name][some]) for variable in (terms.STATUS, terms.GAP_MIN, terms.CARRYING)
+            np.ma.getdata(file[variable.name][rows_of_piece]) for variable in (terms.STATUS, terms.GAP_MIN, terms.CARRYING)
         )
-        yield first, status, gap, carrying
+        yield start, status, gap, carrying
 
 
 class _Largest:
@@ -46,7 +46,7 @@ class _Largest:
         self.numbers, self._values = np.zeros(0, dtype=np.int64), np.zeros(0)
 
     def add(self, numbers: np.ndarray, values: np.ndarray) -> None:
-        """Take in values of later numbers."""
+        """Add the values of later numbers."""
         larger = values > (self._values[-1] if 0 < self._count == len(self._values) else 0.0)
         numbers = np.concatenate([self.numbers, numbers[larger]])
         values = np.concatenate([self._values, values[larger]])
@@ -55,7 +55,7 @@ class _Largest:
 
 
 def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None:
-    """Corrected poses (row, part, 12) of some rows; None if the archive does not keep poses."""
+    """Return corrected poses (row, part, 12) of some rows; None if the archive does not keep poses."""
     if terms.ROTATION.name not in file.variables:
         return None
     R, t = (
@@ -66,7 +66,7 @@ def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None
 
 
 def nothing_checked(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
-    """What the group holds before anything was checked."""
+    """Return the values of the group before any check."""
     return {
         terms.CHECKED_REALIZATION: np.full(count, terms.UNFINISHED),
         terms.SURFACE_PENETRATION: np.full((count, pairs), np.nan),

@@ -16,7 +16,7 @@ BLOCK_CHUNK = 256
 
 
 def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
-    """A variable of numbers, without values yet."""
+    """Define a variable of numbers, without values."""
     options: dict[str, Any] = {}
     if {terms.REALIZATION, terms.BLOCK} & set(variable.dims):
         # netCDF's own choice, one row per chunk, reads some fifty times slower.
@@ -32,7 +32,7 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
 
 
 def rows_together(width: int) -> int:
-    """How many rows of so many bytes lie together in the file: those of a block, unless they are too many bytes."""
+    """Return the rows in a chunk of the file, for rows of `width` bytes: those of a block, or fewer if they are too large."""
     rows = terms.BLOCK_ROWS
     while rows > LEAST_ROWS and rows * width > CHUNK:
         rows //= 2
@@ -40,14 +40,14 @@ def rows_together(width: int) -> int:
 
 
 def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
-    """A dimension of the group, or of the groups above it."""
+    """Return a dimension of the group, or of the groups above it."""
     if name in group.dimensions or group.parent is None:
         return group.dimensions[name]
     return _dimension(group.parent, name)
 
 
 def write(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """A variable with its values, which stay as they are, and their checksum; in a group that has the dimensions."""
+    """Write a variable with its final values and their checksum, in a group that has the dimensions."""
     if variable.kind is str:
         _write_text(group, variable, values)
     else:
@@ -56,14 +56,14 @@ def write(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> Non
 
 
 def lay_out(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """A variable of numbers whose values will be overwritten."""
+    """Write a variable of numbers whose values will be overwritten."""
     define(group, variable)
     if np.size(values):
         group[variable.name][...] = values
 
 
 def _write_text(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """Text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
+    """Write text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
     text = np.char.encode(np.array(values, dtype=str), "utf-8")
     length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
     created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))
