@@ -12,7 +12,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
 from tolcontact.simulation.cluster import local_cluster
-from tolcontact.simulation.lazy import TOGETHER
+from tolcontact.simulation.lazy import CHUNK_BLOCKS
 
 
 def rows_of(results, name):
@@ -131,7 +131,7 @@ def test_what_is_written_is_streamed(tmp_path):
 @pytest.mark.slow
 def test_workers_compute_the_same():
     program = tc.build(cases.ra1(), solver="qpoases")
-    found = tc.simulate(program, TOGETHER * 4096 + 100, seed=5).measured
+    found = tc.simulate(program, CHUNK_BLOCKS * 4096 + 100, seed=5).measured
     here = found.values
     with local_cluster(2):
         assert np.array_equal(found.values, here)
