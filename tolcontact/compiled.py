@@ -13,7 +13,7 @@ from numba.core.caching import FunctionCache
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False) -> Any:
-    """The function, compiled when it is first called; `inline`, it becomes part of those that call it."""
+    """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it."""
     dispatcher = njit(nogil=True, error_model="numpy", inline="always" if inline else "never")(function)
     with contextlib.suppress(RuntimeError):  # there is no folder to write to
         dispatcher._cache = _Cache(function)  # what njit(cache=True) does, with Numba's own class

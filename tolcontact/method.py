@@ -84,9 +84,9 @@ class Method:
             "active_set": ACTIVE_SETS,
             "search": SEARCHES,
         }
-        for word, known in choices.items():
-            if getattr(self, word) not in known:
-                raise OptionError(f"{word} is {getattr(self, word)!r}; expected one of: {', '.join(known)}")
+        for choice, names in choices.items():
+            if getattr(self, choice) not in names:
+                raise OptionError(f"{choice} is {getattr(self, choice)!r}; expected one of: {', '.join(names)}")
         if not 0 < self.eta < 1:
             raise OptionError(f"eta is {self.eta!r}; expected a small number between 0 and 1")
         if not 0 <= self.activity < float("inf"):

@@ -10,13 +10,13 @@ from tolcontact.errors import ArchiveError
 
 
 def pieces(rows: xr.Dataset) -> Iterator[xr.Dataset]:
-    """The realizations, so many at once that they fit into memory whatever their number."""
+    """Yield the realizations in pieces that fit into memory."""
     for start in range(0, rows.sizes[terms.REALIZATION], terms.PIECE_ROWS):
         yield rows.isel({terms.REALIZATION: slice(start, start + terms.PIECE_ROWS)})
 
 
 def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
-    """Their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
+    """Yield their statuses, piece by piece. Raises ArchiveError for one that has no meaning."""
     for piece in pieces(rows[[terms.STATUS.name]]):
         status = piece[terms.STATUS.name].values
         if status.min(initial=0) < terms.UNFINISHED or status.max(initial=0) >= len(terms.STATUS_MEANINGS):
@@ -25,7 +25,7 @@ def statuses(rows: xr.Dataset) -> Iterator[np.ndarray]:
 
 
 def finished(results: xr.DataTree) -> int:
-    """How many rows, from the first on, were written completely."""
+    """Return how many rows, from the first on, were written completely."""
     rows = 0
     for piece in statuses(results.to_dataset()):
         unfinished = np.flatnonzero(piece == terms.UNFINISHED)

@@ -28,13 +28,13 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
     A = ca.vertcat(*(A[k, :] if fill[k].is_one() else _or_idle(fill[k], A[k, :], k) for k in range(len(rows))))
     B = setting.slope(misfit) @ to_z
     opens = ca.sparsify(ca.DM(np.equal.outer(rows.pairs, range(pairs)).astype(float)))
-    rest = -setting.at_rest(misfit)
+    targets = -setting.at_rest(misfit)
     return {
         "h": ca.diagcat(H, ca.SX.eye(pairs)),
         "g": ca.vertcat(to_z.T @ pull, ca.DM(np.full(pairs, setting.group.length))),
         "a": ca.blockcat([[A, ca.diag(SLACK / length) @ opens], [B, ca.SX(equations, pairs)]]),
-        "lba": ca.vertcat(ca.if_else(fill, -rows.gaps / length, -FAR * setting.group.length), rest),
-        "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), rest),
+        "lba": ca.vertcat(ca.if_else(fill, -rows.gaps / length, -FAR * setting.group.length), targets),
+        "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
         "u": U,
         "length": length,
     }
@@ -61,7 +61,7 @@ def _unit_blocks(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
 
 
 def _or_idle(filled: ca.SX, row: ca.SX, seed: int) -> ca.SX:
-    """A row, or if its slot is empty one in general position that with a bound far away never binds.
+    """Return a row, or if its slot is empty one in general position that with a bound far away never binds.
 
     Rows of zeros would do for other plugins, but qpOASES starts from the rows that carried in the previous problem, and
     fails if one of those has become zero.

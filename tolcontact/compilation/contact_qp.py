@@ -57,7 +57,7 @@ class ContactProgram:
     standing: tuple[np.ndarray | None, ...]
 
     def qp(self, plugin: Plugin) -> ca.Function:
-        """A new solver of a plugin, without memory of any problem."""
+        """Return a new solver of a plugin, without memory of any problem."""
         return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
 
     @property
@@ -70,7 +70,7 @@ class ContactProgram:
 def contact_program(
     nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin
 ) -> ContactProgram:
-    """The Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` rows.
+    """Return the Functions of a group; their inputs and outputs, for `p` parts, `f` movers, `q` pairs, `k` rows.
 
     Where few points of a pair can be the deepest each of them has a row, always. The `v` other pairs have SLOTS rows each, for
     points that change: `m` = v * SLOTS.
@@ -92,7 +92,7 @@ def contact_program(
     corrected (12 p)     poses after the correction; in an exact resolution after as much of it as `stride` allows
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
     relative (12 q)      X_RM of every pair at `corrected`
-    multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Criterion)
+    multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Objective)
     residual             KKT residual [mm], in y: the larger of max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows
                          of length 1, or how far a gap remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
@@ -112,32 +112,32 @@ def contact_program(
         firmness=inputs["firmness"],
         z=ca.SX.sym("z", FREEDOMS * len(group.free)),
     )
-    now = poses_of(inputs["poses"])
-    centres = [now[k].apply(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
-    motion = Motion(group.carried, now, increments(setting.z, group.length, centres))
+    current = poses_of(inputs["poses"])
+    centres = [current[k].apply(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
+    motion = Motion(group.carried, current, increments(setting.z, group.length, centres))
     moved = motion.by(linear)
-    rows = contact_rows(setting, standing, now, moved, inputs)
+    rows = contact_rows(setting, standing, current, moved, inputs)
     goal = energy(setting, moved)
-    Q, pull = (setting.at_rest(each) for each in ca.hessian(goal.value, setting.z))
+    Q, pull = (setting.at_rest(expression) for expression in ca.hessian(goal.value, setting.z))
     if method.is_exact:
         Q += rows.wrap / goal.scale
         Q, pull = with_curvature(setting, goal, rows, motion.by(quadratic), Q, pull, inputs)
         if method.is_iterated or curved_pairs(nominal, group):
-            Q += inputs["caution"] * setting.curvature(proximity(setting, now, moved)) / group.length
+            Q += inputs["caution"] * setting.curvature(proximity(setting, current, moved)) / group.length
     exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
     problem = conditioned(setting, Q, pull, rows, exact)
     poses = motion.by(rigid if method.is_exact else published)
-    given, results = outcome(setting, goal, rows, poses, problem, inputs["stride"])
-    least = ca.substitute(setting.at_rest(goal.value), setting.firmness, 1)
+    solution_symbols, results = outcome(setting, goal, rows, poses, problem, inputs["stride"])
+    pure_energy = ca.substitute(setting.at_rest(goal.value), setting.firmness, 1)
     return ContactProgram(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
-        finish=_function("finish", inputs | given, results),
-        energy=_function("energy", {name: inputs[name] for name in OF_ENERGY}, {"energy": least}),
+        finish=_function("finish", inputs | solution_symbols, results),
+        energy=_function("energy", {name: inputs[name] for name in OF_ENERGY}, {"energy": pure_energy}),
         relate=_function(
             "relate",
             {name: inputs[name] for name in ("poses", "deviations")},
-            {"relative": ca.vertcat(*(X.vector() for X in setting.relative(now)))},
+            {"relative": ca.vertcat(*(X.vector() for X in setting.relative(current)))},
         ),
         slacks=len(group.pairs),
         equations=exact.numel(),
@@ -146,7 +146,7 @@ def contact_program(
 
 
 def _inputs(nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None]) -> dict[str, ca.SX]:
-    """The symbols of all inputs, by name."""
+    """Return the symbols of all inputs, by name."""
     varying = sum(points is None for points in standing)
     slots = SLOTS * varying
     rows = slots + sum(len(points) for points in standing if points is not None)

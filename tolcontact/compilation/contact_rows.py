@@ -48,8 +48,10 @@ class Rows:
 
 
 def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | None:
-    """The points of a pair that always have a row: those of round faces, or that can be the deepest, if they are few and stay
-    the same."""
+    """Return the points of a pair that always have a row; None if slots hold changing points.
+
+    These are the points of round faces, and points that can be the deepest, if they are few and stay the same.
+    """
     if gaps is None:
         return np.arange(len(pair.P_m))
     return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else None
@@ -58,45 +60,45 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
 def contact_rows(
     setting: Setting,
     standing: Sequence[np.ndarray | None],
-    now: Sequence[Pose],
-    moved: Sequence[Pose],
+    start_poses: Sequence[Pose],
+    end_poses: Sequence[Pose],
     inputs: Mapping[str, ca.SX],
 ) -> Rows:
-    """The rows about the poses `now`, which the increments change to `moved`; `inputs` as in contact_program."""
+    """Return the rows about the poses `now`, which the increments change to `moved`; `inputs` as in contact_program."""
     slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     slopes: list[ca.SX] = []
     pairs: list[int] = []
     gaps, filled, relative, bends = ([] for _ in range(4))
     bow, wrap = (ca.SX(setting.z.numel(), setting.z.numel()) for _ in range(2))
-    for k, (before, after) in enumerate(zip(setting.relative(now), setting.relative(moved), strict=True)):
-        by_z = setting.slope(after.vector())
-        relative.append(before.vector() + by_z @ setting.z)
+    for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
+        by_z = setting.slope(end.vector())
+        relative.append(start.vector() + by_z @ setting.z)
         points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
             reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
-            of_points, by_entries, second, closing, _ = round_gaps(pair.round)(
-                before.vector(), heights(pair, setting.deviations), reactions
+            of_points, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
+                start.vector(), heights(pair, setting.deviations), reactions
             )
             slopes.append(by_entries @ by_z)
             gaps.append(of_points)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
             bends.append(by_entries.T @ reactions)
-            bow += by_z.T @ second @ by_z
+            bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
             continue
         if points is None:
-            chosen, bend = list(itertools.islice(slots, SLOTS)), next(slot_bends)
+            row_points, bend = list(itertools.islice(slots, SLOTS)), next(slot_bends)
         else:
-            chosen, bend = _always(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
-        for P_m, P_r, n_r, is_filled in chosen:
+            row_points, bend = _standing_rows(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
+        for P_m, P_r, n_r, is_filled in row_points:
             X = ca.SX.sym("X_RM", ENTRIES)
             g = gap(pose_of(X), P_m, P_r, n_r)
-            gradient = ca.substitute(ca.jacobian(g, X), X, before.vector())
+            gradient = ca.substitute(ca.jacobian(g, X), X, start.vector())
             if points is not None:
                 bend += gradient.T * inputs["reactions"][len(pairs)]
             slopes.append(gradient @ by_z)
-            gaps.append(ca.substitute(g, X, before.vector()))
+            gaps.append(ca.substitute(g, X, start.vector()))
             filled.append(is_filled)
             pairs.append(k)
         bends.append(bend)
@@ -113,16 +115,16 @@ def contact_rows(
 
 
 def _slots(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
-    """The points in the slots."""
-    columns = (ca.horzsplit(each) for each in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
+    """Return the points in the slots."""
+    columns = (ca.horzsplit(values) for values in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
     return iter(zip(*columns, strict=True))
 
 
-def _always(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
-    """Points that have a row whatever happens: constants, but for what they stand out by."""
-    P_m, P_r, n_r = (ca.SX(ca.DM(each[points].T)) for each in (pair.P_m, pair.P_r, pair.n_r))
+def _standing_rows(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
+    """Return points that always have a row: constants, but for the heights that deviations give them."""
+    P_m, P_r, n_r = (ca.SX(ca.DM(values[points].T)) for values in (pair.P_m, pair.P_r, pair.n_r))
     offsets = pair.offsets.take(points)
     if offsets.columns.size:
         heights = ca.sparsify(ca.DM(offsets.matrix.T)) @ deviations[offsets.columns.tolist()]
         P_r = P_r + n_r @ ca.diag(heights)
-    return list(zip(*(ca.horzsplit(each) for each in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))
+    return list(zip(*(ca.horzsplit(values) for values in (P_m, P_r, n_r, ca.SX.ones(1, len(points)))), strict=True))

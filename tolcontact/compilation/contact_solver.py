@@ -31,10 +31,10 @@ class ContactSolver:
         self.start_over()
 
     def twin(self) -> "ContactSolver":
-        """The same for another thread."""
-        other = copy.copy(self)
-        other.start_over()
-        return other
+        """Return the same for another thread."""
+        twin = copy.copy(self)
+        twin.start_over()
+        return twin
 
     def start_over(self) -> None:
         """Forget all problems solved before: some plugins start from the last one."""
@@ -42,7 +42,7 @@ class ContactSolver:
         self._others: dict[str, _PluginSolver] = {}
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
-        """The outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
+        """Return the outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
         Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
         others, without curvature. `residual` is infinite, and other outputs may be NaN, if all gave up.
@@ -56,16 +56,16 @@ class ContactSolver:
                 break
             if name not in self._others:
                 self._others[name] = _PluginSolver(self._program, PLUGINS[name])
-            again = self._solved(self._others[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
-            again["second"] = np.ones((len(lost), 1))
-            better = again["residual"][:, 0] < answer["residual"][lost, 0]
-            _replace(answer, lost[better], _of(again, better))
+            polished_outputs = self._solved(self._others[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
+            polished_outputs["second"] = np.ones((len(lost), 1))
+            better = polished_outputs["residual"][:, 0] < answer["residual"][lost, 0]
+            _replace(answer, lost[better], _of(polished_outputs, better))
             if PLUGINS[name].remembers:
                 del self._others[name]
         return answer
 
     def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
-        """The objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
+        """Return the objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
         return self._energy(**arrays)["energy"][:, 0]
 
     def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization _"]:
@@ -87,9 +87,9 @@ class ContactSolver:
         rough = np.flatnonzero(is_rough & np.isfinite(residual))
         if rough.size:
             problem = _of(problem, rough)
-            again = self._finished(_of(inputs, rough) | problem | self._polished(problem, _of(solution, rough)))
-            better = again["residual"][:, 0] < residual[rough]
-            _replace(outputs, rough[better], _of(again, better))
+            polished_outputs = self._finished(_of(inputs, rough) | problem | self._polished(problem, _of(solution, rough)))
+            better = polished_outputs["residual"][:, 0] < residual[rough]
+            _replace(outputs, rough[better], _of(polished_outputs, better))
         return outputs
 
     def _finished(self, arrays: Arrays) -> Arrays:
@@ -126,11 +126,11 @@ class _PluginSolver:
         at_least[: -program.slacks] = -np.inf
         bounds = {"lbx": at_least, "ubx": np.full(at_least.shape, np.inf)}
         # The other inputs are zero, and starting points that no plugin is told to use.
-        given = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in QP}
+        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in QP}
         with MAKING, quiet():
-            self._solve = InterpretedFunction(qp, given)
+            self._solve = InterpretedFunction(qp, fixed_inputs)
 
-    def __call__(self, problem: Arrays, before: np.ndarray) -> tuple[Arrays, np.ndarray]:
+    def __call__(self, problem: Arrays, reactions: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
 
         A solver that starts from the previous problem's rows has less to change where problems alike follow each other:
@@ -140,8 +140,8 @@ class _PluginSolver:
         if not self._remembers:
             solved, failed = self._solve(inputs)
             return {name: solved[i] for name, i in zip(SOLUTION, self._results, strict=True)}, failed
-        violated = problem["lba"][:, : before.shape[1]]
-        likely = np.where(before.any(axis=1, keepdims=True), before, violated) > 0
+        violated = problem["lba"][:, : reactions.shape[1]]
+        likely = np.where(reactions.any(axis=1, keepdims=True), reactions, violated) > 0
         order = np.lexsort(np.packbits(likely, axis=1).T)
         solved, failed = self._solve([array[order] for array in inputs])
         back = np.argsort(order)
@@ -149,11 +149,11 @@ class _PluginSolver:
 
 
 def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:
-    """Some rows of all arrays."""
+    """Return some rows of all arrays."""
     return {name: values[rows] for name, values in arrays.items()}
 
 
-def _replace(arrays: Arrays, rows: np.ndarray, others: Arrays) -> None:
+def _replace(arrays: Arrays, rows: np.ndarray, replacements: Arrays) -> None:
     """Put `others` where some rows of all arrays are."""
-    for name, values in others.items():
+    for name, values in replacements.items():
         arrays[name][rows] = values

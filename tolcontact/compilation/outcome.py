@@ -29,24 +29,24 @@ def outcome(
     The QP's matrices are inputs, so that nothing is computed twice and the residuals are of what was solved.
     """
     group, z, count = setting.group, setting.z, len(rows)
-    size, held = z.numel() + len(group.pairs), problem["a"].size1() - count
-    given = {name: ca.SX.sym(name, problem[name].sparsity()) for name in SOLVED}
-    given |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + held), "lam_x": ca.SX.sym("lam_x", size)}
-    x, lam_a, lam_x, length = given["x"], given["lam_a"], given["lam_x"], given["length"]
+    size, equations = z.numel() + len(group.pairs), problem["a"].size1() - count
+    symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in SOLVED}
+    symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
+    x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
-    excess = given["a"] @ x - given["lba"]
+    excess = symbols["a"] @ x - symbols["lba"]
     natural = ca.vertcat(ca.fmin(excess[:count], -lam_a[:count]), ca.fmin(s, -lam_s), ca.fmin(excess[:count] * length, 0))
-    stationarity = ca.norm_inf(given["h"] @ x + given["g"] + given["a"].T @ lam_a + lam_x)
-    residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if held else [])]
-    step = whitening(given["u"]) @ y
-    taken = step
+    stationarity = ca.norm_inf(symbols["h"] @ x + symbols["g"] + symbols["a"].T @ lam_a + lam_x)
+    residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if equations else [])]
+    step = whitening(symbols["u"]) @ y
+    taken_step = step
     if setting.method.is_exact:
         turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
-        taken = step * ca.fmin(1, stride * group.length / ca.norm_inf(turns))
-    after = {
+        taken_step = step * ca.fmin(1, stride * group.length / ca.norm_inf(turns))
+    end_values = {
         "corrected": ca.vertcat(*(pose.vector() for pose in poses)),
         "relative": ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))),
-        "astray": ca.norm_inf(misfit(setting, poses)) if held else ca.SX(0),
+        "astray": ca.norm_inf(misfit(setting, poses)) if equations else ca.SX(0),
     }
     results = {
         "linearized": ca.substitute(rows.relative, z, step),
@@ -54,6 +54,6 @@ def outcome(
         "residual": ca.mmax(ca.vertcat(*residuals)),
         "slack": SLACK * s,
         "step": ca.vertcat(ca.norm_inf(step), ca.norm_inf(y)),
-        **{name: ca.substitute(value, z, taken) for name, value in after.items()},
+        **{name: ca.substitute(value, z, taken_step) for name, value in end_values.items()},
     }
-    return given, {name: ca.densify(value) for name, value in results.items()}
+    return symbols, {name: ca.densify(value) for name, value in results.items()}

@@ -31,23 +31,23 @@ def polished(
     at_zero = (-lam_x > x)[:, size - slacks :]
     bounds = np.zeros((count, slacks, size))
     bounds[:, :, size - slacks :] = np.eye(slacks)
-    every = np.concatenate([A, bounds], axis=1)
-    held = np.concatenate([carries, at_zero], axis=1)
-    wanted = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
-    C = np.where(held[..., None], every, 0.0)
-    idle = np.eye(rows + slacks) * ~held[:, None, :]
+    all_rows = np.concatenate([A, bounds], axis=1)
+    is_equation = np.concatenate([carries, at_zero], axis=1)
+    bounds_of_rows = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
+    C = np.where(is_equation[..., None], all_rows, 0.0)
+    idle = np.eye(rows + slacks) * ~is_equation[:, None, :]
     K = np.concatenate(
         [np.concatenate([H, -C.swapaxes(1, 2)], axis=2), np.concatenate([C, idle], axis=2)],
         axis=1,
     )
-    right = np.concatenate([-g, np.where(held, wanted, 0.0)], axis=1)
-    given = K.copy()
-    given[:, size:, size:] += GIVE * np.eye(rows + slacks) * held[:, None, :]
+    right = np.concatenate([-g, np.where(is_equation, bounds_of_rows, 0.0)], axis=1)
+    regularized = K.copy()
+    regularized[:, size:, size:] += GIVE * np.eye(rows + slacks) * is_equation[:, None, :]
     solution = np.zeros_like(right)
-    inverse = _inverse(given)
+    inverse = _inverse(regularized)
     for _ in range(REFINEMENTS):
-        rest = right - np.einsum("kij,kj->ki", K, solution)
-        solution += np.einsum("kij,kj->ki", inverse, rest)
+        remainder = right - np.einsum("kij,kj->ki", K, solution)
+        solution += np.einsum("kij,kj->ki", inverse, remainder)
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
     lam_x[:, size - slacks :] = -multipliers[:, rows:]
@@ -61,4 +61,4 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
     except np.linalg.LinAlgError:
         if len(matrices) == 1:
             return np.full_like(matrices, np.nan)
-        return np.concatenate([_inverse(one[None]) for one in matrices])
+        return np.concatenate([_inverse(matrix[None]) for matrix in matrices])

@@ -24,6 +24,7 @@ from tolcontact.mechanics.quiet import MAKING, quiet
 from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
+from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
 from tolcontact.variation import Draws
 
@@ -86,7 +87,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     draws = Draws(nominal)
     with MAKING:  # which also calls users' functions, that may print
         with quiet():
-            chosen = plugin(solver)
+            conic_plugin = plugin(solver)
         d = ca.SX.sym("deviations", len(nominal.contributors))
         raw = ca.vertcat(*(pose.vector() for pose in raw_poses(nominal, d)))
         entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
@@ -115,13 +116,13 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             nominal=nominal,
             draws=draws,
             method=method,
-            plugin=chosen,
+            plugin=conic_plugin,
             place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
             observe=NamedFunction.dense(observe),
             gaps=gaps,
             round_gaps={k: NamedFunction.dense(function) for k, function in of_round.items()},
-            groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, chosen)) for group in groups),
-            nominal_measures=observe(_at_rest(len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
+            groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, conic_plugin)) for group in groups),
+            nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
                 for measure, value in zip(nominal.measures, values, strict=True)
@@ -152,7 +153,3 @@ def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
         faults = ['objective "seating" needs a force, and none is declared; declare one with assembly.force(...)']
     if faults:
         raise ModelError(nominal.assembly.name, faults)
-
-
-def _at_rest(parts: int) -> np.ndarray:
-    return np.tile(np.concatenate([np.eye(3).ravel(), np.zeros(3)]), parts)

@@ -38,7 +38,7 @@ class Twist:
         return self.d + ca.cross(self.W, x - self.c)
 
     def moving(self, X: Pose, turn: ca.SX) -> Pose:
-        """A pose after the motion x -> c + d + turn (x - c)."""
+        """Return a pose after the motion x -> c + d + turn (x - c)."""
         return Pose(turn @ X.R, turn @ (X.t - self.c) + self.c + self.d)
 
 
@@ -47,27 +47,27 @@ class Motion:
     """The increments of the movers of a group, about the poses `now` of its parts."""
 
     carried: Sequence[Carried]
-    now: Sequence[Pose]
+    poses: Sequence[Pose]
     movers: Sequence[Twist]
 
     def by(self, update: Callable[[Carried, Pose, Sequence[Twist]], Pose]) -> list[Pose]:
-        """The poses that the increments cause, as `linear`, `rigid`, `quadratic` or `published` has it."""
-        return [update(part, X, self.movers) for part, X in zip(self.carried, self.now, strict=True)]
+        """Return the poses that the increments cause, as `linear`, `rigid`, `quadratic` or `published` has it."""
+        return [update(part, X, self.movers) for part, X in zip(self.carried, self.poses, strict=True)]
 
 
 def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:
-    """The increments of the movers from the QP's variables, all of them in mm: (dt, length * w) for each mover."""
+    """Return the increments of the movers from the QP's variables, all of them in mm: (dt, length * w) for each mover."""
     return [Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)]
 
 
 def linear(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """The pose after the increments to first order, affine in them: R <- (I + [W]x) R, paper (12)."""
+    """Return the pose after the increments to first order, affine in them: R <- (I + [W]x) R, paper (12)."""
     twist = _total(part, X, movers)
     return twist.moving(X, ca.SX.eye(3) + ca.skew(twist.W))
 
 
 def rigid(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """The pose after the increments as rigid motions: R <- exp([w]x) R for its own, then for those that carry it."""
+    """Return the pose after the increments as rigid motions: R <- exp([w]x) R for its own, then for those that carry it."""
     for mover in reversed(part.movers):
         X = movers[mover].moving(X, rotation(movers[mover].W))
     return X

@@ -24,10 +24,10 @@ def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Po
 
     x_end - x_start = a + D (P - c), with a the displacement of the centre and D the difference of the rotations.
     """
-    count, first = moments[0], moments[1:4]
-    second = ca.SX.zeros(3, 3)
+    count, first_moment = moments[0], moments[1:4]
+    second_moment = ca.SX.zeros(3, 3)
     for k, (i, j) in enumerate(_UPPER):
-        second[i, j] = second[j, i] = moments[4 + k]
+        second_moment[i, j] = second_moment[j, i] = moments[4 + k]
     a = end.apply(ca.DM(centre)) - start.apply(ca.DM(centre))
     D = end.R - start.R
-    return count * ca.dot(a, a) / 2 + ca.dot(a, D @ first) + ca.trace(D @ second @ D.T) / 2
+    return count * ca.dot(a, a) / 2 + ca.dot(a, D @ first_moment) + ca.trace(D @ second_moment @ D.T) / 2

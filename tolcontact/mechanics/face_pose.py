@@ -11,7 +11,7 @@ from tolcontact.mechanics.pose import Pose, relative, rotation
 
 
 def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
-    """The pose by which points of the nominal face come to where they are, in the nominal assembly frame; None of none."""
+    """Return the pose that moves points of the nominal face to where they are, in the nominal assembly frame."""
     if face is None or not face.twist.any():
         return None
     q = ca.DM(face.twist) @ deviations[face.columns.tolist()]
@@ -20,14 +20,14 @@ def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
 
 
 def face_height(face: FaceDeviation | None, deviations: ca.SX) -> ca.SX:
-    """How much farther out of the material it lies [mm]."""
+    """Return by how much a face has grown out of the material [mm]."""
     if face is None or not face.grows:
         return ca.SX(0)
     return ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
 
 
 def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pose | None]:
-    """The poses of the moving and the reference face of a pair in their parts."""
+    """Return the poses of the moving and the reference face of a pair in their parts."""
     moving, reference = pair.deviating
     return face_pose(moving, deviations), face_pose(reference, deviations)
 

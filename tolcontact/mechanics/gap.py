@@ -28,6 +28,6 @@ def gap_gradient() -> ca.Function:
 
 
 def gap_matrix(pair: ContactPoints) -> np.ndarray:
-    """The constant matrix (13, point): gaps (point,) [mm] = [entries of X_RM, 1] @ matrix."""
+    """Return the constant matrix (13, point): gaps (point,) [mm] = [entries of X_RM, 1] @ matrix."""
     gradient, constant = gap_gradient().map(len(pair.P_m))(pair.P_m.T, pair.P_r.T, pair.n_r.T)
     return np.vstack([gradient.full(), constant.full()])

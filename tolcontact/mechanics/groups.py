@@ -73,7 +73,7 @@ def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
 
 
 def contact_groups(nominal: Nominal) -> list[Group]:
-    """The groups of parts that contact couples: what touches only fixed parts in common stays apart."""
+    """Return the groups of parts that contact couples: what touches only fixed parts in common stays apart."""
     chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
@@ -90,37 +90,39 @@ def _movers_of(part: int | None, chains: Sequence[tuple[int, ...]]) -> set[int]:
 
 
 def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...]) -> Group:
-    own = [
+    members = [
         (index, pair)
         for index, pair in enumerate(nominal.pairs)
         if (set(chains[pair.moving]) | _movers_of(pair.reference, chains)) & set(free)
     ]
     moved = {part for part, chain in enumerate(chains) if set(chain) & set(free)}
-    others = {part for _, pair in own for part in (pair.moving, pair.reference)} | {nominal.parts[part].parent for part in free}
-    parts = tuple(sorted(moved | {part for part in others if part is not None}))
+    neighbours = {part for _, pair in members for part in (pair.moving, pair.reference)} | {
+        nominal.parts[part].parent for part in free
+    }
+    parts = tuple(sorted(moved | {part for part in neighbours if part is not None}))
     points: dict[int, list[np.ndarray]] = {part: [] for part in parts}
-    for _, pair in own:
+    for _, pair in members:
         points[pair.moving].append(pair.P_m)
         if pair.reference is not None:
             points[pair.reference].append(pair.P_r)
     # A part without contact points of its own turns about those of the last part that moves it.
-    every = np.vstack([pair.P_m for _, pair in own])
+    moving_points = np.vstack([pair.P_m for _, pair in members])
     centre = {part: np.vstack(points[part] or points[(chains[part] or free)[-1]]).mean(axis=0) for part in parts}
-    references = {pair.reference for _, pair in own}
+    references = {pair.reference for _, pair in members}
     sides = [
         Side(position, parts.index(part), P, centre[part])
-        for position, (_, pair) in enumerate(own)
+        for position, (_, pair) in enumerate(members)
         for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
         if part is not None and chains[part]
     ]
-    spread = float(np.sqrt(((every - every.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    spread = float(np.sqrt(((moving_points - moving_points.mean(axis=0)) ** 2).sum(axis=1).mean()))
     return Group(
         parts=parts,
-        pairs=tuple(index for index, _ in own),
+        pairs=tuple(index for index, _ in members),
         free=free,
         carried=tuple(
             Carried(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
         ),
         sides=tuple(sides),
-        length=spread or float(nominal.parts[own[0][1].moving].mesh.scale),
+        length=spread or float(nominal.parts[members[0][1].moving].mesh.scale),
     )

@@ -24,8 +24,8 @@ class SymbolicPoses:
 
     def _pose(self, part: Part) -> Pose:
         if part not in self._nominal.assembly.parts:
-            known = ", ".join(own.name for own in self._nominal.assembly.parts)
-            raise LookupError(f'unknown part "{getattr(part, "name", part)}"; the parts are: {known}')
+            names = ", ".join(declared.name for declared in self._nominal.assembly.parts)
+            raise LookupError(f'unknown part "{getattr(part, "name", part)}"; the parts are: {names}')
         return self._poses[self._nominal.part_index(part)]
 
     def position(self, point: Point) -> ca.SX:
@@ -68,17 +68,17 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
 
 
 def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
-    seen = SymbolicPoses(nominal, poses, deviations)
+    symbolic = SymbolicPoses(nominal, poses, deviations)
     if isinstance(measure.of, Point):
         of, to = measure.of, measure.to
         if to is not None:
-            off = nominal.position(to) - nominal.position(of) if measure.quantity == "deviation of distance" else np.zeros(3)
-            moved = seen.position(to) - seen.position(of) - ca.DM(off)
+            origin = nominal.position(to) - nominal.position(of) if measure.quantity == "deviation of distance" else np.zeros(3)
+            moved = symbolic.position(to) - symbolic.position(of) - ca.DM(origin)
         else:
-            off = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
-            moved = seen.position(of) - ca.DM(off)
+            origin = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
+            moved = symbolic.position(of) - ca.DM(origin)
         return ca.dot(ca.DM(np.array(measure.along)), moved)
-    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(seen)
+    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(symbolic)
     expression = ca.SX(value)
     if expression.shape != (1, 1):
         raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")

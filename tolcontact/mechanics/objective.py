@@ -32,9 +32,9 @@ class Energy(NamedTuple):
     scale: ca.SX
 
 
-def energy(setting: Setting, now: Sequence[Pose]) -> Energy:
-    """The objective at the poses `now`, affine in the increments."""
-    return _ENERGIES[setting.method.objective](setting, now)
+def energy(setting: Setting, poses: Sequence[Pose]) -> Energy:
+    """Return the objective at the poses `now`, affine in the increments."""
+    return _ENERGIES[setting.method.objective](setting, poses)
 
 
 def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
@@ -43,30 +43,30 @@ def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> c
     return sum((_of_all_points(setting, side, start, end) for side in sides), ca.SX(0)) / _count(setting)
 
 
-def _points(setting: Setting, now: Sequence[Pose]) -> Energy:
+def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
     """Displacements of the points that count."""
-    value = setting.firmness * _regularization(setting, now)
+    value = setting.firmness * _regularization(setting, poses)
     for k, side in enumerate(setting.group.sides):
-        value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], now[side.part])
+        value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], poses[side.part])
     weight = ca.fmax(ca.sum2(setting.moments[0, :]), 1)
     return Energy(value / weight, weight)
 
 
-def _springs(setting: Setting, now: Sequence[Pose]) -> Energy:
+def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
     """Energy of the two-sided locators of the movers, 1/2 sum k e^2 [N mm], over the sum of the k [N/mm]."""
-    regularization = setting.firmness * _regularization(setting, now)
+    regularization = setting.firmness * _regularization(setting, poses)
     value, total = ca.SX(0), 0.0
     for part in setting.group.free:
-        own = setting.nominal.parts[part].locators
-        before, after = (elongation(setting, part, poses, linear=True) for poses in (setting.raw, now))
-        for k, e in zip(own.stiffness[~own.one_sided], ca.vertsplit(after - before), strict=True):
+        locators = setting.nominal.parts[part].locators
+        start_elongation, end_elongation = (elongation(setting, part, poses, linear=True) for poses in (setting.raw, poses))
+        for k, e in zip(locators.stiffness[~locators.one_sided], ca.vertsplit(end_elongation - start_elongation), strict=True):
             value += float(k) * e**2 / 2
             total += float(k)
     total = total or 1.0
     return Energy(value / total + regularization / _count(setting), ca.SX(total))
 
 
-def _forces(setting: Setting, now: Sequence[Pose]) -> Energy:
+def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
     """Less the work of the declared forces [N mm], over the sum of their sizes [N] (1 if there are none)."""
     nominal, group = setting.nominal, setting.group
     work, total = ca.SX(0), 0.0
@@ -74,10 +74,10 @@ def _forces(setting: Setting, now: Sequence[Pose]) -> Energy:
         part = nominal.part_index(force.at.part)
         if part in group.parts and group.carried[group.position(part)].movers:
             p, k = ca.DM(nominal.position(force.at)), group.position(part)
-            work += ca.dot(ca.DM(np.array(force.vector)), now[k].apply(p) - setting.raw[k].apply(p))
+            work += ca.dot(ca.DM(np.array(force.vector)), poses[k].apply(p) - setting.raw[k].apply(p))
             total += float(np.linalg.norm(force.vector))
     total = total or 1.0
-    quadratic = setting.firmness * YIELD * proximity(setting, setting.raw, now) / group.length
+    quadratic = setting.firmness * YIELD * proximity(setting, setting.raw, poses) / group.length
     return Energy(quadratic - work / total, ca.SX(total))
 
 
@@ -89,20 +89,20 @@ _ENERGIES: dict[str, Callable[[Setting, Sequence[Pose]], Energy]] = {
 }
 
 
-def _regularization(setting: Setting, now: Sequence[Pose]) -> ca.SX:
-    return sum((setting.method.eta * each for each in _HOLDS[setting.method.regularization](setting, now)), ca.SX(0))
+def _regularization(setting: Setting, poses: Sequence[Pose]) -> ca.SX:
+    return sum((setting.method.eta * term for term in _HOLDS[setting.method.regularization](setting, poses)), ca.SX(0))
 
 
-def _of_points(setting: Setting, now: Sequence[Pose]) -> list[ca.SX]:
+def _of_points(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
     """Displacement energies of all contact points, side by side."""
-    return [_of_all_points(setting, side, setting.raw, now) for side in setting.group.sides]
+    return [_of_all_points(setting, side, setting.raw, poses) for side in setting.group.sides]
 
 
-def _of_identity(setting: Setting, now: Sequence[Pose]) -> list[ca.SX]:
+def _of_identity(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
     """Energies of the paper's eta I: translations [mm] and rotations [rad] of the movers."""
     energies = []
     for part in map(setting.group.position, setting.group.free):
-        dt, D = now[part].t - setting.raw[part].t, now[part].R - setting.raw[part].R
+        dt, D = poses[part].t - setting.raw[part].t, poses[part].R - setting.raw[part].R
         energies.append((ca.dot(dt, dt) + ca.sumsqr(D) / 2) / 2)  # |[w]x|^2 = 2 |w|^2
     return energies
 
@@ -117,9 +117,9 @@ def _of_all_points(setting: Setting, side: Side, start: Sequence[Pose], end: Seq
     carriers = group.carried[part].movers[:-1]
     if not carriers:
         return displacement_energy(moments, side.centre, start[part], end[part])
-    below = group.position(group.free[carriers[-1]])
-    after = setting.linear(relative(end[part], end[below]))
-    return displacement_energy(moments, side.centre, relative(start[part], start[below]), after)
+    carrier = group.position(group.free[carriers[-1]])
+    end_elongation = setting.linear(relative(end[part], end[carrier]))
+    return displacement_energy(moments, side.centre, relative(start[part], start[carrier]), end_elongation)
 
 
 def _count(setting: Setting) -> int:

@@ -7,24 +7,24 @@ from tolcontact.mechanics.pose import Pose, rotation
 
 
 def raw_poses(nominal: Nominal, deviations: ca.SX) -> list[Pose]:
-    """The raw pose of every part for deviations (contributor, 1) [mm] in the order of `nominal.contributors`."""
-    own = [_on_its_locators(part, held(nominal, index, deviations)) for index, part in enumerate(nominal.parts)]
+    """Return the raw pose of every part for deviations (contributor, 1) [mm] in the order of `nominal.contributors`."""
+    local = [_on_its_locators(part, held(nominal, index, deviations)) for index, part in enumerate(nominal.parts)]
 
     def follow(index: int) -> Pose:
         parent = nominal.parts[index].parent
-        return own[index] if parent is None else follow(parent) @ own[index]
+        return local[index] if parent is None else follow(parent) @ local[index]
 
-    return [follow(index) for index in range(len(own))]
+    return [follow(index) for index in range(len(local))]
 
 
 def held(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
     """How far each locator of a part moves it (locator, 1) [mm]: its deviation, and what its face comes out of the part."""
-    own, locators = deviations[nominal.columns(part).tolist()], nominal.parts[part].locators
+    local, locators = deviations[nominal.columns(part).tolist()], nominal.parts[part].locators
     for number in range(len(locators)):
         columns, factors = locators.pushes(number)
         if columns.size:
-            own[number] += ca.dot(ca.DM(factors), deviations[columns.tolist()])
-    return own
+            local[number] += ca.dot(ca.DM(factors), deviations[columns.tolist()])
+    return local
 
 
 def _on_its_locators(part: NominalPart, d: ca.SX) -> Pose:

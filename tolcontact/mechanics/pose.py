@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import casadi as ca
 
-ENTRIES = 12
+from tolcontact import poses
+
+ENTRIES = poses.ENTRIES
+
 # Keeps sqrt differentiable at rest; its square root is far below any angle, and the series below stay exact with it.
 _TINY = 1e-300
 
@@ -27,17 +30,17 @@ class Pose(NamedTuple):
         return self.R @ p + self.t
 
     def vector(self) -> ca.SX:
-        """The 12 entries."""
+        """Return the 12 entries."""
         return ca.vertcat(ca.vec(self.R.T), self.t)
 
 
 def pose_of(vector: ca.SX) -> Pose:
-    """The pose whose 12 entries are `vector`."""
+    """Return the pose whose 12 entries are `vector`."""
     return Pose(ca.reshape(vector[:9], 3, 3).T, vector[9:12])
 
 
 def poses_of(vector: ca.SX) -> list[Pose]:
-    """The poses whose entries stand one after the other in `vector`."""
+    """Return the poses whose entries stand one after the other in `vector`."""
     return [pose_of(part) for part in ca.vertsplit(vector, ENTRIES)]
 
 

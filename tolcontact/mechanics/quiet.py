@@ -36,9 +36,9 @@ _kept: deque[_Muffled] = deque(maxlen=16)
 
 
 def _muffled(stream: Any) -> _Muffled:
-    for one in _kept:
-        if one.stream is stream:
-            return one
+    for muffled in _kept:
+        if muffled.stream is stream:
+            return muffled
     _kept.append(_Muffled(stream))
     return _kept[-1]
 

@@ -15,18 +15,20 @@ from tolcontact.geometry.analytic_surfaces import Cone, Sphere, Torus
 from tolcontact.mechanics.face_pose import face_height
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
-ROUNDS = 6  # of Newton's method, from the tangent that is nearest to an upright shaft
-LARGEST = 0.5  # rad: step of it
-ASIDE = 1e-13  # mm: what a point on an axis is taken to be beside it
-CLOSE = 1e-3  # of the ball's or shaft's radius: freedom that curvature is taken for at least
-STRAIGHT = 1e-9
-ALIKE = 0.05  # rad: tangents in one direction
+NEWTON_STEPS = 6  # from the tangent that is nearest to an upright shaft
+MAX_TURN = 0.5  # rad: step of it
+AXIS_OFFSET = 1e-13  # mm: what a point on an axis is taken to be beside it
+MIN_FREEDOM = 1e-3  # of the ball's or shaft's radius: freedom that curvature is taken for at least
+TOLERANCE = 1e-9
+SAME_TANGENT = 0.05  # rad: tangents in one direction
 
 Terms = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # of a point: gap, slope, second derivative, and how its wall closes in
 
 
 def round_gaps(points: RoundPoints) -> ca.Function:
-    """Function of X_RM (12), heights (2) by which the moving and the reference face have grown, and reactions (point); results:
+    """Return the gaps of round points as a Function.
+
+    Its inputs are X_RM (12), heights (2) by which the moving and the reference face have grown, and reactions (point). Results:
 
     gaps     (point) [mm]; where two tangents all but agree, both are those of the nearer one
     slopes   (point, 12): their derivatives by X_RM
@@ -43,13 +45,13 @@ def round_gaps(points: RoundPoints) -> ca.Function:
     bow, wrap = ca.SX.zeros(ENTRIES, ENTRIES), ca.SX.zeros(ENTRIES, ENTRIES)
     for point, reaction in zip(points, ca.vertsplit(reactions), strict=True):
         of_body, of_wall = (grown[0], grown[1]) if point.on_moving else (grown[1], grown[0])
-        found = (_of_tangents if _has_tangents(point) else _of_ball)(point, X, of_body, of_wall)
-        distances.append(found[0])
+        gap_terms = (_tangent_terms if _has_tangents(point) else _ball_terms)(point, X, of_body, of_wall)
+        distances.append(gap_terms[0])
         if point.is_hollow:
-            nearest = (point, found)
+            nearest = (point, gap_terms)
         elif nearest is not None and _touches(point, nearest[0]):
-            found = _unless_alike(found, nearest[1])
-        gap, slope, bend, closing = found
+            gap_terms = _unless_alike(gap_terms, nearest[1])
+        gap, slope, bend, closing = gap_terms
         gaps.append(gap)
         slopes.append(slope)
         bow += reaction * bend
@@ -61,27 +63,27 @@ def round_gaps(points: RoundPoints) -> ca.Function:
 
 
 def _touches(plane: RoundPoint, hollow: RoundPoint) -> bool:
-    """Whether a plane is one of the fixed tangents of a hollow wall, for the same ball, or the same end of a shaft."""
+    """Return whether a plane is one of the fixed tangents of a hollow wall, for the same ball, or the same end of a shaft."""
     wall, n = hollow.wall, plane.wall.axis
     if plane.wall.kind != "plane" or not (plane.centre == hollow.centre).all():
         return False
-    off = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n looks inward
+    offset = float(n @ (plane.wall.origin - wall.origin)) + wall.radius  # n looks inward
     lean = 0.0 if wall.kind == "sphere" else float(n @ wall.axis) - np.sin(wall.angle)
-    return abs(off) < STRAIGHT * plane.radius and abs(lean) < STRAIGHT
+    return abs(offset) < TOLERANCE * plane.radius and abs(lean) < TOLERANCE
 
 
 def _unless_alike(fixed: Terms, nearest: Terms) -> Terms:
-    """A fixed tangent; the nearest one in its place, if the two are in one direction.
+    """Return a fixed tangent; the nearest one in its place, if the two are in one direction.
 
     Either could carry then, to a solver's accuracy, and they differ in direction: steps would not come to rest.
     """
-    is_alike = ca.sumsqr(fixed[1] - nearest[1]) < ALIKE**2 * ca.sumsqr(fixed[1])
+    is_alike = ca.sumsqr(fixed[1] - nearest[1]) < SAME_TANGENT**2 * ca.sumsqr(fixed[1])
     gap, slope, bend, closing = (ca.if_else(is_alike, b, a) for a, b in zip(fixed, nearest, strict=True))
     return gap, slope, bend, closing
 
 
 def heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
-    """How much the moving and the reference face of a pair have grown (2) [mm]."""
+    """Return by how much the moving and the reference face of a pair have grown (2) [mm]."""
     return ca.vertcat(*(face_height(face, deviations) for face in pair.deviating))
 
 
@@ -90,16 +92,20 @@ def _has_tangents(point: RoundPoint) -> bool:
 
 
 def _in_wall_frame(point: RoundPoint, X: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Centre and axis (3, 1) of the ball or shaft, as the part that has the wall sees them."""
+    """Return centre and axis (3, 1) of the ball or shaft in the frame of the part that has the wall."""
     pose = pose_of(X)
     if not point.on_moving:
         pose = Pose(pose.R.T, -(pose.R.T @ pose.t))
     return pose.apply(ca.DM(point.centre)), pose.R @ ca.DM(point.axis)
 
 
-def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
-    """Beside a plane, or of a shaft in a hollow cylinder: gap, slope (1, 12), second derivative (12, 12), and what is to be
-    subtracted from that because the wall closes in (12, 12); shaft and wall have grown by `of_body` and `of_wall` [mm].
+def _tangent_terms(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
+    """Return the terms of a point beside a plane, or of a shaft in a hollow cylinder; both have grown by `of_body`, `of_wall`.
+
+    Terms are the gap [mm], its slope (1, 12) and second derivative (12, 12) by X_RM, and what the closing wall subtracts from
+    that (12, 12). The gap is written for a tangent plane with normal e, turned by `delta` towards t. A plane has one such
+    plane. Of a hollow wall it is the nearest one, e* with d gap / d delta = 0; as X_RM moves, e* turns with it, which lowers
+    the second derivative by (d2 gap / dX d delta)^2 / (d2 gap / d delta2), unless e* is held where the wall ends.
     """
     c, a = _in_wall_frame(point, X)
     o, w, r = ca.DM(point.wall.origin), point.wall.axis, float(point.radius)
@@ -117,69 +123,73 @@ def _of_tangents(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) ->
         float(point.wall.radius) - of_wall - ca.dot(across, c - o) - (r + of_body) * ca.sqrt(1 + tilt * ca.dot(across, a) ** 2)
     )
     slope, slide = ca.jacobian(gap, X), ca.jacobian(gap, delta)
-    second, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
+    second_derivative, sliding, stiffness = ca.hessian(gap, X)[0], ca.jacobian(slide, X), ca.jacobian(slide, delta)
     symbols = [e, t, delta]
     if point.wall.kind == "plane":
-        flat = _put([gap, slope, second], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
+        flat = _put([gap, slope, second_derivative], symbols, [ca.SX(-ca.DM(w)), ca.SX.zeros(3), ca.SX(0)])
         return flat[0], flat[1], flat[2], ca.SX.zeros(ENTRIES, ENTRIES)
     turning = ca.Function("turning", [X, of_both, e, t], _put([slide, stiffness], [delta], [ca.SX(0)]))
-    there, is_free = _nearest_tangent(point, turning, X, of_both, c - o)
-    least = ca.fmax(ca.fabs(float(point.wall.radius) - r - of_wall - of_body), CLOSE * r)
-    closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, least)
-    found = _put([gap, slope, second, closing], symbols, [there, ca.cross(ca.DM(w), there), ca.SX(0)])
-    return found[0], found[1], found[2], found[3]
+    nearest, is_free = _nearest_tangent(point, turning, X, of_both, c - o)
+    min_curvature = ca.fmax(ca.fabs(float(point.wall.radius) - r - of_wall - of_body), MIN_FREEDOM * r)
+    closing = is_free * sliding.T @ sliding / ca.fmax(stiffness, min_curvature)
+    gap_terms = _put([gap, slope, second_derivative, closing], symbols, [nearest, ca.cross(ca.DM(w), nearest), ca.SX(0)])
+    return gap_terms[0], gap_terms[1], gap_terms[2], gap_terms[3]
 
 
 def _put(expressions: list[ca.SX], symbols: list[ca.SX], values: list[ca.SX]) -> list[ca.SX]:
-    """Expressions in which values stand for symbols."""
+    """Return expressions with values in place of symbols."""
     return list(ca.substitute(expressions, symbols, values))  # type: ignore[arg-type]
 
 
 def _nearest_tangent(point: RoundPoint, turning: ca.Function, X: ca.SX, grown: ca.SX, q: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if that is where the wall ends, else 1.
+    """Return the outward unit vector (3, 1) of the wall's nearest tangent plane; and 0 if the wall ends there, else 1.
 
-    turning  Function of X_RM, what shaft and wall have grown by, e and t: derivatives of the gap as e turns towards t
+    turning  Function of X_RM, growth of shaft and wall, e and t: two derivatives of the gap as e turns towards t
     q        (3, 1) from the wall's axis to the shaft's
     """
     w, x = ca.DM(point.wall.axis), ca.DM(point.towards)
-    _, e = _direction(_across(w, q) + ASIDE * x)
+    _, e = _direction(_across(w, q) + AXIS_OFFSET * x)
     _, e = _direction(_across(w, e))  # what rounding left along the axis counts if a shaft is hardly off it
     e, is_free = _within(point, e)
-    least = CLOSE * float(point.radius) * 1e-3
-    for _ in range(ROUNDS):
+    min_curvature = MIN_FREEDOM * float(point.radius) * 1e-3
+    for _ in range(NEWTON_STEPS):
         t = ca.cross(w, e)
-        first, second = turning(X, grown, e, t)
-        newton = ca.fmin(ca.fmax(-first / ca.fmax(second, least), -LARGEST), LARGEST)
-        step = ca.if_else(second > least, newton, ca.if_else(first > 0, -LARGEST, LARGEST))  # away from a farthest tangent
+        slope_along, second_derivative = turning(X, grown, e, t)
+        newton = ca.fmin(ca.fmax(-slope_along / ca.fmax(second_derivative, min_curvature), -MAX_TURN), MAX_TURN)
+        step = ca.if_else(
+            second_derivative > min_curvature, newton, ca.if_else(slope_along > 0, -MAX_TURN, MAX_TURN)
+        )  # away from a farthest tangent
         _, e = _direction(e + step * t)
         e, is_free = _within(point, e)
     return e, is_free
 
 
 def _within(point: RoundPoint, e: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """The direction (3, 1) of a hollow wall that is nearest to e; and 1 if it is e."""
+    """Return the direction (3, 1) of a hollow wall that is nearest to e; and 1 if it is e."""
     opening = float(point.opening)
-    if opening > np.pi - STRAIGHT or not point.is_hollow:
+    if opening > np.pi - TOLERANCE or not point.is_hollow:
         return e, ca.SX(1)
     x = ca.DM(point.towards)
     is_free = ca.dot(e, x) >= np.cos(opening)
     if point.wall.kind == "sphere":
-        _, aside = _direction(_across(x, e) + ASIDE * ca.DM(np.linalg.svd(point.towards[None])[2][1]))
+        _, aside = _direction(_across(x, e) + AXIS_OFFSET * ca.DM(np.linalg.svd(point.towards[None])[2][1]))
     else:
         y = ca.DM(np.cross(point.wall.axis, point.towards))
         aside = ca.if_else(ca.dot(e, y) < 0, -1, 1) * y
     return ca.if_else(is_free, e, np.cos(opening) * x + np.sin(opening) * aside), ca.if_else(is_free, 1, 0)
 
 
-def _of_ball(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
-    """The same of a ball beside a curved wall."""
+def _ball_terms(point: RoundPoint, X: ca.SX, of_body: ca.SX, of_wall: ca.SX) -> Terms:
+    """Return the same of a ball beside a curved wall."""
     c, _ = _in_wall_frame(point, X)
     side = -1.0 if point.is_hollow else 1.0
-    distance, normal, around, rest = _distance(point, c, of_body + of_wall)
+    distance, normal, around, fixed_part = _distance(point, c, of_body + of_wall)
     n = ca.SX.sym("n", 3)
     along, J = ca.dot(n, c), ca.jacobian(c, X)
-    slope, bend = (ca.substitute(each, n, side * normal) for each in (ca.jacobian(along, X), ca.hessian(along, X)[0]))
-    bend += J.T @ rest @ J if point.is_hollow else J.T @ (around + rest) @ J
+    slope, bend = (
+        ca.substitute(expression, n, side * normal) for expression in (ca.jacobian(along, X), ca.hessian(along, X)[0])
+    )
+    bend += J.T @ fixed_part @ J if point.is_hollow else J.T @ (around + fixed_part) @ J
     closing = J.T @ around @ J if point.is_hollow else ca.SX.zeros(ENTRIES, ENTRIES)
     return side * distance - float(point.radius) - of_body - of_wall, slope, bend, closing
 
@@ -194,33 +204,33 @@ def _distance(point: RoundPoint, c: ca.SX, grown: ca.SX) -> tuple[ca.SX, ca.SX, 
     wall, w, x = point.wall, ca.DM(point.wall.axis), ca.DM(point.towards)
     r, nothing = float(point.radius), ca.SX.zeros(3, 3)
     p = c - ca.DM(wall.origin)
-    least = ca.fmax(ca.fabs(float(wall.radius) - r - grown), CLOSE * r)
+    min_curvature = ca.fmax(ca.fabs(float(wall.radius) - r - grown), MIN_FREEDOM * r)
     if isinstance(wall, Sphere):
-        _, n = _direction(p + ASIDE * x)
+        _, n = _direction(p + AXIS_OFFSET * x)
         n, is_free = _within(point, n)
         length, t = ca.dot(n, p), ca.cross(x, n)  # along the rim, if the wall ends there
-        along_rim = t @ t.T / ca.fmax(ca.norm_2(_across(x, p)) * np.sin(point.opening), CLOSE * r)
-        around = (ca.SX.eye(3) - n @ n.T) / ca.fmax(length, least)
+        along_rim = t @ t.T / ca.fmax(ca.norm_2(_across(x, p)) * np.sin(point.opening), MIN_FREEDOM * r)
+        around = (ca.SX.eye(3) - n @ n.T) / ca.fmax(length, min_curvature)
         return wall.height(length, 0.0), n, ca.if_else(is_free, around, along_rim), nothing
     along = ca.dot(w, p)
-    _, outward = _direction(_across(w, p) + ASIDE * x)
+    _, outward = _direction(_across(w, p) + AXIS_OFFSET * x)
     _, outward = _direction(_across(w, outward))
     outward, is_free = _within(point, outward)
     length, t = ca.dot(outward, p), ca.cross(w, outward)
     if isinstance(wall, Torus):
         tube, n = _direction(wall.from_circle(length, outward, along, w))
         across = ca.cross(t, n)
-        turning = ca.dot(n, outward) / ca.fmax(length, CLOSE * r)
-        return wall.height(tube, along), n, across @ across.T / ca.fmax(tube, CLOSE * r), turning * t @ t.T
+        turning = ca.dot(n, outward) / ca.fmax(length, MIN_FREEDOM * r)
+        return wall.height(tube, along), n, across @ across.T / ca.fmax(tube, MIN_FREEDOM * r), turning * t @ t.T
     if isinstance(wall, Cone):
         cos = np.cos(wall.angle)
         n = cos * outward - np.sin(wall.angle) * w
-        return wall.height(length, along), n, is_free * cos * t @ t.T / ca.fmax(length, CLOSE * r), nothing
-    return wall.height(length, along), outward, is_free * t @ t.T / ca.fmax(length, least), nothing
+        return wall.height(length, along), n, is_free * cos * t @ t.T / ca.fmax(length, MIN_FREEDOM * r), nothing
+    return wall.height(length, along), outward, is_free * t @ t.T / ca.fmax(length, min_curvature), nothing
 
 
 def _across(w: ca.DM, vector: ca.SX) -> ca.SX:
-    """What of a vector (3, 1) is across the unit vector w."""
+    """Return the component of a vector (3, 1) across the unit vector w."""
     return vector - w * ca.dot(w, vector)
 
 

@@ -34,7 +34,7 @@ class Setting:
     z: ca.SX
 
     def at_rest(self, expression: ca.SX) -> ca.SX:
-        """The expression at z = 0."""
+        """Return the expression at z = 0."""
         return ca.substitute(expression, self.z, ca.SX.zeros(self.z.shape))
 
     def slope(self, expression: ca.SX) -> ca.SX:
@@ -46,18 +46,18 @@ class Setting:
         return self.at_rest(ca.hessian(expression, self.z)[0])
 
     def linear(self, X: Pose) -> Pose:
-        """The pose to first order in z."""
+        """Return the pose to first order in z."""
         entries = X.vector()
         return pose_of(self.at_rest(entries) + self.slope(entries) @ self.z)
 
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
         """X_RM of the faces of the group's pairs."""
-        found = []
+        relative_poses = []
         for index, faces in zip(self.group.pairs, self._faces, strict=True):
             pair = self.nominal.pairs[index]
             reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
-            found.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
-        return found
+            relative_poses.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
+        return relative_poses
 
     @cached_property
     def _faces(self) -> list[tuple[Pose | None, Pose | None]]:

@@ -25,7 +25,9 @@ _NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
 
 
 def record(expression: ca.SX, entries: ca.SX) -> Tape:
-    """The steps of a scalar expression of `entries`: those of all poses (12 * part, 1), then deviations (contributor, 1).
+    """Return the steps of a scalar expression of `entries`.
+
+    entries   (12 * part + contributor, 1): the entries of all poses, then deviations
 
     Raises ValueError for an operation that has no place on a tape, or for too many of them.
     """
@@ -53,7 +55,7 @@ def record(expression: ca.SX, entries: ca.SX) -> Tape:
 
 
 def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
-    """The expression that a tape holds, on the given poses and deviations."""
+    """Return the expression that a tape holds, on the given poses and deviations."""
     entries = ca.vertcat(*(pose.vector() for pose in poses), deviations)
     if entries.numel() != ENTRIES * len(poses) + deviations.numel():
         raise ValueError("a tape needs 12 entries for each pose")

@@ -15,22 +15,22 @@ def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bo
 
     Seen from what the part is located on; to first order in the increments, if `linear`.
     """
-    group, own = setting.group, setting.nominal.parts[part]
+    group, entry = setting.group, setting.nominal.parts[part]
     X = poses[group.position(part)]
-    X_PM = X if own.parent is None else relative(X, poses[group.position(own.parent)])
-    if own.parent is not None and linear:
+    X_PM = X if entry.parent is None else relative(X, poses[group.position(entry.parent)])
+    if entry.parent is not None and linear:
         X_PM = setting.linear(X_PM)
-    exact = ~own.locators.one_sided
-    P, n = own.locators.points[exact], own.locators.directions[exact]
+    exact = ~entry.locators.one_sided
+    P, n = entry.locators.points[exact], entry.locators.directions[exact]
     return ca.vertcat(*(ca.dot(ca.DM(b), X_PM.apply(ca.DM(a)) - ca.DM(a)) for a, b in zip(P, n, strict=True)))
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
     """How far the two-sided locators of the movers are from their deviations [mm] (locator, 1)."""
-    apart = []
+    errors = []
     for part in setting.group.free:
         exact = ~setting.nominal.parts[part].locators.one_sided
         if exact.any():
-            wanted = held(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
-            apart.append(elongation(setting, part, poses, linear=linear) - wanted)
-    return ca.vertcat(*apart) if apart else ca.SX(0, 1)
+            expected = held(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
+            errors.append(elongation(setting, part, poses, linear=linear) - expected)
+    return ca.vertcat(*errors) if errors else ca.SX(0, 1)

@@ -18,11 +18,13 @@ class InterpretedFunction:
     the same in all realizations.
     """
 
-    def __init__(self, function: ca.Function, given: Mapping[int, np.ndarray] | None = None) -> None:
+    def __init__(self, function: ca.Function, fixed_inputs: Mapping[int, np.ndarray] | None = None) -> None:
         # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
         inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
         caller = ca.Function("caller", inputs, function.call(inputs))
-        self._calls = [_Buffers(caller.map(width) if width > 1 else caller, width, given or {}) for width in (*WIDTHS, 1)]
+        self._calls = [
+            _Buffers(caller.map(width) if width > 1 else caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)
+        ]
         self._solvers = [function] if function.is_a("Conic") else []
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
@@ -39,8 +41,8 @@ class InterpretedFunction:
                 # A plugin that gives up on one realization ends the whole call (qpOASES does), so find out which.
                 self._forget()
                 for k in range(start, stop):
-                    one = slice(k, k + 1)
-                    if not self._calls[-1]([array[one] for array in inputs], [result[one] for result in results]):
+                    entry = slice(k, k + 1)
+                    if not self._calls[-1]([array[entry] for array in inputs], [result[entry] for result in results]):
                         failed[k] = True
                         self._forget()
                         for result in results:
@@ -51,8 +53,10 @@ class InterpretedFunction:
         """Who evaluates which realizations; the narrower of WIDTHS may have idle places at the end."""
         start = 0
         while start < count:
-            left = count - start
-            call = self._calls[0] if left >= WIDTHS[0] else self._calls[1] if left >= WIDTHS[1] // 2 else self._calls[2]
+            remaining = count - start
+            call = (
+                self._calls[0] if remaining >= WIDTHS[0] else self._calls[1] if remaining >= WIDTHS[1] // 2 else self._calls[2]
+            )
             stop = min(start + call.width, count)
             yield call, start, stop
             start = stop
@@ -68,20 +72,20 @@ class InterpretedFunction:
 class _Buffers:
     """One Function, of `width` realizations at once, with arrays that stay where they are."""
 
-    def __init__(self, function: ca.Function, width: int, given: Mapping[int, np.ndarray]) -> None:
+    def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
         self._buffer, self._evaluate = function.buffer()
         inputs = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
         self._outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
         self.width = width
         self.sizes_out = [output.shape[1] for output in self._outputs]
         for i, array in enumerate(inputs):
-            if i in given:
-                array[:] = given[i]
+            if i in fixed_inputs:
+                array[:] = fixed_inputs[i]
             self._buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
         for i, array in enumerate(self._outputs):
             self._buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
         self._all = inputs  # the buffer does not keep them alive
-        self._inputs = [array for i, array in enumerate(inputs) if i not in given]
+        self._inputs = [array for i, array in enumerate(inputs) if i not in fixed_inputs]
         self.is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:

@@ -16,7 +16,7 @@ _SUM = 32
 
 
 def kept(key: str) -> bytes | None:
-    """The code that was kept under a key; None if there is none, or not all of it."""
+    """Return the code that was kept under a key; None if there is none, or not all of it."""
     path = _folder() / key
     try:
         data = path.read_bytes()
@@ -44,9 +44,9 @@ def _folder() -> Path:
 
 
 def _make_room(folder: Path) -> None:
-    found = [(path.stat(), path) for path in folder.iterdir()]
-    size = sum(stat.st_size for stat, _ in found)
-    for stat, path in sorted(found, key=lambda each: each[0].st_mtime):
+    entries = [(path.stat(), path) for path in folder.iterdir()]
+    size = sum(stat.st_size for stat, _ in entries)
+    for stat, path in sorted(entries, key=lambda entry: entry[0].st_mtime):
         if size <= MOST:
             return
         with contextlib.suppress(FileNotFoundError):  # another process was faster

@@ -86,11 +86,14 @@ def _module(function: ca.Function) -> ir.Module:
     lanes = [builder.add(k, _INDEX(lane)) for lane in range(LANES)]
     lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
     sizes = ([function.nnz_in(i) for i in range(function.n_in())], [function.nnz_out(i) for i in range(function.n_out())])
-    here = [
-        [[builder.gep(place, [builder.mul(lane, _INDEX(size))]) for lane in lanes] for place, size in zip(*both, strict=True)]
-        for both in zip(places, sizes, strict=True)
+    registers_here = [
+        [
+            [builder.gep(place, [builder.mul(lane, _INDEX(size))]) for lane in lanes]
+            for place, size in zip(*operands, strict=True)
+        ]
+        for operands in zip(places, sizes, strict=True)
     ]
-    _translate(function, builder, *here)
+    _translate(function, builder, *registers_here)
     following = builder.add(k, _INDEX(LANES))
     k.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, count), body, done)
@@ -99,25 +102,25 @@ def _module(function: ca.Function) -> ir.Module:
 
 
 def _translate(function: ca.Function, builder: ir.IRBuilder, inputs: list, results: list) -> None:
-    """The instructions of a Function; `inputs` and `results` hold, for each argument and lane, where it is."""
+    """Return the instructions of a Function; `inputs` and `results` hold, for each argument and lane, where it is."""
     work: dict[int, ir.Value] = {}
     for number in range(function.n_instructions()):
         operation = function.instruction_id(number)
-        to, of = function.instruction_output(number), function.instruction_input(number)
+        to, names = function.instruction_output(number), function.instruction_input(number)
         if operation == ca.OP_OUTPUT:
             for lane, place in enumerate(results[to[0]]):
-                value = builder.extract_element(work[of[0]], ir.IntType(32)(lane))
+                value = builder.extract_element(work[names[0]], ir.IntType(32)(lane))
                 builder.store(value, builder.gep(place, [_INDEX(to[1])]))
         elif operation == ca.OP_INPUT:
             value = _LANES(ir.Undefined)
-            for lane, place in enumerate(inputs[of[0]]):
-                loaded = builder.load(builder.gep(place, [_INDEX(of[1])]))
+            for lane, place in enumerate(inputs[names[0]]):
+                loaded = builder.load(builder.gep(place, [_INDEX(names[1])]))
                 value = builder.insert_element(value, loaded, ir.IntType(32)(lane))
             work[to[0]] = value
         elif operation == ca.OP_CONST:
             work[to[0]] = _constant(function.instruction_constant(number))
         elif operation in OPERATIONS:
-            work[to[0]] = OPERATIONS[operation](builder, *(work[index] for index in of))
+            work[to[0]] = OPERATIONS[operation](builder, *(work[index] for index in names))
         else:
             raise UnknownInstructionError(f"instruction {operation}")
 
@@ -186,8 +189,8 @@ def _surroundings() -> bytes:
     """What machine code depends on, besides the Function: the processor, the libraries, and how it is translated."""
     translation = Path(__file__).read_bytes()
     features = binding.get_host_cpu_features().flatten()
-    known = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
-    return "\n".join(known).encode() + translation
+    parts = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
+    return "\n".join(parts).encode() + translation
 
 
 def _compiled(module: ir.Module, key: str) -> binding.ExecutionEngine:
