@@ -147,7 +147,7 @@ def test_tables_are_as_wide_as_the_terminal(archive):
 
 @pytest.mark.slow
 def test_a_run_without_a_terminal_says_how_far_it_is(monkeypatch, tmp_path):
-    monkeypatch.setattr(progress, "EVERY", 0.0)
+    monkeypatch.setattr(progress, "LINE_INTERVAL", 0.0)
     model, size = MODELS / "ra1.py", ("--samples", "20000", "--solver", "daqp", "--surfaces", "0")
     done = call(tmp_path, "run", model, *size)
     lines = [line for line in done.stderr.splitlines() if line.startswith("ra1: ")]

@@ -135,7 +135,7 @@ def test_the_command_compares_archives(archive, tmp_path):
         (["{}", "model.py"], "not one model, nor archives"),
         (["{}", "other.nc"], "does not exist"),
         (["{}", "other.nc", "--samples", "20"], "--samples is for models"),
-        (["model.py", "--report", "page.html"], "--report is for archives"),
+        (["model.py", "--report", "page.html"], "--report applies to archives"),
     ],
 )
 def test_what_cannot_be_compared_is_refused(options, said, archive, tmp_path):

@@ -255,8 +255,8 @@ def test_odd_names_are_texts(tmp_path, open_page):
 
 @pytest.mark.slow
 def test_bodies_of_many_triangles_are_drawn_with_fewer(tmp_path, monkeypatch):
-    monkeypatch.setattr(decimation, "TRIANGLES", 2000)
-    monkeypatch.setattr(decimation, "LEAST", 100)
+    monkeypatch.setattr(decimation, "MAX_TRIANGLES", 2000)
+    monkeypatch.setattr(decimation, "MIN_TRIANGLES", 100)
     a = tc.Assembly("ball")
     ball = a.part("ball", tc.Mesh(trimesh.creation.icosphere(subdivisions=4, radius=50)))
     small = a.part("small", tc.Box(10, 20, 10), at=(200, 0, 0), fixed=True)

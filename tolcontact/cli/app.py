@@ -1,4 +1,4 @@
-"""The application: its options, and how it ends."""
+"""The application: options that commands share, and its exit codes."""
 
 import inspect
 import io
@@ -22,8 +22,8 @@ app = typer.Typer(
 )
 
 
-def _show_version(asked: bool) -> None:
-    if asked:
+def _show_version(is_set: bool) -> None:
+    if is_set:
         typer.echo(f"tolcontact {__version__}")
         raise typer.Exit
 
@@ -38,51 +38,52 @@ def _options(
 
 
 def or_(names: Iterable[str]) -> str:
-    """Names as a help text lists them."""
+    """Return names as a help text lists them."""
     return ", ".join(f'"{name}"' if " " in name else name for name in names)
 
 
-Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a model as JSON.")]
+Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a JSON model.")]
 StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]
 Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
 Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
 Resolution = Annotated[
-    str | None, typer.Option(help=f"One linear step, or as many as it takes: {or_(RESOLUTIONS)}. Default: the model's.")
+    str | None,
+    typer.Option(help=f"One linear step, or steps until all gaps are open: {or_(RESOLUTIONS)}. Default: the model's."),
 ]
 Objective = Annotated[
     str | None,
-    typer.Option(help=f"What the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
+    typer.Option(help=f"Quantity that the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
 
 
-AsJson = Annotated[bool, typer.Option("--json", help="Print it as JSON.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
-Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Keep it in an archive of the same model, too.")]
-Workers = Annotated[int | None, typer.Option(metavar="N", help="Simulate in so many processes, with dask.")]
+Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store the result in an archive of the same model.")]
+Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
     str | None,
     typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Show no progress and no notices; results are printed.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print results only: no progress, no notices.")]
 
 
 def only_one(**options: bool) -> None:
-    """Raise OptionError if several ways to print are asked for."""
-    asked = [f"--{word}" for word, given in options.items() if given]
-    if len(asked) > 1:
-        raise OptionError(f"{' and '.join(asked)} are given; choose one")
+    """Raise OptionError if several of these options are set."""
+    names = [f"--{name}" for name, is_set in options.items() if is_set]
+    if len(names) > 1:
+        raise OptionError(f"{' and '.join(names)} exclude each other; choose one")
 
 
 def examples(*commands: str) -> str:
-    """The end of a help text, a command a line."""
+    """Return the end of a help text, with one command per line."""
     return "Examples:\n\n" + "\n\n".join(f"tolcontact {command}" for command in commands)
 
 
-def chosen(**words: str | None) -> dict[str, str]:
-    """The words of a method that were given, instead of the model's own."""
-    return {word: value for word, value in words.items() if value is not None}
+def chosen(**options: str | None) -> dict[str, str]:
+    """Return the choices of a method that options replace."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 def main(assembly: Callable[[], Assembly]) -> None:
@@ -92,10 +93,10 @@ def main(assembly: Callable[[], Assembly]) -> None:
 
 
 def command_line(arguments: list[str] | None = None) -> None:
-    """The console script: `app`, with errors as one message and exit code 2."""
+    """Run `app` as the console script; an error is one message with exit code 2."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # a terminal with few characters is no reason to stop
+            stream.reconfigure(errors="backslashreplace")  # for terminals with few characters
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _show_warning
@@ -104,8 +105,8 @@ def command_line(arguments: list[str] | None = None) -> None:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
     except OSError as error:
-        refused = shown(str(error))
-        typer.echo(f"error: the operating system reports: {refused}; continue an unfinished archive with --resume", err=True)
+        report = shown(str(error))
+        typer.echo(f"error: the operating system reports: {report}; continue an unfinished archive with --resume", err=True)
         sys.exit(2)
 
 

@@ -8,7 +8,7 @@ import typer
 
 from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples
 from tolcontact.cli.output import console
-from tolcontact.cli.view import temporary
+from tolcontact.cli.view import temporary_page
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import Nominal
@@ -25,21 +25,21 @@ def check(
     resolution: Resolution = None,
     objective: Objective = None,
     population: Annotated[
-        int | None, typer.Option(metavar="N", help="Also draw N of every feature, and measure which share lies in its zones.")
+        int | None, typer.Option(metavar="N", help="Also draw N of every feature, and print the share inside its zones.")
     ] = None,
     seed: Seed = 1,
-    view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with faults marked.")] = False,
+    view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model, and these options, and list every fault; runs nothing."""
-    declared = load_model(model)
+    """Check a model and these options, and list every fault, without a run."""
+    assembly = load_model(model)
     try:
-        program = build(declared, solver=solver, method=chosen(resolution=resolution, objective=objective))
+        program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
     except ModelError as error:
         if view:
-            _look(declared, None, error.faults, temporary(model))
+            _open_view(assembly, None, error.faults, temporary_page(model))
         raise
     if view:
-        _look(declared, program.nominal, (), temporary(model))
+        _open_view(assembly, program.nominal, (), temporary_page(model))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
@@ -48,11 +48,11 @@ def check(
         typer.echo(f"  contact {pair.name}: {pair.in_words}")
     typer.echo("no faults found")
     if population is not None:
-        console().print(population_text(check_population(declared, samples=population, seed=seed)))
+        console().print(population_text(check_population(assembly, samples=population, seed=seed)))
 
 
-def _look(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
-    """Write the view of a model, and open it."""
+def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
+    """Write the view of a model, and open it in the browser."""
     write_view(model, nominal, faults, path)
     typer.echo(f"page: {shown(str(path))}")
     typer.launch(str(path))

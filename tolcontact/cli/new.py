@@ -14,8 +14,8 @@ STARTER = Path(__file__).with_name("starter.py")
 
 
 @app.command(epilog=examples("new bracket"))
-def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Of the model; its script is NAME.py.")]) -> None:
-    """Write a small model with comments, to begin with."""
+def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model; its script is NAME.py.")]) -> None:
+    """Write a small model with comments as a starting point."""
     path = Path(name if name.endswith(".py") else f"{name}.py")
     if faults := list(key_faults("model", [path.stem])):
         raise OptionError(faults[0])
@@ -26,7 +26,7 @@ def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Of the model; 
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError as error:
-        raise OptionError(f'"{path}" exists already, and is left as it is; choose another name') from error
+        raise OptionError(f'"{path}" exists already, and was not changed; choose another name') from error
     except OSError as error:
         raise OptionError(f'"{path}" cannot be written: {error.strerror}') from error
     typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")

@@ -1,4 +1,4 @@
-"""Progress on standard error, and the message to a user who stops a run."""
+"""Progress on standard error, and the message of a run that a user stops."""
 
 import contextlib
 import logging
@@ -17,16 +17,16 @@ from tolcontact.errors import shown
 from tolcontact.report import grouped
 from tolcontact.workflow.forecast import duration
 
-EVERY = 10.0  # s
+LINE_INTERVAL = 10.0  # s
 
 
 class Pace:
-    """How fast realizations are finished, and how long the others will take."""
+    """The rate of finished realizations, and the time that the others will take."""
 
     def __init__(self) -> None:
-        self.began: tuple[float, int] | None = None  # [s], and how many were there: what a resumed run finds took no time
+        self.began: tuple[float, int] | None = None  # [s], and realizations of a resumed run, which took no time
 
-    def words(self, done: int, total: int) -> str:
+    def text(self, done: int, total: int) -> str:
         now = time.monotonic()
         if self.began is None:
             self.began = now, done
@@ -38,9 +38,9 @@ class Pace:
 
 @contextlib.contextmanager
 def shown_progress(name: str, total: int, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
-    """Gives what is to be told how many realizations are done, and of how many; announcements are shown, too.
+    """Yield a function of the finished and the total number of realizations that shows progress; also show announcements.
 
-    A bar on a terminal; elsewhere a line every EVERY seconds; nothing, announcements included, if `quiet`.
+    Progress is a bar on a terminal, and elsewhere a line every LINE_INTERVAL seconds. With `quiet` nothing is shown.
     """
     console = Console(stderr=True)
     columns = (
@@ -53,58 +53,58 @@ def shown_progress(name: str, total: int, *, quiet: bool) -> Iterator[Callable[[
     pace, last = Pace(), time.monotonic()
     task = bar.add_task(shown(name), total=total, pace="")
 
-    def show(done: int, of: int) -> None:
+    def show(done: int, total: int) -> None:
         nonlocal last
-        said = pace.words(done, of)
-        bar.update(task, completed=done, total=of, description=shown(name), pace=said)
-        if bar.disable and not quiet and time.monotonic() - last > EVERY:
+        speed = pace.text(done, total)
+        bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
+        if bar.disable and not quiet and time.monotonic() - last > LINE_INTERVAL:
             last = time.monotonic()
-            typer.echo(f"{shown(name)}: {grouped(done)} of {grouped(of)}{', ' if said else ''}{said}", err=True)
+            typer.echo(f"{shown(name)}: {grouped(done)} of {grouped(total)}{', ' if speed else ''}{speed}", err=True)
 
-    with bar, _log_shown(console, lambda words: bar.update(task, description=words), quiet=quiet):
+    with bar, _log_shown(console, lambda message: bar.update(task, description=message), quiet=quiet):
         yield show
 
 
 @contextlib.contextmanager
 def _log_shown(console: Console, show: Callable[[str], None], *, quiet: bool) -> Iterator[None]:
-    """Show what the package is doing, and print what it announces."""
+    """Show the log of the package in the progress bar, and print its warnings."""
 
     class Shown(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            words = shown(record.getMessage())
+            message = shown(record.getMessage())
             if record.levelno < logging.WARNING:
-                show(words)
+                show(message)
             elif not quiet:
-                console.print(words, markup=False, highlight=False, soft_wrap=True)
+                console.print(message, markup=False, highlight=False, soft_wrap=True)
 
     log, handler = logging.getLogger("tolcontact"), Shown()
-    before = log.level
+    level = log.level
     log.addHandler(handler)
     log.setLevel(logging.INFO)
     try:
         yield
     finally:
         log.removeHandler(handler)
-        log.setLevel(before)
+        log.setLevel(level)
 
 
 @contextlib.contextmanager
 def stopped(out: Path | None, done: list[int]) -> Iterator[None]:
-    """Report how far a run came if it is stopped; `done` is how far, and of how many."""
+    """Report the progress of a run that is stopped; `done` is the finished and the total number of realizations."""
     stopped_by = [signal.SIGINT]
 
     def terminate(number: int, _: object) -> None:
         stopped_by[0] = signal.Signals(number)
         raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGTERM, terminate)
+    handler = signal.signal(signal.SIGTERM, terminate)
     try:
         yield
     except KeyboardInterrupt:
-        go_on = "continue with --resume" if out is not None and out.exists() else "nothing is kept"
-        typer.echo(f"stopped: {grouped(done[0])} of {grouped(done[1])} done; {go_on}", err=True)
+        advice = "continue with --resume" if out is not None and out.exists() else "nothing is kept"
+        typer.echo(f"stopped: {grouped(done[0])} of {grouped(done[1])} done; {advice}", err=True)
         sys.stderr.flush()
-        # What threads still compute is not waited for: it is not in the archive, and may take minutes.
+        # Threads may compute for minutes; their results are not in the archive.
         os._exit(128 + stopped_by[0])
     finally:
-        signal.signal(signal.SIGTERM, before)
+        signal.signal(signal.SIGTERM, handler)

@@ -51,34 +51,36 @@ def run(
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
-    keep: Annotated[str, typer.Option(help=f"What to archive for each realization: {or_(KEPT)}.")] = "all",
+    keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
         str,
-        typer.Option(metavar="some|all|N|none", help="Number of realizations that magnitudes of displacement fields cover."),
+        typer.Option(metavar="some|all|N|none", help="Number of realizations behind magnitudes of displacement fields."),
     ] = "some",
-    plan: Annotated[str, typer.Option(help=f"How contributors are drawn: {or_(PLANS)}.")] = MONTE_CARLO,
+    plan: Annotated[str, typer.Option(help=f"Plan of the draws: {or_(PLANS)}.")] = MONTE_CARLO,
     until: Annotated[
         str | None,
-        typer.Option(metavar="TEXT", help='Go on until an interval is so narrow: "MEASURE: 6 sigma +-1 %", "...: ppm +-20 %".'),
+        typer.Option(
+            metavar="TEXT", help='Sample until this interval is narrow enough: "MEASURE: 6 sigma +-1 %", "...: ppm +-20 %".'
+        ),
     ] = None,
     surfaces: Annotated[
-        int, typer.Option(help="Number of realizations that are checked between contact points, against the surfaces.")
+        int, typer.Option(help="Number of realizations that are checked between contact points, on the surfaces.")
     ] = SURFACES,
-    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page to look at.")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page for a browser.")] = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate a model with and without contact, and print what happens to its measures.
+    """Simulate a model with and without contact, and print the statistics of its measures.
 
-    Exit code 1 if more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
+    The exit code is 1 if more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
     """
     if out is None and (overwrite or resume):
-        raise OptionError("--overwrite and --resume need an archive, and none is named; name one: --out FILE.nc")
+        raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
     if report is not None:
         check_page(report)
     method = chosen(resolution=resolution, objective=objective)
-    # Who stops it gets the cursor back first.
+    # Stopping first gives the cursor back.
     with (
         stopped(out, done := [0, samples]),
         shown_progress(model.stem, samples, quiet=quiet) as show,
@@ -95,9 +97,9 @@ def run(
             fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip
     with results:
-        found = summarize(results)
+        summary = summarize(results)
         if report is not None:
-            write_page(results, found, report)
-        print_summary(found)
+            write_page(results, summary, report)
+        print_summary(summary)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")

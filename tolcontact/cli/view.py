@@ -21,28 +21,28 @@ from tolcontact.workflow.run import summarize
 
 @app.command(epilog=examples("view model.py", "view parts.stp", "view model.py --out page.html"))
 def view(
-    what: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
+    source: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
     out: Annotated[
         Path | None,
-        typer.Option(metavar="FILE.html", help="Only write the page. Default: a temporary one, opened in the browser."),
+        typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
     ] = None,
 ) -> None:
-    """Look at an assembly before any run: faces with the words that choose them, locators, contact points, nominal gaps.
+    """Show an assembly before a run: faces with their selectors, locators, contact points and nominal gaps.
 
-    Faults of a model are listed on the page. Of an archive it is the report.
+    The page lists the faults of a model. For an archive it is the report.
     """
     if out is not None:
         check_page(out)
-    path = out or temporary(what)
-    if what.suffix.lower() == ".nc":
-        with open_archive(what) as results:
+    path = out or temporary_page(source)
+    if source.suffix.lower() == ".nc":
+        with open_archive(source) as results:
             write_page(results, summarize(results), path)
-    elif what.suffix.lower() in STEP:
-        model = Assembly(what.stem)
-        parts_from(model, what)
+    elif source.suffix.lower() in STEP:
+        model = Assembly(source.stem)
+        parts_from(model, source)
         write_view(model, None, [], path)
     else:
-        _write_model(load_model(what), path)
+        _write_model(load_model(source), path)
     typer.echo(f"page: {shown(str(path))}")
     if out is None:
         typer.launch(str(path))
@@ -57,6 +57,6 @@ def _write_model(model: Assembly, path: Path) -> None:
         write_view(model, nominal, (), path)
 
 
-def temporary(of: Path) -> Path:
-    """Where a page is written that is only looked at."""
-    return Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{of.stem}.html"
+def temporary_page(source: Path) -> Path:
+    """Return the path of a new page in a temporary folder."""
+    return Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{source.stem}.html"

@@ -1,8 +1,8 @@
-"""Report: tables for a terminal, pages for a browser, and what notebooks show. A chapter of the guide.
+"""Report: tables for a terminal, pages for a browser, and views for notebooks. A chapter of the guide.
 
 `summary_text`, `comparison_text`, `runs_text` and `population_text` turn the datasets of `tc.summarize`, `tc.compare`,
-`tc.compare_runs` and `tc.check_population` into something that rich prints. Tables fit into 80 columns, or take what a wider
-terminal gives; output to a file or a pipe is never cut.
+`tc.compare_runs` and `tc.check_population` into text that rich prints. Tables fit into 80 columns, or use the width of a wider
+terminal; output to a file or a pipe is never cut.
 
 >>> import tolcontact as tc
 >>> from rich.console import Console
@@ -19,20 +19,20 @@ variation simulation of stand: 1000 realizations
 ...
 
 `write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. It needs no network, and is
-sent like any file: the assembly to turn, with fields, single realizations and sections; histograms with limits, and how
-estimates settle; measures against contributors; contact, certificates, and how the run was made.
-`write_view` (`tolcontact view`) writes the assembly before any run: faces with the words that choose them, locators, contact
+sent like any file: the assembly in 3D, with fields, single realizations and sections; histograms with limits, and the
+convergence of estimates; measures against contributors; contact, certificates, and the settings of the run.
+`write_view` (`tolcontact view`) writes the assembly before a run: faces with their selectors, locators, contact
 points, and nominal gaps. In a notebook a declared assembly and a program show this page; a summary shows its tables, and
-`results.tolcontact` the report. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes runs side by side.
+`results.tolcontact` the report. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes a comparison of runs.
 
 How to read the text:
 
-- Each figure is `estimate [lower, upper]`, with as many decimals as its 95 % interval deserves.
+- Each figure is `estimate [lower, upper]`, with the decimals that its 95 % interval supports.
 - The columns are the raw state, the corrected state, and the change between them. Changes are from the same draws, so their
   intervals are narrower than a comparison of the two columns suggests.
 - The second table gives, for each part, the smallest and largest 6 sigma of the displacement over its surface.
-- The last lines are about contact: how many realizations it touched, their statuses, the pairs in conflict, the largest
-  penetration at contact points and between surfaces, and advice if the method should be another one.
+- The last lines describe contact: the share of realizations that it touched, their statuses, the pairs in conflict, the largest
+  penetration at contact points and between surfaces, and advice if another method fits better.
 
 Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line states it.
 """

@@ -1,4 +1,4 @@
-"""What is drawn besides the bodies, in the nominal assembly frame [mm]: locators, contact points, measures, forces."""
+"""Annotations of an assembly in its nominal frame [mm]: locators, contact points, measures, features and forces."""
 
 import json
 from collections.abc import Iterator
@@ -18,13 +18,13 @@ Mark = dict[str, Any]
 
 @dataclass(frozen=True)
 class Marks:
-    """Each by its name.
+    """Annotations by kind, each with a name.
 
     locators   at (3,), along (3,)
     contacts   part (its number), points (point, 3), gaps (point,), None where only an archive is known
     measures   points (point, 3), along (3,), or None
-    features   at (3,), where the face of a feature that contact or a locator is on turns about
-    forces     at (3,), or None where only the geometry knows it, along (3,)
+    features   at (3,), the centre of the face
+    forces     at (3,), or None at the end of an axis, along (3,)
     """
 
     locators: list[Mark]
@@ -35,14 +35,16 @@ class Marks:
 
 
 def marks_of(results: xr.DataTree) -> Marks:
-    """Those of an archive; what it does not have is left out."""
+    """Return the annotations that an archive has."""
     document = json.loads(str(results["model"][terms.DECLARATION.name].values))
-    forces = [{"name": each["name"], "at": _at(document, each["at"]), "along": each["vector"]} for each in document["forces"]]
+    forces = [
+        {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]
+    ]
     return Marks(_locators(results), list(_contacts(results)), list(_measures(document)), _features(results), forces)
 
 
 def marks_of_nominal(nominal: Nominal) -> Marks:
-    """Those of a model before any run."""
+    """Return the annotations of a model before a run."""
     locators = zip(nominal.locators.labels, nominal.locators.points, nominal.locators.directions, strict=True)
     contacts = []
     for pair in nominal.pairs:
@@ -65,9 +67,9 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
 
 
 def fixed_points(pair: ContactPoints) -> tuple[np.ndarray, np.ndarray]:
-    """Contact points (point, 3) and gaps (point,) [mm]; the nearest tangent of a hollow wall, which moves, is left out."""
-    stays = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
-    return pair.P_m[stays], ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1)[stays]
+    """Return contact points (point, 3) and gaps (point,) [mm], without nearest tangents of hollow walls, which move."""
+    is_fixed = ~pair.round.points["is_hollow"] if pair.round else np.ones(len(pair.P_m), dtype=bool)
+    return pair.P_m[is_fixed], ((pair.P_m - pair.P_r) * pair.n_r).sum(axis=1)[is_fixed]
 
 
 def _locators(results: xr.DataTree) -> list[Mark]:
@@ -95,23 +97,23 @@ def _features(results: xr.DataTree) -> list[Mark]:
     contact = results["contact"].to_dataset()
     if terms.FACE_CENTRE.name not in contact:
         return []
-    named = zip(contact[terms.FEATURE_OF_FACE.name].values, contact[terms.FACE_CENTRE.name].values, strict=True)
-    return [{"name": str(name), "at": at.tolist()} for name, at in named]
+    faces = zip(contact[terms.FEATURE_OF_FACE.name].values, contact[terms.FACE_CENTRE.name].values, strict=True)
+    return [{"name": str(name), "at": at.tolist()} for name, at in faces]
 
 
 def _measures(document: Mark) -> Iterator[Mark]:
     for measure in document["measures"]:
         ends = [_at(document, measure[word]) for word in ("of", "to") if word in measure]
-        known = [end for end in ends if end is not None]
-        if known:
-            yield {"name": measure["name"], "points": known, "along": measure["along"]}
+        positions = [end for end in ends if end is not None]
+        if positions:
+            yield {"name": measure["name"], "points": positions, "along": measure["along"]}
 
 
 def _at(document: Mark, point: Mark) -> list[float] | None:
-    """Where a declared point is in the nominal assembly; None of an axis's end, which is the geometry's."""
+    """Return the nominal position of a declared point; None for the end of an axis, which the document does not have."""
     if "position" not in point:
         return None
-    part = next(each for each in document["parts"] if each["name"] == point["part"])
+    part = next(entry for entry in document["parts"] if entry["name"] == point["part"])
     R = Rotation.from_rotvec(part["rotation"]).as_matrix()
     return [float(x) for x in R @ point["position"] + part["at"]]
 

@@ -1,4 +1,4 @@
-"""How a notebook shows declared assemblies, programs, summaries and results: tables, and the scene to turn."""
+"""The HTML of assemblies, programs, summaries and results in a notebook: tables, and a 3D scene."""
 
 import functools
 import html
@@ -19,7 +19,7 @@ _DIMENSIONS = {"measure", "state", "statistic", "change_of", "interval", "pair",
 
 @functools.singledispatch
 def html_of(thing: object) -> str:
-    """A thing as HTML."""
+    """Return an object as HTML."""
     return f"<pre>{html.escape(str(thing))}</pre>"
 
 
@@ -47,12 +47,12 @@ def _(summary: Summary) -> str:
 
 
 def results_html(results: xr.DataTree, summary: Summary) -> str:
-    """The report, with its overview outside of the frame: where scripts are not run, it is what remains."""
+    """Return the report of results, after an overview that also appears where scripts are not run."""
     return summary_table(summary) + framed(page_of(results, summary))
 
 
 def framed(page: str) -> str:
-    """A page inside another one; its scripts see nothing of what is around it."""
+    """Return a page inside a frame, whose scripts cannot see the notebook."""
     return (
         f'<iframe srcdoc="{html.escape(page)}" sandbox="allow-scripts" title="assembly" '
         f'style="width: 100%; height: {HEIGHT}px; border: 1px solid #c9ced6"></iframe>'

@@ -1,5 +1,4 @@
-"""Pages for a browser that hold everything and need no network: the report of a run, runs side by side, and the view of a
-model before any."""
+"""Self-contained pages for a browser: the report of a run, the comparison of runs, and the view of a model."""
 
 from tolcontact.report.html.page import page_of, summary_table, view_page, write_comparison, write_page, write_view
 

@@ -1,4 +1,4 @@
-"""What the charts of a page are drawn from: histograms of each measure in both states, and how estimates settle with N."""
+"""The data of a page's charts: histograms of each measure in both states, and the convergence of estimates."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,54 +12,56 @@ from tolcontact.report.html.packed_array import packed
 from tolcontact.statistics import intervals
 
 BINS = 60
-POINTS = 2000  # realizations that are shown as points
-STEPS = 40  # numbers of realizations at which estimates are shown
+MAX_POINTS = 2000  # realizations in scatter charts
+CONVERGENCE_STEPS = 40
 FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
 
 
 def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]:
-    """For each measure its name, units, limits, figures and distributions."""
+    """Return name, units, limits, figures and distributions of each measure."""
     rows = results.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(summary.attrs["realizations"])})
-    found = []
+    charts = []
     for number, name in enumerate(summary["measure"].values):
-        of = summary.sel(measure=name)
-        states = [_of_state(rows, number, state) for state in range(len(terms.STATES))]
+        measure = summary.sel(measure=name)
+        states = [_convergence(rows, number, state) for state in range(len(terms.STATES))]
         edges = _edges(states)
-        for state, own in enumerate(states):
-            own["counts"] = _counts(rows, number, state, edges)
-            del own["range"]
-        found.append(
+        for state, chart in enumerate(states):
+            chart["counts"] = _counts(rows, number, state, edges)
+            del chart["range"]
+        charts.append(
             {
                 "name": str(name),
-                "units": str(of["measure_units"].values),
-                "limits": [_finite(of["measure_lower"]), _finite(of["measure_upper"])],
+                "units": str(measure["measure_units"].values),
+                "limits": [_finite(measure["measure_lower"]), _finite(measure["measure_upper"])],
                 "edges": edges.tolist(),
                 "states": states,
-                **{word: [_finite(each) for each in _estimates(of, name)] for word, name in FIGURES.items()},
+                **{key: [_finite(value) for value in _estimates(measure, figure)] for key, figure in FIGURES.items()},
             }
         )
-    return found
+    return charts
 
 
 def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> list[dict[str, Any]]:
-    """For each measure of a comparison the share [%] of realizations in the same bins, by run and state."""
-    found = []
+    """Return, for each measure of a comparison, the share [%] of realizations in common bins, by run and state."""
+    charts = []
     rows = {
         name: run.to_dataset()[[terms.MEASURED.name]].isel({terms.REALIZATION: slice(int(count))})
         for (name, run), count in zip(runs.items(), comparison["realizations"].values, strict=True)
     }
     for name in comparison["measure"].values:
-        places = {run: own[terms.MEASURE].values.tolist().index(name) for run, own in rows.items()}
-        both = range(len(terms.STATES))
-        edges = _edges([{"range": _range(own, places[run], state)} for run, own in rows.items() for state in both])
+        positions = {run: table[terms.MEASURE].values.tolist().index(name) for run, table in rows.items()}
+        states = range(len(terms.STATES))
+        edges = _edges([{"range": _range(table, positions[run], state)} for run, table in rows.items() for state in states])
         shares = [
             {
                 "name": run,
-                "shares": [[100 * k / own.sizes[terms.REALIZATION] for k in _counts(own, places[run], s, edges)] for s in both],
+                "shares": [
+                    [100 * k / table.sizes[terms.REALIZATION] for k in _counts(table, positions[run], s, edges)] for s in states
+                ],
             }
-            for run, own in rows.items()
+            for run, table in rows.items()
         ]
-        found.append(
+        charts.append(
             {
                 "name": str(name),
                 "units": str(comparison["measure_units"].sel(measure=name).values),
@@ -68,61 +70,63 @@ def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
                 "runs": shares,
             }
         )
-    return found
+    return charts
 
 
 def relations_of(results: xr.DataTree, summary: xr.Dataset) -> dict[str, Any]:
-    """The first realizations one by one: measures (realization, state, measure), and deviations (realization, contributor)."""
-    some = {terms.REALIZATION: slice(min(summary.attrs["realizations"], POINTS))}
+    """Return measures (realization, state, measure) and deviations (realization, contributor) of the first realizations."""
+    selection = {terms.REALIZATION: slice(min(summary.attrs["realizations"], MAX_POINTS))}
     sample = results["sample"].to_dataset()
-    found: dict[str, Any] = {
-        "measured": packed(results.to_dataset()[terms.MEASURED.name].isel(some).values),
+    relations: dict[str, Any] = {
+        "measured": packed(results.to_dataset()[terms.MEASURED.name].isel(selection).values),
         "contributors": [],
     }
     if terms.DEVIATION.name in sample:
-        varying = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
-        deviations = sample[terms.DEVIATION.name].isel(some).values
-        moves = np.ptp(deviations, axis=0) > 0
+        dim = sample[terms.DEVIATION.name].dims[-1]  # archives before format 4 have locators alone
+        deviations = sample[terms.DEVIATION.name].isel(selection).values
+        is_varying = np.ptp(deviations, axis=0) > 0
         units = (
-            sample[terms.CONTRIBUTOR_UNITS.name].values if terms.CONTRIBUTOR_UNITS.name in sample else np.full(len(moves), "mm")
+            sample[terms.CONTRIBUTOR_UNITS.name].values
+            if terms.CONTRIBUTOR_UNITS.name in sample
+            else np.full(len(is_varying), "mm")
         )
-        labels = zip(sample[varying].values[moves], units[moves], strict=True)
-        found["contributors"] = [{"name": str(name), "units": str(unit)} for name, unit in labels]
-        found["deviations"] = packed(deviations[:, moves])
-    return found
+        labels = zip(sample[dim].values[is_varying], units[is_varying], strict=True)
+        relations["contributors"] = [{"name": str(name), "units": str(unit)} for name, unit in labels]
+        relations["deviations"] = packed(deviations[:, is_varying])
+    return relations
 
 
-def _estimates(of: xr.Dataset, statistic: str) -> xr.DataArray:
-    return of["statistic_value"].sel(statistic=statistic, interval="estimate")
+def _estimates(measure: xr.Dataset, statistic: str) -> xr.DataArray:
+    return measure["statistic_value"].sel(statistic=statistic, interval="estimate")
 
 
-def _of_state(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
-    """The range of a measure, and its mean after more and more realizations, with half of its 95 % interval (Student's t)."""
+def _convergence(rows: xr.Dataset, measure: int, state: int) -> dict[str, Any]:
+    """Return the range of a measure, and its mean by number of realizations, with half of its 95 % interval (Student's t)."""
     total = rows.sizes[terms.REALIZATION]
-    steps = np.unique(np.geomspace(2, total, STEPS).round().astype(int))
-    low, high, count, middle = np.inf, -np.inf, 0, None
-    sums, found = np.zeros(2), []
+    steps = np.unique(np.geomspace(2, total, CONVERGENCE_STEPS).round().astype(int))
+    low, high, count, centre = np.inf, -np.inf, 0, None
+    sums, estimates = np.zeros(2), []
     for piece in pieces(rows):
         x = piece[terms.MEASURED.name].values[:, state, measure]
         low, high = min(low, float(x.min())), max(high, float(x.max()))
-        middle = float(x[0]) if middle is None else middle
-        cumulated = np.cumsum([x - middle, (x - middle) ** 2], axis=1)
+        centre = float(x[0]) if centre is None else centre
+        cumulated = np.cumsum([x - centre, (x - centre) ** 2], axis=1)
         for n in steps[(steps > count) & (steps <= count + len(x))]:
-            first, second = (sums + cumulated[:, n - count - 1]) / n
-            s = float(np.sqrt(max(second - first**2, 0) * n / (n - 1)))
-            found.append([int(n), middle + first, intervals.student(n - 1) * s / np.sqrt(n)])
+            mean, mean_square = (sums + cumulated[:, n - count - 1]) / n
+            s = float(np.sqrt(max(mean_square - mean**2, 0) * n / (n - 1)))
+            estimates.append([int(n), centre + mean, intervals.student(n - 1) * s / np.sqrt(n)])
         sums, count = sums + cumulated[:, -1], count + len(x)
-    return {"range": (low, high), "settling": packed(np.array(found).reshape(-1, 3))}
+    return {"range": (low, high), "settling": packed(np.array(estimates).reshape(-1, 3))}
 
 
 def _range(rows: xr.Dataset, measure: int, state: int) -> tuple[float, float]:
-    """The least and the largest value of a measure."""
+    """Return the smallest and the largest value of a measure."""
     values = [piece[terms.MEASURED.name].values[:, state, measure] for piece in pieces(rows)]
     return min(float(x.min()) for x in values), max(float(x.max()) for x in values)
 
 
 def _edges(states: list[dict[str, Any]]) -> np.ndarray:
-    low, high = min(own["range"][0] for own in states), max(own["range"][1] for own in states)
+    low, high = min(chart["range"][0] for chart in states), max(chart["range"][1] for chart in states)
     if not (np.isfinite(low) and np.isfinite(high)):
         return np.array([])
     return np.linspace(low, high, BINS + 1) if high > low else np.array([low - 0.5, high + 0.5])

@@ -1,4 +1,4 @@
-"""Bodies of many triangles are drawn with fewer: a page has to be sent, and turned."""
+"""The decimation of large bodies, which keeps pages small and quick to draw."""
 
 from collections.abc import Sequence
 
@@ -7,24 +7,24 @@ import igl
 import numpy as np
 from scipy.spatial import cKDTree
 
-TRIANGLES = 60_000  # of all bodies together
-LEAST = 500  # of a body
-ENOUGH = 1.2  # times as many as wanted
+MAX_TRIANGLES = 60_000  # of all bodies
+MIN_TRIANGLES = 500  # of a body
+MAX_EXCESS = 1.2  # over the number of triangles that the fast method should reach
 
 
-def allowed(counts: Sequence[int]) -> list[int]:
-    """How many triangles each body may have."""
-    share = min(1.0, TRIANGLES / max(sum(counts), 1))
-    return [count if share == 1 else min(count, max(LEAST, int(share * count))) for count in counts]
+def triangle_budgets(counts: Sequence[int]) -> list[int]:
+    """Return the largest number of triangles of each body."""
+    share = min(1.0, MAX_TRIANGLES / max(sum(counts), 1))
+    return [count if share == 1 else min(count, max(MIN_TRIANGLES, int(share * count))) for count in counts]
 
 
 def coarser(vertices: np.ndarray, faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """A surface of `count` triangles, about: vertices (vertex, 3), faces (face, 3), and the vertex of before next to each."""
+    """Return a surface of about `count` triangles: vertices (vertex, 3), faces (face, 3), and the nearest old vertices."""
     if len(faces) <= count:
         return vertices, faces, np.arange(len(vertices))
-    found, corners = fast_simplification.simplify(vertices, faces, target_count=count)
-    if len(corners) > ENOUGH * count:  # it stops where many edges are short; this one merges the shortest, but takes longer
-        found, corners, *_ = igl.decimate(
+    coarse, corners = fast_simplification.simplify(vertices, faces, target_count=count)
+    if len(corners) > MAX_EXCESS * count:  # short edges stop the fast method, not this one
+        coarse, corners, *_ = igl.decimate(
             np.asarray(vertices, dtype=np.float64, order="C"), np.asarray(faces, dtype=np.int64, order="C"), count
         )
-    return found, corners, cKDTree(vertices).query(found)[1]
+    return coarse, corners, cKDTree(vertices).query(coarse)[1]

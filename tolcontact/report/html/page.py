@@ -1,4 +1,4 @@
-"""The pages themselves, from templates that hold styles, scripts, libraries and data."""
+"""Pages from templates; each holds its styles, scripts, libraries and data."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -16,8 +16,7 @@ from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import scene_of
-from tolcontact.report.html.shown_realizations import shown_of
-from tolcontact.report.html.view import gaps_in_words, view_of
+from tolcontact.report.html.view import gap_rows, view_of
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells, pair_columns, pair_rows
 from tolcontact.vocabulary import STATES
@@ -33,24 +32,23 @@ RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set
 
 
 def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
-    """Write the report of a run, whose summary is given. Raises ArchiveError if the file cannot be written."""
+    """Write the report of a run with this summary. Raises ArchiveError if the file cannot be written."""
     _write(page_of(results, summary), path)
 
 
 def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
-    """Write the view of a model before any run (see view_page). Raises ArchiveError if the file cannot be written."""
+    """Write the view of a model before a run (see view_page). Raises ArchiveError if the file cannot be written."""
     _write(view_page(assembly, nominal, faults), path)
 
 
 def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, path: Path) -> None:
-    """Write runs side by side (see compare_runs). Raises ArchiveError if the file cannot be written."""
+    """Write the comparison of runs (see compare_runs). Raises ArchiveError if the file cannot be written."""
     _write(comparison_page(runs, comparison), path)
 
 
 def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
-    """The report of a run, whose summary is given."""
-    shown = shown_of(results)
-    scene = scene_of(results, summary, shown)
+    """Return the report of a run with this summary."""
+    scene = scene_of(results, summary)
     values = {
         "title": summary.attrs["title"],
         "realizations": grouped(summary.attrs["realizations"]),
@@ -74,28 +72,28 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
 
 
 def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
-    """The view of a model before any run; `nominal` is None if it has faults."""
+    """Return the view of a model before a run; `nominal` is None for a model with faults."""
     values = {
         "title": assembly.name,
         "faults": faults,
-        "pairs": gaps_in_words(nominal),
+        "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),
     }
     return _page("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []})
 
 
 def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
-    """The file that all parts were taken from, if nothing else is declared yet."""
+    """Return the name of the file of the parts, if nothing else is declared yet."""
     return "" if nominal or faults or not assembly.parts else Path(str(getattr(assembly.parts[0].geometry, "source", ""))).name
 
 
 def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> str:
-    """Runs side by side."""
+    """Return the comparison of runs as a page."""
     measures = []
-    for measure in comparison["measure"].values:
-        of = comparison.sel(measure=measure)
-        tables = [{"columns": VALUES, "rows": value_rows(of)}, {"columns": CHANGES, "rows": change_rows(of)}]
-        measures.append({"name": str(measure), "units": str(of["measure_units"].values), "tables": tables})
+    for name in comparison["measure"].values:
+        measure = comparison.sel(measure=name)
+        tables = [{"columns": VALUES, "rows": value_rows(measure)}, {"columns": CHANGES, "rows": change_rows(measure)}]
+        measures.append({"name": str(name), "units": str(measure["measure_units"].values), "tables": tables})
     values = {
         "title": comparison.attrs["title"],
         "reference": comparison.attrs["reference_run"],
@@ -106,12 +104,12 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
 
 
 def summary_table(summary: xr.Dataset) -> str:
-    """The overview of a summary, as a table that needs no page."""
+    """Return the overview of a summary as a table outside of a page."""
     return _template("overview").render(overview=_overview(summary))
 
 
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
-    """A page of a kind, which has a template and scripts."""
+    """Return a page of a kind, which selects its template and scripts."""
     return _template(kind).render(
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
@@ -144,35 +142,35 @@ def _plain_json(data: Any, **_: Any) -> str:
 
 
 def _overview(summary: xr.Dataset) -> list[dict[str, Any]]:
-    found = []
-    for measure in summary["measure"].values:
-        of = summary.sel(measure=measure)
+    rows = []
+    for name in summary["measure"].values:
+        measure = summary.sel(measure=name)
+        units, limits = str(measure["measure_units"].values), limits_text(measure)
         for state in STATES:
-            cells = overview_cells(of["statistic_value"].sel(state=state))
-            units, said = str(of["measure_units"].values), limits_text(of)
-            found.append({"measure": str(measure), "units": units, "limits": said, "state": state, "cells": cells})
-    return found
+            cells = overview_cells(measure["statistic_value"].sel(state=state))
+            rows.append({"measure": str(name), "units": units, "limits": limits, "state": state, "cells": cells})
+    return rows
 
 
 def _details(summary: xr.Dataset) -> list[dict[str, Any]]:
-    """All estimates of each measure, as rows of texts."""
-    found = []
+    """Return all estimates of each measure as rows of texts."""
+    details = []
     for measure in summary["measure"].values:
-        rows, marked = measure_rows(summary.sel(measure=measure))
-        found.append({"name": str(measure), "rows": rows, "note": APART if marked else ""})
-    return found
+        rows, is_marked = measure_rows(summary.sel(measure=measure))
+        details.append({"name": str(measure), "rows": rows, "note": APART if is_marked else ""})
+    return details
 
 
 def _missing(scene: dict[str, Any]) -> list[str]:
-    """What the archive does not have, or the page not all of, in words."""
-    said = []
+    """Return sentences about data that the archive does not have, or that the page simplifies."""
+    remarks = []
     if not any("mean" in part for part in scene["parts"]):
-        said.append("The archive has no displacement fields.")
+        remarks.append("The archive has no displacement fields.")
     if "motions" not in scene["realizations"]:
-        said.append("The archive has no poses: single realizations are shown by their numbers alone.")
-    said += [
+        remarks.append("The archive has no poses: single realizations have figures only.")
+    remarks += [
         f"Part {part['name']} is drawn with {grouped(part['faces']['shape'][0])} of its {grouped(part['triangles'])} triangles."
         for part in scene["parts"]
         if part["faces"]["shape"][0] < part["triangles"]
     ]
-    return said
+    return remarks

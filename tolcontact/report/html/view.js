@@ -1,8 +1,8 @@
 "use strict";
-// The view before any run: faces are picked, and the words that choose them in a script are shown.
+// The view before a run: a click on a face shows its selector in a script.
 
-const TOUCHING = 1e-6; // mm
-const NEAR = 0.03; // of the assembly: a corner that is so near is meant
+const GAP_TOLERANCE = 1e-6; // mm
+const SNAP_DISTANCE = 0.03; // of the size of the assembly, between a click and a corner
 
 function pick(stage) {
   const ray = new THREE.Raycaster(), place = new THREE.Vector2();
@@ -23,7 +23,7 @@ function pick(stage) {
 function choose(stage, part, hit) {
   stage.paint("", 3, CORRECTED);
   if (!part) {
-    byId("said").textContent = "Click on a face for the words that choose it, and the point.";
+    byId("said").textContent = "Click on a face for its selector and the point.";
     return;
   }
   const known = data.scene.parts[stage.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
@@ -37,12 +37,12 @@ function choose(stage, part, hit) {
   byId("said").textContent = [`part ${part.name}`, face.said, face.words, pointAt(known, part, hit)].join("\n");
 }
 
-/** The words for the corner of the triangle next to a hit, if it is near, else for the hit, in the part's own frame. */
+/** Return the selector of the nearest corner of the triangle, or of the hit if no corner is near, in the frame of the part. */
 function pointAt(known, part, hit) {
   const place = part.mesh.geometry.getAttribute("position");
   const corners = [0, 1, 2].map((corner) => new THREE.Vector3().fromBufferAttribute(place, 3 * hit.faceIndex + corner));
   const nearest = corners.reduce((one, other) => (other.distanceTo(hit.point) < one.distanceTo(hit.point) ? other : one));
-  const isNear = nearest.distanceTo(hit.point) < NEAR * stage.size;
+  const isNear = nearest.distanceTo(hit.point) < SNAP_DISTANCE * stage.size;
   const [a, b] = [(isNear ? nearest : hit.point).toArray(), known.placement];
   const off = a.map((x, k) => x - b[9 + k]);
   const own = [0, 1, 2].map((k) => off[0] * b[k] + off[1] * b[3 + k] + off[2] * b[6 + k]); // R transposed
@@ -53,7 +53,7 @@ function gaps(stage) {
   data.scene.contacts.forEach((pair, k) => {
     const values = unpacked(pair.gaps).values, points = stage.pairs[k].points, colour = new THREE.Color();
     const colours = Float32Array.from(Array.from(values).flatMap((gap) =>
-      colour.set(gap < -TOUCHING ? RED : gap > TOUCHING ? "#2563eb" : TOUCHED).toArray()));
+      colour.set(gap < -GAP_TOLERANCE ? RED : gap > GAP_TOLERANCE ? "#2563eb" : TOUCHED).toArray()));
     points.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
     Object.assign(points.material, { vertexColors: true, needsUpdate: true });
     points.material.color.set("#ffffff");

@@ -1,8 +1,7 @@
-"""Results as text for a terminal, or a pipe."""
+"""Results as text for a terminal or a pipe."""
 
 from tolcontact.report.text.analyses import analysis_text
-from tolcontact.report.text.comparison import comparison_text
-from tolcontact.report.text.population import population_text
+from tolcontact.report.text.checks import comparison_text, population_text
 from tolcontact.report.text.runs import runs_text
 from tolcontact.report.text.summary import capability_text, summary_text
 

@@ -1,4 +1,4 @@
-"""A comparison of runs for the terminal."""
+"""The comparison of runs as text."""
 
 import math
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ _DRAWS = {
 
 
 def runs_text(comparison: xr.Dataset) -> Group:
-    """A comparison (see compare_runs) as something that rich prints."""
+    """Return a comparison (see compare_runs) for rich to print."""
     return Group(*_sections(comparison))
 
 
@@ -29,55 +29,56 @@ def _sections(comparison: xr.Dataset) -> Iterator[Text | FigureTable]:
     yield Text(comparison.attrs["title"], style="bold")
     for line in runs_lines(comparison):
         yield Text(line)
-    for measure in comparison["measure"].values:
-        of = comparison.sel(measure=measure)
-        yield Text(f"\n{measure} ({of['measure_units'].values})", style="bold")
-        yield FigureTable(VALUES, value_rows(of))
+    for name in comparison["measure"].values:
+        measure = comparison.sel(measure=name)
+        yield Text(f"\n{name} ({measure['measure_units'].values})", style="bold")
+        yield FigureTable(VALUES, value_rows(measure))
         yield Text(f"\nchanges from {comparison.attrs['reference_run']}")
-        yield FigureTable(CHANGES, change_rows(of))
+        yield FigureTable(CHANGES, change_rows(measure))
 
 
 def runs_lines(comparison: xr.Dataset) -> Iterator[str]:
-    """What the runs are, one after the other."""
-    for run in comparison["run"].values:
-        of = comparison.sel(run=run)
-        lost = [f"{int(n)} {name}" for name, n in zip(of["status_meaning"].values, of["by_status"].values, strict=True) if n]
-        said = [
-            f"{run}: {of['title'].values}",
-            f"{grouped(int(of['realizations']))} realizations: {', '.join(lost)}",
-            f"largest penetration: raw {_depth(of, 'raw')} mm, corrected {_depth(of, 'corrected')} mm",
+    """Yield a description of each run, and of parts that only some runs have."""
+    for name in comparison["run"].values:
+        run = comparison.sel(run=name)
+        statuses = zip(run["status_meaning"].values, run["by_status"].values, strict=True)
+        counts = [f"{int(n)} {meaning}" for meaning, n in statuses if n]
+        lines = [
+            f"{name}: {run['title'].values}",
+            f"{grouped(int(run['realizations']))} realizations: {', '.join(counts)}",
+            f"largest penetration: raw {_depth(run, 'raw')} mm, corrected {_depth(run, 'corrected')} mm",
         ]
-        if run != comparison.attrs["reference_run"]:
-            said.append(_DRAWS[str(of["draws"].values)])
-        yield "\n  ".join(said)
+        if name != comparison.attrs["reference_run"]:
+            lines.append(_DRAWS[str(run["draws"].values)])
+        yield "\n  ".join(lines)
     if left_out := comparison.attrs["left_out"]:
         yield f"not in all runs, and left out: {left_out}"
 
 
-def value_rows(of: xr.Dataset) -> list[list[str]]:
-    """Of one measure: run and state, mean, 6 sigma, Ppk and share outside."""
+def value_rows(measure: xr.Dataset) -> list[list[str]]:
+    """Return rows of a measure by run and state: mean, 6 sigma, Ppk and share outside."""
     rows = []
-    for run in of["run"].values:
+    for run in measure["run"].values:
         rows.append([str(run), *[""] * (len(VALUES) - 1)])
         for state in STATES:
-            mean, spread, ppk, outside = of["value"].sel(run=run, state=state).values
+            mean, spread, ppk, outside = measure["value"].sel(run=run, state=state).values
             rows.append([f"  {state}", number(mean), number(spread), number(ppk), share(outside)])
     return rows
 
 
-def change_rows(of: xr.Dataset) -> list[list[str]]:
-    """Of one measure: run and state, how mean, 6 sigma and share change, and the largest difference of a realization."""
+def change_rows(measure: xr.Dataset) -> list[list[str]]:
+    """Return rows of a measure by run and state: changes of mean, 6 sigma and share, and the largest difference."""
     rows = []
-    for run in of["run"].values[1:]:
+    for run in measure["run"].values[1:]:
         rows.append([str(run), *[""] * (len(CHANGES) - 1)])
         for state in STATES:
-            one = of.sel(run=run, state=state)
-            mean, ratio, outside = one["change"].values
-            far = float(one["furthest"])
+            changes = measure.sel(run=run, state=state)
+            mean, ratio, outside = changes["change"].values
+            furthest = float(changes["furthest"])
             cells = [number(mean, sign=True), percent(ratio - 1, sign=True), percent(outside, sign=True)]
-            rows.append([f"  {state}", *cells, f"{far:.2g}" if math.isfinite(far) else "-"])
+            rows.append([f"  {state}", *cells, f"{furthest:.2g}" if math.isfinite(furthest) else "-"])
     return rows
 
 
-def _depth(of: xr.Dataset, state: str) -> str:
-    return f"{float(of['penetration'].sel(state=state)):.3g}"
+def _depth(run: xr.Dataset, state: str) -> str:
+    return f"{float(run['penetration'].sel(state=state)):.3g}"

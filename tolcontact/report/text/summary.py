@@ -1,4 +1,4 @@
-"""The summary as text for a terminal."""
+"""The summary of a run as text."""
 
 import math
 from collections.abc import Iterator
@@ -28,15 +28,15 @@ from tolcontact.vocabulary import (
 )
 
 RAW, CORRECTED = STATES
-_CHANGE_BESIDE = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
-_SHORT = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
-_BY_PERCENTILES = {PP_NORMAL: PP, PPK_NORMAL: PPK}
-ADVISED = 0.01  # share of the smallest tolerance range: more penetration than that deserves an exact resolution
-APART = "* apart from that by percentiles: as of a normal distribution it is wrong"
+CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
+SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
+PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
+PENETRATION_SHARE = 0.01  # of the smallest tolerance range; deeper penetration calls for an exact resolution
+APART = "* differs from the index by percentiles: the measure is not normally distributed"
 
 
 def summary_text(summary: xr.Dataset) -> Group:
-    """A summary (see summarize) as something that rich prints."""
+    """Return a summary (see summarize) for rich to print."""
     return Group(*_sections(summary))
 
 
@@ -64,25 +64,25 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
 
 
 def capability_text(summary: xr.Dataset) -> Group:
-    """How each measure of a summary keeps within its limits, and no more."""
+    """Return shares outside of limits and capability of each measure of a summary."""
     return Group(
         Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold"), *_limits(summary)
     )
 
 
 def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
-    for measure in summary["measure"].values:
-        of = summary.sel(measure=measure)
-        yield Text(f"\n{measure} ({of['measure_units'].values}): {limits_text(of) or 'no limits'}", style="bold")
-        if limits_text(of):
-            rows, marked = measure_rows(of.sel(statistic=[*SHARES, *CAPABILITY]))
+    for name in summary["measure"].values:
+        measure = summary.sel(measure=name)
+        yield Text(f"\n{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}", style="bold")
+        if limits_text(measure):
+            rows, is_marked = measure_rows(measure.sel(statistic=[*SHARES, *CAPABILITY]))
             yield FigureTable(["", RAW, CORRECTED], [row[:-1] for row in rows])
-            if marked:
+            if is_marked:
                 yield Text(APART)
 
 
 def _overview(summary: xr.Dataset) -> FigureTable:
-    """Of each measure what a decision is made by."""
+    """Return the figures of each measure that decide about it."""
     rows = []
     for measure in summary["measure"].values:
         rows.append([str(measure), "", "", "", ""])
@@ -91,69 +91,69 @@ def _overview(summary: xr.Dataset) -> FigureTable:
     return FigureTable(["", "mean", "6 sigma", PPK, "outside"], rows)
 
 
-def overview_cells(of: xr.DataArray) -> list[str]:
-    """Mean, 6 sigma, Ppk and share outside of a measure in one state."""
-    mean, spread, ppk, outside = (of.sel(statistic=word).values for word in ("mean", "6 sigma", PPK, OUTSIDE))
+def overview_cells(statistics: xr.DataArray) -> list[str]:
+    """Return mean, 6 sigma, Ppk and share outside of a measure in one state."""
+    mean, spread, ppk, outside = (statistics.sel(statistic=name).values for name in ("mean", "6 sigma", PPK, OUTSIDE))
     return [number(mean), number(spread), number(ppk), share(outside)]
 
 
-def _measure_section(of: xr.Dataset, name: str) -> Iterator[Text | FigureTable]:
-    units, quantity = str(of["measure_units"].values), str(of["measure_quantity"].values)
-    said = ", ".join(each for each in (quantity, limits_text(of)) if each)
-    yield Text(f"\n{name} ({units}){': ' if said else ''}{said}", style="bold")
-    rows, marked = measure_rows(of)
+def _measure_section(measure: xr.Dataset, name: str) -> Iterator[Text | FigureTable]:
+    units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
+    subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
+    yield Text(f"\n{name} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
+    rows, is_marked = measure_rows(measure)
     yield FigureTable(["", RAW, CORRECTED, "change"], rows)
-    if marked:
+    if is_marked:
         yield Text(APART)
 
 
-def measure_rows(of: xr.Dataset) -> tuple[list[list[str]], bool]:
-    """All estimates of a measure: rows of label, raw, corrected and change; and whether one is marked by * (see APART)."""
-    rows, marked = [], False
-    for statistic in of["statistic"].values:
-        values = [of["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
+def measure_rows(measure: xr.Dataset) -> tuple[list[list[str]], bool]:
+    """Return rows of label, raw, corrected and change of a measure, and True if one is marked by * (see APART)."""
+    rows, is_marked = [], False
+    for statistic in measure["statistic"].values:
+        values = [measure["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
         if statistic in (*SHARES, *CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
             continue
         if statistic in SHARES:
-            rows.append([_SHORT[statistic], *map(share, values), ""])
+            rows.append([SHORT_LABELS[statistic], *map(share, values), ""])
             continue
-        label, figures = _SHORT.get(statistic, statistic), [number(value) for value in values]
-        if statistic in _BY_PERCENTILES:
-            beside = of["statistic_value"].sel(statistic=_BY_PERCENTILES[statistic])
+        label, figures = SHORT_LABELS.get(statistic, statistic), [number(value) for value in values]
+        if statistic in PERCENTILE_COUNTERPART:
+            counterpart = measure["statistic_value"].sel(statistic=PERCENTILE_COUNTERPART[statistic])
             for k, state in enumerate((RAW, CORRECTED)):
-                if _are_apart(values[k], beside.sel(state=state).values):
-                    figures[k], marked = f"* {figures[k]}", True
+                if _are_disjoint(values[k], counterpart.sel(state=state).values):
+                    figures[k], is_marked = f"* {figures[k]}", True
         change = ""
-        if statistic in _CHANGE_BESIDE:
-            changed = of["change"].sel(change_of=_CHANGE_BESIDE[statistic]).values
-            change = number(changed, sign=True) if statistic == "mean" else percent(changed - 1, sign=True)
+        if statistic in CHANGE_OF_STATISTIC:
+            ratio = measure["change"].sel(change_of=CHANGE_OF_STATISTIC[statistic]).values
+            change = number(ratio, sign=True) if statistic == "mean" else percent(ratio - 1, sign=True)
         rows.append([label, *figures, change])
-    return rows, marked
+    return rows, is_marked
 
 
-def _are_apart(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether two intervals have nothing in common."""
-    return bool(one[1] > other[2] or other[1] > one[2])
+def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
+    """Return True for estimates whose intervals do not overlap."""
+    return bool(a[1] > b[2] or b[1] > a[2])
 
 
 def _field_table(summary: xr.Dataset) -> FigureTable:
     rows = []
     for part in summary["part"].values:
         for state in (RAW, CORRECTED):
-            of = summary["field_extreme"].sel(part=part, state=state)
-            extremes = [number(of.sel(extreme=extreme).values) for extreme in ("least", "largest")]
+            field = summary["field_extreme"].sel(part=part, state=state)
+            extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), state, *extremes])
     return FigureTable(["part", "state", "least", "largest"], rows)
 
 
 def pair_columns(summary: xr.Dataset) -> list[str]:
-    """The heading of `pair_rows`."""
+    """Return the heading of `pair_rows`."""
     units = summary["reaction"].attrs["units"]
     return ["contact pair", "carries", f"mean reaction, {units}", "95th percentile"]
 
 
 def pair_rows(summary: xr.Dataset) -> list[list[str]]:
-    """How often each pair carries, and what."""
+    """Return rows of each pair: the share of realizations in which it carries, and its reaction."""
     rows = []
     for pair in summary["pair"].values:
         mean, *_, high = summary["reaction"].sel(pair=pair).values
@@ -162,17 +162,17 @@ def pair_rows(summary: xr.Dataset) -> list[list[str]]:
 
 
 def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
-    """What a run of `count` realizations shows about contact, line by line."""
+    """Yield lines about the contact of a run of `count` realizations."""
     yield f"realizations touched by contact: {percent(summary['touched'].values)}"
     by_status = _by_status(summary)
     yield "status: " + ", ".join(f"{n} {meaning}" for meaning, n in by_status.items() if n)
-    stuck = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
-    if stuck:
+    conflicts = [f"{pair} ({int(n)})" for pair, n in zip(summary["pair"].values, summary["conflicts"].values, strict=True) if n]
+    if conflicts:
         share = percent(summary["not_assemblable"].values)
-        yield f"not assemblable: {share}; least-penetration poses are included"
-        yield f"pairs in conflict there: {', '.join(stuck)}"
-    if unsure := by_status["not_converged"]:
-        yield f"not converged: {unsure} of {count}; their last poses are included above"
+        yield f"not assemblable: {share}; the statistics include poses of least penetration"
+        yield f"pairs in conflict there: {', '.join(conflicts)}"
+    if unconverged := by_status["not_converged"]:
+        yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
     if doubtful := by_status["doubtful"]:
         yield f"doubtful: {doubtful} of {count} answers lie too far from the raw pose to be certified"
     raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
@@ -180,31 +180,31 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if shifted := summary.attrs["datum_shifts"]:
-        yield f"datum shift of {shifted}: not drawn; the contact of the datum features decides it"
+        yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
     yield f"largest penetration at contact points: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
 
 
 def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
-    """What contact points do not see."""
-    checked, depth, beside = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
-    limit = ADVISED * summary.attrs["smallest_range"]
+    """Yield lines about penetration between contact points."""
+    checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
+    limit = PENETRATION_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
         yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
-            yield f"advice: it exceeds {ADVISED:.0%} of the smallest tolerance range; use more contact points"
-        if beside > limit:
-            yield f"contact points that touch lie up to {beside:.3g} mm beside their reference face"
+            yield f"advice: it exceeds {PENETRATION_SHARE:.0%} of the smallest tolerance range; use more contact points"
+        if overhang > limit:
+            yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
-    """What to do about penetration that a linear step, or the paper's set of active points, has left."""
-    limit = ADVISED * summary.attrs["smallest_range"]
+    """Yield advice on penetration that a linear step, or the paper's set of active points, leaves."""
+    limit = PENETRATION_SHARE * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
     elif summary.attrs["resolution"] == "linearized" and penetration > limit:
-        yield f"advice: penetration exceeds {ADVISED:.0%} of the smallest range; use --resolution exact"
+        yield f"advice: penetration exceeds {PENETRATION_SHARE:.0%} of the smallest range; use --resolution exact"
     elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
         yield "advice: some realizations did not converge; use --resolution exact"
 

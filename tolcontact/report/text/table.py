@@ -1,4 +1,4 @@
-"""A table of figures that is as wide as the terminal lets it be."""
+"""A table of figures that fits into the width of the terminal."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,13 +7,13 @@ from rich import box
 from rich.console import Console, ConsoleOptions, RenderResult
 from rich.table import Table
 
-NAME_WIDTH = 12  # of names and labels; longer ones may be wrapped
-WIDTH = 80  # of what is no terminal
+NAME_WIDTH = 12  # longer names and labels may be wrapped
+WIDTH = 80  # of files and pipes
 
 
 @dataclass(frozen=True)
 class FigureTable:
-    """Columns as wide as their cells; where they need more than there is, each interval goes below its estimate."""
+    """Columns as wide as their cells. If they do not fit, each interval stands below its estimate."""
 
     columns: Sequence[str]
     rows: Sequence[Sequence[str]]
@@ -26,8 +26,8 @@ class FigureTable:
             rows = [[cell.replace(" [", "\n[") for cell in row] for row in rows]
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
         for k, column in enumerate(self.columns):
-            least = min(widths[0], NAME_WIDTH) if k == 0 else None
-            table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=least)
+            min_width = min(widths[0], NAME_WIDTH) if k == 0 else None
+            table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width)
         for row in rows:
             table.add_row(*row)
         yield table

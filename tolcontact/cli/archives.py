@@ -1,13 +1,15 @@
-"""tolcontact summary."""
+"""tolcontact summary, tolcontact report."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli.app import Archive, AsCsv, AsJson, app, examples, only_one
-from tolcontact.cli.output import console, print_data, print_summary
-from tolcontact.report import capability_text
+from tolcontact.cli.output import check_page, console, print_data, print_summary
+from tolcontact.errors import shown
+from tolcontact.report import capability_text, write_page
 from tolcontact.workflow.run import summarize
 
 
@@ -16,7 +18,7 @@ def summary(
     archive: Archive,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Print only how measures keep within their limits.")] = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Print only shares outside of limits, and capability.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)
@@ -30,3 +32,16 @@ def summary(
             console().print(capability_text(summarize(results)))
         else:
             print_summary(summarize(results))
+
+
+@app.command(epilog=examples("report run.nc", "report run.nc --out page.html"))
+def report(
+    archive: Archive,
+    out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: beside the archive.")] = None,
+) -> None:
+    """Write an archive as one page for a browser, which needs no network."""
+    path = out or Path(archive).with_suffix(".html")
+    check_page(path)
+    with open_archive(archive) as results:
+        write_page(results, summarize(results), path)
+    typer.echo(f"report: {shown(str(path))}")

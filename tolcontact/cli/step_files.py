@@ -1,0 +1,48 @@
+"""tolcontact bodies, tolcontact faces."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Annotated, Any
+
+import typer
+
+from tolcontact.cli.app import AsJson, StepFile, app, examples
+from tolcontact.errors import shown
+from tolcontact.geometry import bodies_in, faces_in
+
+Body = Annotated[str | None, typer.Option(help="Name or number of the body. Not needed for a file with a single body.")]
+
+
+@app.command(epilog=examples("bodies parts.stp"))
+def bodies(file: StepFile, as_json: AsJson = False) -> None:
+    """List the bodies of a STEP file in its product tree: numbers, names, sizes in mm, faces; and its units of length."""
+    listing = bodies_in(file)
+    if as_json:
+        _print_rows(listing)
+        return
+    if listing and listing[0].units:
+        typer.echo(f"lengths in the file: {listing[0].units}; here: mm")
+    parents: tuple[str, ...] = ()
+    for body in listing:
+        *products, _ = body.path or ("",)
+        for depth, name in enumerate(products):
+            if parents[: depth + 1] != tuple(products[: depth + 1]):
+                typer.echo(f"{'  ' * depth}{shown(name)}")
+        parents = tuple(products)
+        typer.echo(f"{'  ' * len(products)}{body}")
+
+
+@app.command(epilog=examples("faces parts.stp --body lid"))
+def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
+    """List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them."""
+    listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
+    if as_json:
+        _print_rows(listing)
+        return
+    for face in listing:
+        typer.echo(face)
+
+
+def _print_rows(rows: Sequence[Any]) -> None:
+    typer.echo(json.dumps([asdict(row) for row in rows]))
