@@ -132,9 +132,9 @@ def test_the_command_compares_archives(archive, tmp_path):
     [
         (["{}"], "at least two runs"),
         (["{}", "{}"], "name each once"),
-        (["{}", "model.py"], "not one model, nor archives"),
+        (["{}", "model.py"], "neither one model nor archives"),
         (["{}", "other.nc"], "does not exist"),
-        (["{}", "other.nc", "--samples", "20"], "--samples is for models"),
+        (["{}", "other.nc", "--samples", "20"], "--samples applies to a model"),
         (["model.py", "--report", "page.html"], "--report applies to archives"),
     ],
 )

@@ -24,10 +24,10 @@
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` makes the shell complete them. A
-script with `tc.main(assembly)` under its main guard takes the options of `run`. Results go to stdout; progress, warnings
-and errors go to stderr: a bar with rate and time left in a terminal, a line every ten seconds elsewhere, nothing with
-`--quiet`. Tables use the width of the terminal, and are never cut in files and pipes. `compare` prints JSON with `--json`, and writes
-netCDF with `--out`.
+script with `tc.main(assembly)` under its main guard takes the options of `run`. Results go to stdout; progress, warnings and
+errors go to stderr: a bar with rate and time left in a terminal, a line every ten seconds elsewhere, nothing with
+`--quiet`. Tables use the width of the terminal, and are never cut in files and pipes. `compare` prints JSON with `--json`, and
+writes netCDF with `--out`.
 
 | option of `run` | |
 |---|---|
