@@ -158,7 +158,7 @@ def test_a_run_without_a_terminal_says_how_far_it_is(monkeypatch, tmp_path):
 
 def test_every_command_has_examples_that_name_it():
     for command in app.registered_commands:
-        name = command.callback.__name__
+        name = command.name or command.callback.__name__
         assert command.epilog.startswith("Examples:") and f"tolcontact {name} " in command.epilog
 
 
