@@ -32,6 +32,13 @@ from tolcontact.workflow.models import DEFAULT_SOLVER
 from tolcontact.workflow.run import SURFACES, summarize
 from tolcontact.workflow.run import run as run_model
 
+Until = Annotated[
+    str | None,
+    typer.Option(
+        metavar="TEXT", help='Sample until this interval is narrow enough: "MEASURE: 6 sigma +-1 %", "...: ppm +-20 %".'
+    ),
+]
+
 
 @app.command(
     epilog=examples(
@@ -57,12 +64,7 @@ def run(
         typer.Option(metavar="some|all|N|none", help="Number of realizations behind magnitudes of displacement fields."),
     ] = "some",
     plan: Annotated[str, typer.Option(help=f"Plan of the draws: {or_(PLANS)}.")] = MONTE_CARLO,
-    until: Annotated[
-        str | None,
-        typer.Option(
-            metavar="TEXT", help='Sample until this interval is narrow enough: "MEASURE: 6 sigma +-1 %", "...: ppm +-20 %".'
-        ),
-    ] = None,
+    until: Until = None,
     surfaces: Annotated[
         int, typer.Option(help="Number of realizations that are checked between contact points, on the surfaces.")
     ] = SURFACES,

@@ -69,23 +69,7 @@ def summarize(results: xr.DataTree) -> Summary:
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
     return Summary(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        coords={
-            terms.MEASURE: rows[terms.MEASURE].values,
-            terms.STATE: list(terms.STATES),
-            terms.STATISTIC: list(STATISTICS),
-            terms.INTERVAL: list(terms.ESTIMATE),
-            terms.CHANGE_OF: list(terms.CHANGES),
-            terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
-            terms.PART: rows[terms.PART].values,
-            terms.PAIR: rows[terms.PAIR].values,
-            terms.OF_REACTION: list(terms.REACTION_STATISTICS),
-            terms.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in combinations],
-            terms.OF_ITERATIONS: list(terms.MIDDLES),
-            terms.EXTREME: list(terms.EXTREMES),
-            terms.MEASURE_UNITS.name: (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),
-            **{name: (terms.MEASURE, bounds) for name, bounds in zip(terms.MEASURE_BOUNDS, limits(rows).T, strict=True)},
-            terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
-        },
+        coords=_coordinates(rows, combinations),
         attrs={
             "title": results.attrs.get("title", ""),
             "realizations": count,
@@ -112,6 +96,27 @@ def in_conflict(rows: xr.Dataset) -> np.ndarray:
     gap = rows[terms.GAP_MIN.name].sel({terms.STATE: "corrected"}).transpose(terms.REALIZATION, terms.PAIR).values
     stuck = rows[terms.STATUS.name].values == terms.Status.NOT_ASSEMBLABLE
     return stuck[:, None] & (gap < -rows.attrs["solver_accuracy"])
+
+
+def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
+    """Return the labels of all dimensions, and what describes each measure."""
+    return {
+        terms.MEASURE: rows[terms.MEASURE].values,
+        terms.STATE: list(terms.STATES),
+        terms.STATISTIC: list(STATISTICS),
+        terms.INTERVAL: list(terms.ESTIMATE),
+        terms.CHANGE_OF: list(terms.CHANGES),
+        terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
+        terms.PART: rows[terms.PART].values,
+        terms.PAIR: rows[terms.PAIR].values,
+        terms.OF_REACTION: list(terms.REACTION_STATISTICS),
+        terms.COMBINATION: [" + ".join(pairs) or "none" for pairs, _ in combinations],
+        terms.OF_ITERATIONS: list(terms.MIDDLES),
+        terms.EXTREME: list(terms.EXTREMES),
+        terms.MEASURE_UNITS.name: (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),
+        **{name: (terms.MEASURE, bounds) for name, bounds in zip(terms.MEASURE_BOUNDS, limits(rows).T, strict=True)},
+        terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
+    }
 
 
 def _status_values(rows: xr.Dataset) -> dict[ArchiveVariable, Any]:

@@ -65,48 +65,71 @@ def run(
     Raises ModelError, OptionError, or ArchiveError before anything is simulated or written; ClusterError if workers fail.
     """
     check_counts(samples=samples, seed=seed, surfaces=surfaces)
-    if keep not in KEPT:
-        raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
-    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
-        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
-    if plan not in PLANS:
-        raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
+    _check_choices(keep, fields, plan)
     check_program(model, solver, method)
     target = None if until is None else Target.of(until)
+    settings = Run(seed, samples, keep, surfaces, str(fields), plan)
 
     def write(path: Path) -> None:
         program = program_of(model, solver, method)
         program = replace(program, draws=program.draws.planned(plan))
         if target:
             target.check(program)
-        blocks = mapping(client)
-        settings, is_resumed = Run(seed, samples, keep, surfaces, str(fields), plan), resume and path.exists()
-        while True:
-            sums = RunSums(program, settings)
-            with (
-                ArchiveWriter.resume(path, program, settings)
-                if is_resumed
-                else ArchiveWriter(path, program, settings, sums.sizes)
-            ) as writer:
-                announce(program, samples=writer.samples - writer.rows, seed=seed, keep=keep, threads=threads_of(client))
-                _simulate(program, writer, sums, seed, blocks, progress)
-            enlarged = target.next(path, program) if target else None
-            if enlarged is None:
-                return
-            settings, is_resumed = settings._replace(samples=enlarged), True
+        _write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
 
     if out is None:
-        for option, is_set in {"overwrite": overwrite, "resume": resume}.items():
-            if is_set:
-                raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / "results.nc"
-            write(path)
-            with opened(path) as tree:
-                return tree.load()
+        return _results_in_memory(write, overwrite=overwrite, resume=resume)
     with taken(out, overwrite=overwrite, resume=resume) as path:
         write(path)
     return opened(path)
+
+
+def _results_in_memory(write: Callable[[Path], None], **archive_options: bool) -> xr.DataTree:
+    """Return the results of `write` without keeping its archive. Raises OptionError for options that need an archive."""
+    for option, is_set in archive_options.items():
+        if is_set:
+            raise OptionError(f"{option} needs an archive, and none is named; name one: out=...")
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "results.nc"
+        write(path)
+        with opened(path) as tree:
+            return tree.load()
+
+
+def _check_choices(keep: str, fields: int | str, plan: str) -> None:
+    """Raise OptionError for a choice that `run` does not offer."""
+    if keep not in KEPT:
+        raise OptionError(f"keep is {keep!r}; expected one of: {', '.join(KEPT)}")
+    if fields not in FIELD_CHOICES and not (type(fields) is int and 2 <= fields < 2**63):
+        raise OptionError(f"fields is {fields!r}; expected a whole number, at least 2, or one of: {', '.join(FIELD_CHOICES)}")
+    if plan not in PLANS:
+        raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
+
+
+def _write_archive(
+    path: Path,
+    program: Program,
+    settings: Run,
+    target: Target | None,
+    client: Any,
+    progress: Progress | None,
+    *,
+    is_resumed: bool,
+) -> None:
+    """Simulate into the archive at `path`, and add realizations until the target is met, if there is one."""
+    blocks = mapping(client)
+    while True:
+        sums = RunSums(program, settings)
+        with (
+            ArchiveWriter.resume(path, program, settings) if is_resumed else ArchiveWriter(path, program, settings, sums.sizes)
+        ) as writer:
+            remaining = writer.samples - writer.rows
+            announce(program, samples=remaining, seed=settings.seed, keep=settings.keep, threads=threads_of(client))
+            _simulate(program, writer, sums, settings.seed, blocks, progress)
+        enlarged = target.next(path, program) if target else None
+        if enlarged is None:
+            return
+        settings, is_resumed = settings._replace(samples=enlarged), True
 
 
 def _simulate(

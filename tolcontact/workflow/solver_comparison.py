@@ -61,12 +61,7 @@ def compare(
     nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, solver, method) for solver, method in contestants]
-    corners = np.stack([_corners(part.vertices) for part in nominal.parts])
-    reference = _timed_results(programs[0], blocks, samples, seed)
-    rows = [
-        _row(reference, reference, corners),
-        *(_row(_timed_results(program, blocks, samples, seed), reference, corners) for program in programs[1:]),
-    ]
+    rows = _rows(programs, blocks, samples, seed)
     labels = {
         terms.SOLVER: [" ".join([solver, *distinctions(method, resolved_by)]) for solver, method in contestants],
         terms.STATUS_MEANING: list(terms.STATUS_MEANINGS),
@@ -87,6 +82,14 @@ def compare(
             "objective": ", ".join(dict.fromkeys(method.objective for method in resolved_by)),
         },
     )
+
+
+def _rows(programs: Sequence[Program], blocks: MapBlocks, samples: int, seed: int) -> list[dict]:
+    """Return the values of each program in the comparison with the first."""
+    corners = np.stack([_corners(part.vertices) for part in programs[0].nominal.parts])
+    reference = _timed_results(programs[0], blocks, samples, seed)
+    further_results = (_timed_results(program, blocks, samples, seed) for program in programs[1:])
+    return [_row(results, reference, corners) for results in itertools.chain([reference], further_results)]
 
 
 def _timed_results(program: Program, blocks: MapBlocks, samples: int, seed: int) -> dict[str, Any]:
