@@ -38,7 +38,7 @@ def assembly() -> tc.Assembly:
 
 
 def draw(figure: Path) -> None:
-    """A picture of the assembly, a colour for each part."""
+    """Draw the assembly, with a colour for each part."""
     tc.plot.assembly(assembly(), marks=False).screenshot(figure, window_size=(760, 560))
 
 

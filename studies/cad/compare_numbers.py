@@ -43,7 +43,7 @@ def numbers_of(path: Path) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def main() -> None:
-    """The largest differences over all files, and the files in which they are."""
+    """Print the largest differences over all files, and the files that have them."""
     files, planes, cylinders, worst = 0, 0, 0, [(0.0, ""), (0.0, "")]
     for name in sys.argv[1:]:
         (content,) = read_files([tc.Mesh(name)]).values()

@@ -33,7 +33,7 @@ def off(product: Product) -> dict[str, float]:
 
 
 def read(path: Path) -> dict:
-    """What became of a file."""
+    """Read a file, and return the outcome as a row."""
     start = time.perf_counter()
     (content,) = read_files([tc.Mesh(path)]).values()
     record = {"seconds": time.perf_counter() - start, "MB": resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1e3}

@@ -32,7 +32,7 @@ def simulate(program: Program, samples: int) -> dict[str, np.ndarray]:
 
 
 def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarray]) -> collections.Counter:
-    """What certified realizations are contradicted by, and how many."""
+    """Count the certified realizations that are contradicted, by the reason."""
     found: collections.Counter = collections.Counter()
     poses = run["poses"]
     R, t = poses[..., :9].reshape(*poses.shape[:3], 3, 3), poses[..., 9:]
@@ -104,7 +104,7 @@ def faces(pair: ContactPoints, R: np.ndarray, t: np.ndarray, deviations: np.ndar
 
 
 def heights(pair: ContactPoints, contributors: int) -> np.ndarray:
-    """What supports stand out by for deviations of 1 (contributor, point)."""
+    """Return the heights of supports for deviations of 1 (contributor, point)."""
     found = np.zeros((contributors, len(pair.P_m)))
     found[pair.offsets.columns] = pair.offsets.matrix
     return found

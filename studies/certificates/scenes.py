@@ -11,7 +11,7 @@ SOLIDS = ("box", "wedge", "cylinder", "sphere")
 
 
 def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
-    """A tower or row of two to four parts, in any frame and of any size, and a method to resolve it."""
+    """Return a tower or row of two to four parts in a random frame and size, and a method that resolves it."""
     rng = np.random.default_rng(seed)
     size = 10.0 ** rng.uniform(-1, 3.5)  # of the first part [mm]
     turn = Rotation.from_rotvec(rng.normal(size=3) * rng.choice([0, 1]))
@@ -75,7 +75,7 @@ def tolerance(part: tc.Part, kind: str, mesh: trimesh.Trimesh, width: float, rng
 
 
 def solid(kind: str, scale: float, rng: np.random.Generator) -> trimesh.Trimesh:
-    """A closed body about as large as `scale` [mm], its lower side down."""
+    """Return a closed body of about the size `scale` [mm], with its lower side down."""
     x, y, z = scale * rng.uniform(0.6, 1.0, size=3)
     if kind == "box":
         return trimesh.creation.box(bounds=[[0, 0, 0], [x, y, z]])

@@ -34,7 +34,7 @@ def simulate(assembly: tc.Assembly, samples: int, *, method: tc.Method | None = 
 
 
 def shifted(assembly: tc.Assembly, by=FAR) -> tc.Assembly:
-    """The same assembly, standing elsewhere."""
+    """Move the assembly to another place."""
     for part in assembly.parts:
         object.__setattr__(part, "at", tuple(np.add(part.at, by)))
     return assembly

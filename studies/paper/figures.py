@@ -23,13 +23,13 @@ TITLES = {"raw": "contactless", "corrected": "contact"}
 
 
 def surface(run: xr.DataTree, part: str) -> pv.PolyData:
-    """A part's surface in its nominal place [mm]."""
+    """Return the surface of a part in its nominal place [mm]."""
     field = run[f"field/{part}"]
     return pv.make_tri_mesh(field.vertices.values, field.faces.values)
 
 
 def moved(run: xr.DataTree, part: str, realization: int, state: str) -> pv.PolyData:
-    """A part's surface in one realization."""
+    """Return the surface of a part in one realization."""
     at = {"realization": realization, "state": state, "part": part}
     mesh = surface(run, part)
     mesh.points = mesh.points @ run.rotation.sel(at).values.T + run.translation.sel(at).values
@@ -37,7 +37,7 @@ def moved(run: xr.DataTree, part: str, realization: int, state: str) -> pv.PolyD
 
 
 def area(run: xr.DataTree, pair: int) -> pv.PolyData:
-    """The contact area of a pair, as triangles between its points."""
+    """Return the contact area of a pair as triangles between its points."""
     contact = run["contact"]
     points = contact.moving_point.values[contact.pair_of_point.values == pair]
     _, _, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
@@ -55,7 +55,7 @@ def measured(run: xr.DataTree) -> tuple[np.ndarray, np.ndarray]:
 
 
 def stage(columns: int, height: int, *, bar: bool = False) -> pv.Plotter:
-    """A picture of so many columns, with room for a colour bar below them if asked for."""
+    """Return an empty picture with this number of columns, and with space for a colour bar below them if `bar`."""
     rows = {"shape": (2, columns), "row_weights": [1, 0.2], "groups": [(1, slice(None))]} if bar else {"shape": (1, columns)}
     size = (FINE * 800 * columns, FINE * height)
     plotter = pv.Plotter(off_screen=True, window_size=size, border=False, line_smoothing=True, **rows)
@@ -69,7 +69,7 @@ def outline(plotter: pv.Plotter, body: pv.PolyData) -> None:
 
 
 def glass(plotter: pv.Plotter, body: pv.PolyData, colour: str) -> None:
-    """The faces towards the viewer only: drawn without a display, faces behind each other are not sorted by depth."""
+    """Draw only the faces towards the viewer: without a display, translucent faces are not sorted by depth."""
     plotter.add_mesh(body, color=colour, opacity=0.35, culling="back")
 
 
@@ -93,7 +93,7 @@ def save(plotter: pv.Plotter, path: Path) -> None:
 
 
 def figure_3(runs: dict[str, xr.DataTree], path: Path) -> None:
-    """The assemblies with locators, contact area and measure."""
+    """Draw the assemblies with locators, contact area and measure."""
     plotter = stage(2, 500)
     for column, (name, run) in enumerate(runs.items()):
         plotter.subplot(0, column)
@@ -122,7 +122,7 @@ def figure_3(runs: dict[str, xr.DataTree], path: Path) -> None:
 
 
 def figure_4(run: xr.DataTree, path: Path) -> None:
-    """The contact points of RA1."""
+    """Draw the contact points of RA1."""
     plotter = stage(1, 420)
     plotter.add_mesh(surface(run, "base"), color=GREY)
     points = run["contact"].moving_point.values
@@ -176,7 +176,7 @@ def figure_6_7(name: str, run: xr.DataTree, path: Path) -> None:
 
 
 def deep(run: xr.DataTree) -> int:
-    """A realization of RA1 whose blocks cut each other by 5 mm, the range on each side: telling, and not rare."""
+    """Return a realization of RA1 whose blocks overlap by 5 mm, the range on each side: a clear and common case."""
     depth = -run.gap_min.sel(state="raw").min("pair").values
     return int(np.abs(depth - 5).argmin())
 

@@ -22,7 +22,7 @@ CORNERS, MEASURED = [(50, 12.5), (100, 12.5), (50, 37.5), (100, 37.5)], (100, 12
 
 
 def heights(run: xr.DataTree) -> np.ndarray:
-    """The first measure's deviation from nominal, (realization, state) [mm]."""
+    """Return the deviation of the first measure from nominal, (realization, state) [mm]."""
     return run.measured.isel(measure=0).values - run.measure_nominal.values[0]
 
 
@@ -45,7 +45,7 @@ def table_1(name: str, runs: list[xr.DataTree], large: dict[str, np.ndarray]) ->
 
 
 def claims(runs: dict[str, list[xr.DataTree]], large: dict[str, xr.DataTree]) -> Iterator[str]:
-    """What the paper says of both assemblies in words."""
+    """Yield the rows for the statements that the paper makes in words."""
     yield "| claim | paper | ours, N = 1000, 20 seeds | ours, large |"
     yield "|---|---|---|---|"
     for name, run in large.items():
@@ -137,6 +137,6 @@ def least_to_largest(values: list[float], *, percent: bool = False) -> str:
 
 
 def left(x: xr.DataTree) -> str:
-    """The penetration that a method has left."""
+    """Print the penetration that a method leaves."""
     depth = -x.gap_min.sel(state="corrected").min("pair").values
     return f"up to {depth.max():.2g} mm, more than 1 um in {(depth > 1e-3).mean():.2%} of the realizations"

@@ -65,7 +65,7 @@ CASES: dict[str, tuple[Callable[[], tc.Assembly], Errors]] = {
 
 
 def sampled(model: tc.Assembly, points: int | None) -> tc.Assembly:
-    """The model with so many points in each pair."""
+    """Return the model with this number of points in each pair."""
     return tc.Assembly.of(
         model.name,
         model.method,
@@ -78,7 +78,7 @@ def sampled(model: tc.Assembly, points: int | None) -> tc.Assembly:
 
 
 def measured(make: Callable[[], tc.Assembly], errors: Errors, points: int | None, samples: int) -> str:
-    """A row of the table."""
+    """Return a row of the table."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", tc.ContactWarning)
         program = tc.build(sampled(make(), points), solver="daqp", method=SEATED)

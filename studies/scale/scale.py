@@ -146,7 +146,7 @@ def simulated(workers, writers, samples, of_worker, of_writer, size):
 
 
 def kills(of_workers, of_writers, folder):
-    """Runs with a worker, or the writer, killed at a random instant, compared with a run that nothing happened to."""
+    """Compare runs whose worker or writer is killed at a random instant with an undisturbed run."""
     whole = folder / "whole.nc"
     tc.run(ra1.assembly, samples=120_000, solver="daqp", surfaces=4, out=whole).close()
     lot, equal = random.Random(1), 0

@@ -42,7 +42,7 @@ def models() -> list[Path]:
 
 
 def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
-    """A model: its question, a picture, its first lines, and its answer."""
+    """Return the section of a model: its question, a picture, its first lines, and its answer."""
     text = path.read_text(encoding="utf-8")
     question, _, rest = (ast.get_docstring(ast.parse(text)) or "").partition("\n\n")
     results = tc.run(path, samples=samples, seed=1, solver="daqp", surfaces=0, fields="none")
@@ -63,13 +63,13 @@ def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
 
 
 def computed(problem: Problem) -> dict[str, Any]:
-    """A problem with its figures."""
+    """Return the section of a problem with its figures."""
     rows = [row(figure) for figure in problem.figures()]
     return {"number": problem.number, "name": problem.name, "text": problem.text, "rows": rows}
 
 
 def build(folder: Path, samples: int, scripts: Sequence[Path], problems: Sequence[Problem] = PROBLEMS) -> None:
-    """The pages of these models and problems, into a folder that need not be there."""
+    """Write the pages of these models and problems into a folder, which is created if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     pdoc.render.configure(show_source=False)
     pdoc.pdoc(*REFERENCE, output_directory=folder / "reference")

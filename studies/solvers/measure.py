@@ -1,4 +1,4 @@
-"""How accurate and how fast are QP solvers on contact problems with a row for every contact point?
+"""Accuracy and speed of QP solvers on contact problems with a row for every contact point.
 
 Usage: python studies/solvers/measure.py [--realizations 12] [--figure accuracy.png]
 
@@ -73,7 +73,7 @@ def models() -> dict[str, tc.Assembly]:
 
 
 def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
-    """The QPs of the first linear step, with a row for every contact point of the first group."""
+    """Return the QPs of the first linear step, with a row for every contact point of the first group."""
     kept = contact_qp.standing_points  # type: ignore[attr-defined]
     contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined]
     found: list[Problem] = []
@@ -163,7 +163,7 @@ def trial(make: Callable[[str, Problem], Solve], which: str, of: list[Problem], 
 
 
 def apart(work: Callable[[], dict[str, float]]) -> dict[str, float] | str:
-    """What `work` gives, done in a process of its own: solvers may crash, or never come back."""
+    """Return the result of `work`, computed in a separate process: solvers may crash or never return."""
     context = multiprocessing.get_context("fork")
     answers = context.Queue()
 

@@ -233,7 +233,7 @@ def against_packing(samples: int) -> None:
 
 
 def whole_runs(largest: int) -> None:
-    """Runs of RA1 with their archive, all processors: time and memory."""
+    """Print the time and memory of runs of RA1 with their archive, on all processors."""
     print("\n| realizations | seconds, build to archive | archive [MB] | largest memory so far [MB] |\n|---:|---:|---:|---:|")
     with tempfile.TemporaryDirectory() as folder:
         samples = 1000

@@ -9,7 +9,7 @@ LONG, WIDE, THICK = 50.0, 25.0, 10.0
 
 
 def slab(points: int, radius: float = np.inf) -> tc.Assembly:
-    """A slab set down on a base; both faces are part of a sphere, flat where `radius` [mm] is infinite."""
+    """Return a slab set down on a base. Both faces are part of a sphere, or flat where `radius` [mm] is infinite."""
     across = max(round(np.sqrt(points / 2)), 2)
     a = tc.Assembly(f"slab of {points}")
     base = a.part("base", tc.Mesh(_shell(LONG + 10, WIDE + 10, 60, 35, radius, -THICK)), fixed=True)
@@ -25,7 +25,7 @@ def slab(points: int, radius: float = np.inf) -> tc.Assembly:
 
 
 def _shell(long: float, wide: float, along: int, across: int, radius: float, thickness: float) -> trimesh.Trimesh:
-    """What lies between the sphere and a plane at height `thickness`."""
+    """Return the body between the sphere and a plane at height `thickness`."""
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(-0.5, 0.5, along) * long, np.linspace(-0.5, 0.5, across) * wide))
     z = radius - np.sqrt(radius**2 - x**2 - y**2) if np.isfinite(radius) else np.zeros_like(x)
     first = (np.arange(across - 1)[:, None] * along + np.arange(along - 1)).ravel()

@@ -70,7 +70,7 @@ def variance(quantity: str, expected: float, source: str, x: np.ndarray) -> Figu
 
 
 def deviation(quantity: str, expected: float, source: str, x: np.ndarray) -> Figure:
-    """Standard deviation of a sample."""
+    """Return the standard deviation of a sample."""
     of = variance(quantity, expected, source, x)
     return Figure(quantity, expected, source, *np.sqrt([of.computed, of.lower, of.upper]))
 
@@ -82,12 +82,12 @@ def share(quantity: str, expected: float, source: str, hits: np.ndarray) -> Figu
 
 
 def within(quantity: str, expected: float, source: str, computed: float, tolerance: float) -> Figure:
-    """A figure that is no estimate."""
+    """Return a figure that is no estimate."""
     return Figure(quantity, expected, source, computed, computed - tolerance, computed + tolerance)
 
 
 def gap_of_one_dimension() -> Iterator[Figure]:
-    """Closed forms of max(0, g) and of the larger of two."""
+    """Yield closed forms of max(0, g) and of the larger of two."""
     for base, tail in ((0, "below a fixed face"), (6, "both vary")):
         _, run = simulate(cases.one_dimensional(base), samples=40_000, seed=SEED, solver="daqp", block=4096)
         height = run["measured"][:, CORRECTED, 0]
@@ -144,7 +144,7 @@ def extremes_of_fasteners() -> Iterator[Figure]:
 
 
 def pocket_of_four_freedoms() -> Iterator[Figure]:
-    """The least of two gaps."""
+    """Yield figures of the smaller of two gaps."""
     gaps = tc.run(pocket(), samples=400_000, seed=SEED, surfaces=0, fields="none", keep="measures")
     least = gaps.measured.sel(state="raw").values.min(axis=1)
     yield share("P(gap < 0)", 0.0522305, "quadrature", least < 0)
@@ -153,13 +153,13 @@ def pocket_of_four_freedoms() -> Iterator[Figure]:
 
 
 def pins_in_slots() -> Iterator[Figure]:
-    """What the solver calls not assemblable."""
+    """Yield the share of realizations that the solver calls not assemblable."""
     _, run = simulate(cases.square_pins(), samples=20_000, seed=SEED, method=SEATED)
     yield share("share that cannot be assembled", 0.049133, "2e7 draws", run["status"] == Status.NOT_ASSEMBLABLE)
 
 
 def clutch() -> Iterator[Figure]:
-    """The angle, where contact and a spring find it."""
+    """Yield figures of the angle that contact and a spring determine."""
     program, run = simulate(cases.model("clutch"), samples=2000, seed=SEED, solver="daqp", method=cases.model("clutch").method)
     of = dict(zip(program.nominal.contributors, run["deviations"].T, strict=True))
     a = 27.645 + of["hub.flat.offset"]
@@ -172,7 +172,7 @@ def clutch() -> Iterator[Figure]:
 
 
 def opposed_faces() -> Iterator[Figure]:
-    """The paper's QP, as linear rows that share no code with ours, against the engine's exact answers."""
+    """Compare the paper's QP, as linear rows that share no code with ours, with the exact answers of the engine."""
     program, run = simulate(cases.model("channel"), samples=2000, seed=SEED, solver="daqp", method=EXACT)
     stuck = []
     for raw in run["poses"][:500, RAW]:

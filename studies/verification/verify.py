@@ -1,4 +1,4 @@
-"""Every problem with a known answer, computed anew: python -m studies.verification.verify [C1 C4 ...]"""
+"""Compute every problem with a known answer again: python -m studies.verification.verify [C1 C4 ...]."""
 
 import sys
 
@@ -11,7 +11,7 @@ COLUMNS = ("quantity", "expected", "from", "computed", "bounds", "verdict")
 
 
 def row(figure: Figure) -> list[str]:
-    """A figure as texts."""
+    """Return a figure as texts."""
     expected = f"{figure.expected:.6g}" if figure.expected == figure.expected else "-"
     half = (figure.upper - figure.lower) / 2
     is_narrow = half < 1e-4 * abs(figure.computed)
