@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, contents, nightly
 from tolcontact import vocabulary
-from tolcontact.archive import writer
+from tolcontact.archive import ArchiveWriter
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 
@@ -66,15 +66,15 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
 @pytest.mark.parametrize(("every", "written"), [(0.0, [4096, 8192]), (1e9, [8192])])
 def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_last(every, written, tmp_path, monkeypatch):
     found = []
-    monkeypatch.setattr(writer, "CHECKPOINTS_EVERY", every)
-    monkeypatch.setattr(writer, "write_checkpoint", lambda archive, checkpoint, parts: found.append(checkpoint.rows))
+    monkeypatch.setattr(ArchiveWriter, "checkpoint_interval", every)
+    monkeypatch.setattr(ArchiveWriter, "write_checkpoint", lambda writer, sums: found.append(writer.rows))
     tc.run(cases.stack(), samples=9000, seed=3, solver="daqp", out=tmp_path / "run.nc", keep="measures", surfaces=0).close()
     assert found == written
 
 
 @pytest.mark.slow
 def test_a_resumed_run_goes_on_after_the_newest_checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(writer, "CHECKPOINTS_EVERY", 0.0)
+    monkeypatch.setattr(ArchiveWriter, "checkpoint_interval", 0.0)
     path, settings = tmp_path / "run.nc", {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}
     for samples, after in ((9000, None), (9001, 8192), (13_000, 8192), (13_001, 12_288)):
         tc.run(cases.stack(), samples=samples, out=path, resume=True, **settings).close()

@@ -1,4 +1,4 @@
-"""Checksums: whether values are still those that were written."""
+"""Checksums, which show whether values are still those that were written."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from tolcontact.vocabulary import ArchiveVariable
 
 
 def crc32(variable: ArchiveVariable, values: Any, start: int = 0) -> int:
-    """CRC-32 of the values of a variable, `after` that of others before them.
+    """Return the CRC-32 of the values of a variable; `after` is that of the values before them.
 
     Numbers are taken as little-endian bytes of the variable's kind, texts as UTF-8 with a zero byte behind each.
     """

@@ -10,7 +10,7 @@ from tests import cases
 from tests.helpers import contents
 from tolcontact.archive import raw_file, writer
 
-writer.CHECKPOINTS_EVERY = 0.0
+writer.ArchiveWriter.checkpoint_interval = 0.0
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"
 program = tc.build(cases.stack(), solver="daqp")

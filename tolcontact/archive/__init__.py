@@ -38,8 +38,8 @@ Each realization is one row and carries its own certificate.
 of features, variables), with source, units, tolerance, rule and mean shift, and their drawn `deviation` (realization,
 contributor), `field/<part>` the displacement fields, `surface` the check between contact points, `model` the declaration as
 JSON, `statistics/<name>` what `tc.contributions`, `tc.sensitivities`, `tc.worst_case`, `tc.tails`, `tc.allocate` and
-`tc.relocate` found, if they were told to keep it there (`into=`). A group is called like its part; a part with the name of a
-dimension gets an underscore behind it (the attribute `part` is the name in any case). Attributes state the format
+`tc.relocate` return, if asked to keep it there (`into=`). A group has the name of its part, followed by an underscore if that
+is the name of a dimension (the attribute `part` is the name in any case). Attributes state the format
 number, the versions, the seed, the solver with its options, and the method with all its choices, and the sampling plan
 (`sampler`); `method_from` states whether the method was the model's, the defaults, or set by options.
 
@@ -133,9 +133,8 @@ from tolcontact.archive.archive_lock import taken
 from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
 from tolcontact.archive.labels import labelled, sizes_of_rows
 from tolcontact.archive.reader import model_of, open_archive, opened
-from tolcontact.archive.row_checksums import check_rows
 from tolcontact.archive.settings import Run, run_settings
-from tolcontact.archive.stored_block import row_values, stored
+from tolcontact.archive.stored_rows import check_rows, row_values, stored
 from tolcontact.archive.writer import ArchiveWriter
 
 __all__ = [

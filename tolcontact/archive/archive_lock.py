@@ -1,4 +1,4 @@
-"""Taking a name: of all runs on a machine, one writes an archive."""
+"""The lock of an archive: only one run on a machine writes it."""
 
 import contextlib
 import os
@@ -13,9 +13,9 @@ from tolcontact.errors import ArchiveError, OptionError
 
 @contextlib.contextmanager
 def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) -> Iterator[Path]:
-    """The file that `path` stands for (the target, if it is a link), kept from all other runs meanwhile.
+    """Lock the file that `path` stands for (the target of a link) against other runs, and yield its path.
 
-    A run that was killed holds nothing: the system releases what it had taken.
+    The system releases the lock of a run that was killed.
     Raises ArchiveError, and changes nothing, if the file cannot become an archive, or another run writes to it.
     """
     if overwrite and resume:
@@ -31,13 +31,13 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
     try:
         _acquire(holding, lock, path)
         if real.exists():
-            _check_replaceable(path, real, asked=overwrite or resume)
+            _check_replaceable(path, real, is_allowed=overwrite or resume)
         yield real
     finally:
-        # Also whoever was stopped between making the file and locking it leaves none behind, unless it is another run's.
+        # A run that is stopped between making and locking the file removes it too, unless it is another run's.
         with contextlib.suppress(OSError):
             holding.acquire()
-            lock.unlink(missing_ok=True)  # whoever opened it meanwhile finds that it is gone, and tries again
+            lock.unlink(missing_ok=True)  # a run that opened it meanwhile notices, and tries again
             holding.release(force=True)
 
 
@@ -51,8 +51,8 @@ def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
         raise ArchiveError(f'archive "{path}" cannot be written: {error.strerror}') from error
 
 
-def _check_replaceable(path: str | Path, real: Path, *, asked: bool) -> None:
-    if not asked:
+def _check_replaceable(path: str | Path, real: Path, *, is_allowed: bool) -> None:
+    if not is_allowed:
         raise ArchiveError(f'archive "{path}" exists; choose another name, or ask to overwrite or to resume it')
     if not os.access(real, os.W_OK):
         raise ArchiveError(f'archive "{path}" cannot be written: it is read-only')

@@ -1,4 +1,4 @@
-"""Inspection of a file before anything in it is trusted: is it an archive, and undamaged?
+"""Inspection of a file before anything in it is trusted: it has to be an undamaged archive.
 
 The netCDF library itself can fail on a damaged file, or never return. So a separate process inspects the file first (this
 module, as a script), with limits on memory and time. It reads all but the realizations, whose checksums are checked when they
@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable
+from tolcontact.vocabulary import ArchiveVariable, archive, surfaces, variation
 
 SECONDS, SECONDS_PER_GB = 20.0, 20.0
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -38,21 +38,14 @@ OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
 OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
-IN_MESH = (*OF_MESH, *terms.KNOWN_SURFACES, terms.NAME_OF_BREP_FACE)
-ONCE = {  # by group
-    "": (*terms.COORDINATES, *terms.ROWS, terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS, *terms.LIMITS,
-         terms.ROW_VARIABLE_LABEL, terms.ROW_CHECKSUM, terms.SUMMED_ROWS),
-    "model": (terms.DECLARATION,),
-    "contact": (*OF_CONTACT, terms.PAIR_OF_POINT, terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL,
-                terms.LOCATOR_OF_POINT, *terms.ROUND, *terms.FEATURE_FACES, *terms.TOUCHING, terms.GROUP_CHECKSUM),
-    "sample": (*OF_SAMPLE, terms.DEVIATION, terms.DISTRIBUTION, terms.STIFFNESS, terms.ONE_SIDED, terms.LOCATOR_POINT,
-               terms.LOCATOR_DIRECTION, terms.CONTRIBUTOR_LABEL, terms.CONTRIBUTOR_SOURCE, terms.CONTRIBUTOR_UNITS,
-               terms.MEAN_SHIFT, terms.FACE_OF_LOCATOR),
-    "surface": (*terms.SURFACE, terms.GROUP_CHECKSUM),
-    "field": (*OF_FIELD, terms.COMPONENT_LABEL, terms.BOUND_LABEL, terms.FIELD_REALIZATIONS,
-              terms.MAGNITUDE_REALIZATIONS, terms.FIELD_SUMS,
-              terms.SUMS_CHECKSUM, terms.GROUP_CHECKSUM),
-}  # fmt: skip
+CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field")
+VARIABLES = {  # by name; no two variables of an archive differ that have one name
+    variable.name: variable
+    for module in (archive, surfaces, variation)
+    for item in vars(module).values()
+    for variable in (item if isinstance(item, tuple) else (item,))
+    if isinstance(variable, ArchiveVariable)
+}
 
 
 def check_name(path: Path) -> None:
@@ -90,7 +83,7 @@ def _fault(path: Path) -> str:
         groups = list(_groups(file))
         for group in groups:
             _check_group(group, path.stat().st_size)
-        _check_archive(file)
+        _check_archive(file, groups)
         for group in groups:
             _check_sums(group)
         _check_declaration(file)
@@ -160,7 +153,7 @@ def _check_text(name: str, text: str) -> None:
         raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
 
 
-def _check_archive(file: netCDF4.Dataset) -> None:
+def _check_archive(file: netCDF4.Dataset, groups: list[netCDF4.Dataset]) -> None:
     optional = (*terms.POSES, *terms.ADDED)
     missing = [v.name for v in terms.ROWS if v not in optional and v.name not in file.variables]
     is_format_1 = getattr(file, "format", 1) == 1
@@ -171,16 +164,12 @@ def _check_archive(file: netCDF4.Dataset) -> None:
     accuracy, samples = getattr(file, "solver_accuracy", None), getattr(file, "samples", None)
     if not (isinstance(accuracy, float | np.floating) and isinstance(samples, int | np.integer) and 0 <= samples < 2**63):
         raise DamagedError("is damaged: its attributes solver_accuracy and samples are not numbers")
-    for name, variables in ONCE.items():
-        parent = file.groups.get(name) if name else file
-        for group in [] if parent is None else (parent.groups.values() if name == "field" else [parent]):
-            for variable in variables:
-                _check_variable(group, variable)
+    for group in groups:
+        for stored, variable in _known_variables(group):
+            _check_variable(group, stored, variable)
     for group in file["model"].groups["mesh"].groups.values() if "mesh" in file["model"].groups else ():
         _need(group, OF_MESH)
         _need_together(group, terms.KNOWN_SURFACES)
-        for variable in IN_MESH:
-            _check_variable(group, variable)
     for name in LABELS:
         if name in file.variables:
             labels = _texts(file[name])
@@ -192,10 +181,15 @@ def _check_archive(file: netCDF4.Dataset) -> None:
     _check_needed(file)
 
 
-def _check_variable(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
-    if variable.name not in group.variables:
-        return
-    stored, where = group[variable.name], f"{group.path.rstrip('/')}/{variable.name}"
+def _known_variables(group: netCDF4.Dataset) -> list[tuple[netCDF4.Variable, ArchiveVariable]]:
+    """Return the stored variables of a group that the vocabulary defines, except in groups of analyses."""
+    if group.path.split("/")[1] not in CHECKED_GROUPS:
+        return []
+    return [(stored, VARIABLES[name]) for name, stored in group.variables.items() if name in VARIABLES]
+
+
+def _check_variable(group: netCDF4.Dataset, stored: netCDF4.Variable, variable: ArchiveVariable) -> None:
+    where = f"{group.path.rstrip('/')}/{variable.name}"
     text = stored.dtype is str or np.dtype(stored.dtype).kind == "S"
     dims = stored.dimensions[:-1] if text and stored.dtype is not str else stored.dimensions
     expected = variable.dims
@@ -265,12 +259,11 @@ def _texts(stored: netCDF4.Variable) -> list[str]:
 def _check_sums(group: netCDF4.Dataset) -> None:
     """Check the stored checksums of variables that are written once, and of groups that are overwritten together."""
     kind = group.path.split("/")[1]
-    variables = {v.name: v for v in (IN_MESH if "/mesh/" in group.path else ONCE.get(kind, ()))}
-    for name, stored in group.variables.items():
-        if terms.CHECKSUM in stored.ncattrs() and name in variables:
-            values = _declaration(stored) if variables[name] is terms.DECLARATION else _values(stored, variables[name])
-            if crc32(variables[name], values) != int(stored.getncattr(terms.CHECKSUM)):
-                raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{name} is not what was written")
+    for stored, variable in _known_variables(group):
+        if terms.CHECKSUM in stored.ncattrs():
+            values = _declaration(stored) if variable is terms.DECLARATION else _values(stored, variable)
+            if crc32(variable, values) != int(stored.getncattr(terms.CHECKSUM)):
+                raise DamagedError(f"is damaged: {group.path.rstrip('/')}/{variable.name} is not what was written")
     if terms.GROUP_CHECKSUM.name in group.variables:
         expected, checksum = int(group[terms.GROUP_CHECKSUM.name][...]), 0
         for variable in {"surface": terms.SURFACE, "contact": terms.TOUCHING}.get(kind, terms.FIELDS):

@@ -28,7 +28,7 @@ class LaidOut:
     """The values of an archive on its disk. A row is what stands at one index of a variable's first dimension."""
 
     def __init__(self, path: Path) -> None:
-        """Raises OSError if the file cannot be read and written."""
+        """Open the file. Raises OSError if it cannot be read and written."""
         self._places: dict[str, Place] = {}
         with h5py.File(path, "r", locking=False) as file:
             file.visititems(self._add_place)

@@ -20,7 +20,7 @@ def open_archive(path: str | Path) -> xr.DataTree:
     """Return an archive as a tree of labelled datasets that are read on demand.
 
     Raises ArchiveError if the file is missing, is not an archive of tolcontact, or is damaged: all but the realizations is
-    read and compared with its checksums; those of the realizations are looked at by `summarize`.
+    read and compared with its checksums; `summarize` checks those of the realizations.
     """
     path = Path(path)
     if not path.is_file():

@@ -73,8 +73,8 @@ def _method_origin(program: Program) -> str:
 
 def kept_rows(kept: str) -> tuple[ArchiveVariable, ...]:
     """Return the variables that are archived of each realization."""
-    left_out = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
-    return tuple(variable for variable in terms.BY_REALIZATION if variable not in left_out[kept])
+    omitted = {"measures": {*terms.POSES, terms.DEVIATION}, "poses": {terms.DEVIATION}, "all": set[ArchiveVariable]()}
+    return tuple(variable for variable in terms.BY_REALIZATION if variable not in omitted[kept])
 
 
 def declaration(program: Program) -> str:

@@ -1,10 +1,10 @@
-"""An archive is written block by block.
+"""Writing an archive block by block.
 
 A file that is being extended breaks when its writer is killed at the wrong moment. So room is laid out first, under another
 name: header, and rows with the status "unfinished". Once the file stands under its own name, bytes are only overwritten in
-place, the status of a row after its data; whatever kills the process, the file opens, finished rows stay, and `resume` goes
-on after the last checkpoint. (Nothing waits for the disk: a machine that loses power may lose more.) To stand there soon, a
-long run begins with room for few rows; when these are full, a copy gets room for all, and takes its place.
+place, the status of a row after its data. If the process is killed, the file still opens, finished rows stay, and `resume`
+continues after the last checkpoint. (Writes are not flushed to the disk: a power failure may lose more.) To have its name
+soon, a long run begins with room for few rows; when these are full, a copy gets room for all, and replaces the file.
 """
 
 import contextlib
@@ -27,16 +27,14 @@ from tolcontact.archive.inspection import inspect
 from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
-from tolcontact.archive.row_checksums import check_rows
 from tolcontact.archive.settings import Run, kept_rows, now, run_settings, versions
-from tolcontact.archive.stored_block import StoredBlock
+from tolcontact.archive.stored_rows import StoredBlock, check_rows
 from tolcontact.archive.surface_rows import archived_poses, choose, nothing_checked
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 
 _XARRAYS_LOCK = combine_locks([NETCDFC_LOCK, HDF5_LOCK])  # its engine "netcdf4" holds it while it reads and closes
-CHECKPOINTS_EVERY = 2.0  # s, at least: with their fields they take some 50 ms for a part with 100 000 vertices
 
 
 class ArchiveWriter:
@@ -47,8 +45,10 @@ class ArchiveWriter:
     kept      variables of each realization that it keeps
     """
 
+    checkpoint_interval = 2.0  # s, at least: checkpoint and fields take some 50 ms for a part with 100 000 vertices
+
     def __init__(self, path: Path, program: Program, run: Run, sums: Sequence[int]) -> None:
-        """Create the file with everything but its rows; `sums` is for each part how many numbers those of its field are.
+        """Create the file with everything but its rows; `sums` is the length of the sums of each part's field.
 
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
@@ -60,33 +60,33 @@ class ArchiveWriter:
 
     @classmethod
     def resume(cls, path: Path, program: Program, run: Run) -> "ArchiveWriter":
-        """Open an archive to go on after its last checkpoint, up to the run's samples, or to its own number if that is larger.
+        """Open an archive to continue after its last checkpoint, up to the run's samples, or its own number if larger.
 
         Raises ArchiveError if the file is not an archive, or contains another model or another run.
         """
         inspect(path)
         writer = cls.__new__(cls)
-        with replacing(path) as part:
-            # Only the copy is opened: whoever reads the old file in this process may go on, HDF5 bears no file opened twice.
-            shutil.copyfile(path, part)
-            with opened(part) as results:
+        with replacing(path) as copy:
+            # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
+            shutil.copyfile(path, copy)
+            with opened(copy) as results:
                 check_rows(results)
-            with opened_locked(part, "r+") as file:
+            with opened_locked(copy, "r+") as file:
                 check_same_run(file, path, program, run_settings(program, run), run.surfaces)
                 rows = last_checkpoint(file, path, [part.name for part in program.nominal.parts]).rows
                 samples, length = max(run.samples, int(file.samples)), len(file.dimensions[terms.REALIZATION])
                 check_room(path, program.nominal, kept_rows(run.keep), samples - length)
                 lay_out_rows(file, length, samples)
                 file.setncattr("samples", np.int64(samples))
-                others = "" if file.versions == versions() else f" with {versions()}"
-                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{others}")
-            # What follows stands for the rows of before.
-            nothing = {terms.field_of(own.name): no_field(len(own.vertices)) for own in program.nominal.parts}
-            nothing["surface"] = nothing_checked(run.surfaces, len(program.nominal.pairs))
-            with contextlib.closing(LaidOut(part)) as values:
+                software = "" if file.versions == versions() else f" with {versions()}"
+                file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{software}")
+            # Fields and checks were of the earlier rows.
+            initial = {terms.field_of(part.name): no_field(len(part.vertices)) for part in program.nominal.parts}
+            initial["surface"] = nothing_checked(run.surfaces, len(program.nominal.pairs))
+            with contextlib.closing(LaidOut(copy)) as values:
                 if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
-                    nothing["contact"] = nothing_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
-                values.overwrite_together(nothing)
+                    initial["contact"] = nothing_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
+                values.overwrite_together(initial)
         writer._go_on(path, program.nominal)
         return writer
 
@@ -102,7 +102,7 @@ class ArchiveWriter:
         self.take_up()
 
     def take_up(self) -> list[np.ndarray]:
-        """Go back to the last checkpoint: its sums of the fields, (state, number) for each part; none if there is none."""
+        """Go back to the last checkpoint, and return its sums of fields, (state, number) for each part; empty without one."""
         with opened_locked(self._path, "r") as file:
             self.rows, self._place, sums = last_checkpoint(file, self._path, self._parts)
         self._since = time.monotonic()
@@ -116,7 +116,7 @@ class ArchiveWriter:
             self._values.close()
 
     def append(self, block: StoredBlock) -> None:
-        """Write the rows of a block, and hand them over to the system."""
+        """Write the rows of a block to the file."""
         with _as_archive_error(self._path):
             if block.stop > self._length:
                 self._make_room_for_all()
@@ -140,17 +140,20 @@ class ArchiveWriter:
 
     @property
     def is_between_blocks(self) -> bool:
-        """Whether the last block is whole: only there can a run go on."""
+        """Whether the last block is complete: a run can be resumed only there."""
         return self.rows % self._block_rows == 0
 
     @property
     def is_checkpoint_due(self) -> bool:
-        """Whether it is time for a checkpoint: the last one is old, or no whole block will follow."""
-        is_old, is_last = time.monotonic() >= self._since + CHECKPOINTS_EVERY, self.rows + self._block_rows > self.samples
+        """Whether it is time for a checkpoint: the last one is old, or no complete block will follow."""
+        is_old, is_last = (
+            time.monotonic() >= self._since + self.checkpoint_interval,
+            self.rows + self._block_rows > self.samples,
+        )
         return self.is_between_blocks and (is_old or is_last)
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:
-        """The sums of the fields (state, number) for each part, over all rows so far. A killed run goes on from them."""
+        """Write the sums of the fields (state, number) for each part so far, from which a killed run continues."""
         with _as_archive_error(self._path):
             place = 1 - self._place
             write_checkpoint(self._values, Checkpoint(self.rows, place, list(sums)), self._parts)
@@ -158,19 +161,19 @@ class ArchiveWriter:
         self._since = time.monotonic()
 
     def write_fields(self, fields: Sequence[dict[terms.ArchiveVariable, Any]]) -> None:
-        """Displacement fields: for each part the values of `FIELDS`."""
+        """Write displacement fields: for each part the values of `FIELDS`."""
         with _as_archive_error(self._path):
             self._values.overwrite_together(
-                {terms.field_of(part): of_part for part, of_part in zip(self._parts, fields, strict=True)}
+                {terms.field_of(part): values for part, values in zip(self._parts, fields, strict=True)}
             )
 
     def chosen(self, seed: int) -> np.ndarray:
-        """Numbers (row,) of the realizations that are to be checked against the surfaces."""
+        """Return the numbers (row,) of the realizations to check against the surfaces."""
         with opened_locked(self._path, "r") as file:
             return choose(file, self._checked, seed)
 
     def poses(self, rows: np.ndarray) -> np.ndarray | None:
-        """Corrected poses (row, part, 12) of some rows; None if they are not kept."""
+        """Return corrected poses (row, part, 12) of some rows; None if they are not kept."""
         with opened_locked(self._path, "r") as file:
             return archived_poses(file, rows)
 
@@ -184,17 +187,17 @@ class ArchiveWriter:
             R, t = (file[variable.name][:end, terms.CORRECTED][rows] for variable in (terms.ROTATION, terms.TRANSLATION))
         return rows, poses.pose(R, t)
 
-    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, beside: np.ndarray) -> None:
-        """What the check of some rows found, (row, pair) [mm]."""
+    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, distance: np.ndarray) -> None:
+        """Write the results (row, pair) [mm] of the check of some rows: penetration, and distance outside the faces."""
         values = nothing_checked(self._checked, self._pairs)
-        found = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: beside}
-        for variable, of_rows in found.items():
-            values[variable][: len(rows)] = of_rows
+        results = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: distance}
+        for variable, array in results.items():
+            values[variable][: len(rows)] = array
         with _as_archive_error(self._path):
             self._values.overwrite_together({"surface": values})
 
     def write_touching(self, share: np.ndarray, interval: np.ndarray, realizations: int) -> None:
-        """How often each contact point touches, (point,), with its interval, (point, bound)."""
+        """Write the share of realizations in which each contact point touches (point,), with its interval (point, bound)."""
         if self._values.has("contact", terms.TOUCHING_SHARE):
             with _as_archive_error(self._path):
                 values = dict(zip(terms.TOUCHING, (share, interval, realizations), strict=True))
@@ -203,7 +206,7 @@ class ArchiveWriter:
 
 @contextlib.contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A name beside `path` to write under; what was written takes the place of `path` when it is whole."""
+    """Yield a temporary path to write to; the complete file then replaces `path`."""
     part = path.with_name(f".{path.name}.part")
     try:
         with _as_archive_error(path):
@@ -224,13 +227,13 @@ def _as_archive_error(path: Path) -> Iterator[None]:
 
 
 def _group_of(variable: terms.ArchiveVariable) -> str:
-    """The path of the group that holds a variable of realizations."""
+    """Return the path of the group that holds a variable of realizations."""
     return "sample" if variable is terms.DEVIATION else ""
 
 
 @contextlib.contextmanager
 def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4.Dataset]:
-    """A file for the netCDF library, which does not bear that another thread, in which garbage is collected, closes a file."""
+    """Open a file while no other thread may use the netCDF library: garbage collection there could close a file."""
     with _XARRAYS_LOCK, netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
         yield file

@@ -116,7 +116,7 @@ ROWS = (
     STATUS,
 )
 POSES = (TRANSLATION, ROTATION)
-ADDED = ROWS[ROWS.index(STARTS) : -1]  # that archives of format 1 do not have; nor have they the group `surface`
+ADDED = ROWS[ROWS.index(STARTS) : -1]  # not in archives of format 1, nor is the group `surface`
 
 BY_REALIZATION = (*ROWS, DEVIATION)
 ROW_VARIABLE_LABEL = label(ROW_VARIABLE, "variable of realizations")
@@ -148,7 +148,7 @@ QUANTITY = ArchiveVariable(
     str,
     "what a measure is the value of: displacement, coordinate, distance, deviation of distance, or expression of the poses",
 )
-LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # that archives before format 4 do not have
+LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # not in archives before format 4
 MEASURE_UNITS = ArchiveVariable("measure_units", (MEASURE,), str, "units of the measure")
 
 DECLARATION = ArchiveVariable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
@@ -253,14 +253,14 @@ SUMS_CHECKSUM = ArchiveVariable("sums_checksum", (CHECKPOINT,), "i8", "CRC-32 of
 
 
 def group_of(part: str) -> str:
-    """The name of a part's groups: its own, with an underscore behind it if it is a name of the archive.
+    """Return the name of a part's groups: its own, followed by an underscore if the archive uses that name.
 
-    xarray hands the coordinates of the root on to all groups, and a group cannot be called like one of them.
+    In xarray all groups inherit the coordinates of the root, and a group cannot have the name of one of them.
     """
     name = unicodedata.normalize("NFC", part)  # as the netCDF library stores it
     return f"{name}_" if name.rstrip("_") in {coordinate.name for coordinate in COORDINATES} else name
 
 
 def field_of(part: str) -> str:
-    """The path of a part's displacement field."""
+    """Return the path of a part's displacement field."""
     return f"field/{group_of(part)}"

@@ -8,21 +8,25 @@ SURFACE_KINDS = ("plane", "cylinder", "cone", "sphere", "torus")  # in the order
 KINDS_MEAN = {"flag_values": list(range(len(SURFACE_KINDS))), "flag_meanings": " ".join(SURFACE_KINDS)}
 
 
-def _surface_variables(word: str, dim: str, whose: str) -> dict[str, ArchiveVariable]:
+def _surface_variables(prefix: str, dim: str, surface: str) -> dict[str, ArchiveVariable]:
     """Return the variables of a surface, by the names of the attributes that they hold."""
     return {
-        "kind": ArchiveVariable(f"{word}_kind", (dim,), "i1", f"kind of {whose}; -1: not known", "1", KINDS_MEAN),
+        "kind": ArchiveVariable(f"{prefix}_kind", (dim,), "i1", f"kind of {surface}; -1: not known", "1", KINDS_MEAN),
         "origin": ArchiveVariable(
-            f"{word}_point", (dim, AXIS), "f8", f"a point of {whose}, if it is a plane, or its centre; of a cone the apex", "mm"
+            f"{prefix}_point",
+            (dim, AXIS),
+            "f8",
+            f"a point of {surface}, if it is a plane, or its centre; of a cone the apex",
+            "mm",
         ),
         "axis": ArchiveVariable(
-            f"{word}_axis", (dim, AXIS), "f8", f"unit normal or axis of {whose}; of a cone from the apex inward", "1"
+            f"{prefix}_axis", (dim, AXIS), "f8", f"unit normal or axis of {surface}; of a cone from the apex inward", "1"
         ),
         "radius": ArchiveVariable(
-            f"{word}_radius", (dim,), "f8", f"radius of {whose}; of a torus that of the tube's middle", "mm"
+            f"{prefix}_radius", (dim,), "f8", f"radius of {surface}; of a torus that of the tube's middle", "mm"
         ),
-        "minor": ArchiveVariable(f"{word}_tube_radius", (dim,), "f8", f"radius of the tube, if {whose} is a torus", "mm"),
-        "angle": ArchiveVariable(f"{word}_angle", (dim,), "f8", f"angle between axis and {whose}, if it is a cone", "rad"),
+        "minor": ArchiveVariable(f"{prefix}_tube_radius", (dim,), "f8", f"radius of the tube, if {surface} is a torus", "mm"),
+        "angle": ArchiveVariable(f"{prefix}_angle", (dim,), "f8", f"angle between axis and {surface}, if it is a cone", "rad"),
     }
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive import ArchiveWriter, Run, stored
-from tolcontact.archive.stored_block import StoredBlock
+from tolcontact.archive.stored_rows import StoredBlock
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
 from tolcontact.simulation.touching import (

@@ -129,7 +129,7 @@ def _row(run: dict, reference: dict, corners: np.ndarray) -> dict:
     measured = np.abs(run["measured"] - reference["measured"])[both_resolved]
     return {
         "seconds": run["seconds"],
-        "by_status": np.bincount(run["status"], minlength=len(terms.STATUS_MEANINGS)),
+        terms.BY_STATUS.name: np.bincount(run["status"], minlength=len(terms.STATUS_MEANINGS)),
         "kkt_residual": run["kkt_residual"][resolved].max(initial=0),
         "penetration": max(0.0, -float(run["gap_min"].min(initial=0))),
         "pose_difference": _extent(distance),

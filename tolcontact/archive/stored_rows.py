@@ -1,6 +1,10 @@
-"""Check that the realizations of an archive are what was written."""
+"""Rows of an archive as they are stored: their conversion and checksums, and the check that they are what was written.
 
-from collections.abc import Iterator
+The worker that simulates a block converts it, so that the writer only writes.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -9,7 +13,34 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import finished
+from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
+
+
+class StoredBlock(NamedTuple):
+    """Realizations `start` to `stop`: the values of each archived variable, by name, and their checksums."""
+
+    start: int
+    stop: int
+    values: dict[str, np.ndarray]
+    checksums: list[int]
+
+
+def stored(block: Block, names: Sequence[str]) -> StoredBlock:
+    """Return a block, converted once for the file and for its checksums; `names` are those of its variables."""
+    values = row_values(block, names)
+    checksums = [crc32(variable, values[variable.name]) for variable in terms.BY_REALIZATION if variable.name in values]
+    return StoredBlock(block.start, block.start + len(block), values, checksums)
+
+
+def row_values(block: Block, names: Sequence[str]) -> dict[str, np.ndarray]:
+    """Return the values of the variables of these names as they are stored."""
+    values = block.values()
+    return {
+        variable.name: np.ascontiguousarray(values[variable], dtype=variable.kind)
+        for variable in terms.BY_REALIZATION
+        if variable.name in names
+    }
 
 
 def check_rows(results: xr.DataTree) -> None:
@@ -35,17 +66,17 @@ def check_rows(results: xr.DataTree) -> None:
 def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tuple[str, int]]:
     """Yield the variables and blocks of `rows` realizations whose values do not match their checksums."""
     done = finished(results)
-    whole = done if done == stored.sizes[terms.REALIZATION] else done // rows * rows
+    complete = done if done == stored.sizes[terms.REALIZATION] else done // rows * rows
     # Blocks are finished in order: none behind the one that is being written.
-    behind = stored[terms.STATUS.name][whole + rows :].values
+    behind = stored[terms.STATUS.name][complete + rows :].values
     if (behind != terms.UNFINISHED).any():
         yield terms.STATUS.name, done // rows
     sums = stored[terms.ROW_CHECKSUM.name].values
     names = stored[terms.ROW_VARIABLE].values.astype(str).tolist()
     for variable in terms.BY_REALIZATION:
         if variable.name in names:
-            values = (results["sample"].to_dataset() if variable is terms.DEVIATION else stored)[variable.name][:whole]
-            actual, expected = _checksums(variable, values, rows), sums[: -(-whole // rows), names.index(variable.name)]
+            values = (results["sample"].to_dataset() if variable is terms.DEVIATION else stored)[variable.name][:complete]
+            actual, expected = _checksums(variable, values, rows), sums[: -(-complete // rows), names.index(variable.name)]
             wrong = np.flatnonzero(actual != expected)
             yield from ((variable.name, int(block)) for block in wrong[:1])
 
