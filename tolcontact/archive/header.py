@@ -9,7 +9,7 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive.labels import labels_of_rows, units_of_rows
 from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
-from tolcontact.archive.surface_rows import nothing_checked
+from tolcontact.archive.surface_rows import empty_checks
 from tolcontact.archive.variables import define, lay_out, write
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
@@ -44,10 +44,10 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_contact(file.createGroup("contact"), nominal)
     _write_sample(file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
     file["contact"].createDimension(terms.BOUND, 2)
-    _lay_out_group(file["contact"], nothing_touching(file["contact"].dimensions[terms.POINT].size))
+    _lay_out_group(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
-    _lay_out_group(checked, nothing_checked(run.surfaces, len(nominal.pairs)))
+    _lay_out_group(checked, empty_checks(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.parts, sums, strict=True):
         _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
 
@@ -109,12 +109,12 @@ def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     write(group, terms.FIELD_VERTICES, part.vertices)
     write(group, terms.FIELD_FACES, part.faces)
     write(group, terms.BOUND_LABEL, terms.BOUNDS)
-    _lay_out_group(group, no_field(len(part.vertices)))
+    _lay_out_group(group, empty_field(len(part.vertices)))
     lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
     lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
 
 
-def no_field(vertices: int) -> dict[ArchiveVariable, Any]:
+def empty_field(vertices: int) -> dict[ArchiveVariable, Any]:
     """Return the values in the group of a part before its field is written."""
     states = len(terms.STATES)
     return {
@@ -125,7 +125,7 @@ def no_field(vertices: int) -> dict[ArchiveVariable, Any]:
     }
 
 
-def nothing_touching(points: int) -> dict[ArchiveVariable, Any]:
+def empty_touching(points: int) -> dict[ArchiveVariable, Any]:
     """Return the shares of touching before any are known."""
     return {
         terms.TOUCHING_SHARE: np.full(points, np.nan),

@@ -22,11 +22,11 @@ from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, surfaces, variation
 
-SECONDS, SECONDS_PER_GB = 20.0, 20.0
+MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0
 MEMORY = 1 << 30  # beside four times the file's own size
-DEFLATED = 1032  # zlib makes data no smaller than that
-DECLARED = 1 << 26  # bytes of a declared model
-TEXT = 1 << 20  # letters of an attribute
+MAX_DEFLATION = 1032  # zlib compresses data no further
+MAX_DECLARATION = 1 << 26  # bytes of a declared model
+MAX_TEXT = 1 << 20  # letters of an attribute
 SIZES = {terms.STATE: 2, terms.AXIS: 3, terms.BODY_AXIS: 3, terms.CORNER: 3, terms.COMPONENT: 4, terms.BOUND: 2}
 GROUPS = ("model", "contact", "sample", "field")
 ADDED = ("surface",)  # groups that archives of format 1 may not have
@@ -65,7 +65,7 @@ def inspect(path: Path) -> None:
     check_name(path)
     gigabytes = path.stat().st_size / 1e9
     try:
-        fault = run_child(Path(__file__), os.fspath(path), seconds=SECONDS + SECONDS_PER_GB * gigabytes)
+        fault = run_child(Path(__file__), os.fspath(path), seconds=MAX_SECONDS + SECONDS_PER_GB * gigabytes)
     except ChildDiedError as error:
         raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
     if fault:
@@ -127,7 +127,7 @@ def _check_group(group: netCDF4.Dataset, size: int) -> None:
             raise DamagedError(f"is not an archive of tolcontact: {where} holds neither numbers nor text")
         itemsize = 8 if variable.dtype is str else np.dtype(variable.dtype).itemsize
         is_packed = any((variable.filters() or {}).get(name) for name in ("zlib", "szip", "zstd", "bzip2", "blosc"))
-        if math.prod(variable.shape) * itemsize > size * (DEFLATED if is_packed else 1):
+        if math.prod(variable.shape) * itemsize > size * (MAX_DEFLATION if is_packed else 1):
             raise DamagedError(f"is damaged: {where} claims {_times(variable.shape)} values, more than the file can hold")
         _check_attributes(variable)
 
@@ -147,7 +147,7 @@ def _check_attributes(thing: Any) -> None:
 
 
 def _check_text(name: str, text: str) -> None:
-    if len(text) > TEXT:
+    if len(text) > MAX_TEXT:
         raise DamagedError(f"is damaged: {name} has {len(text)} characters")
     if shown(text) != text:
         raise DamagedError(f"is damaged: {name} holds control characters ({shown(text)[:60]})")
@@ -278,7 +278,7 @@ def _values(stored: netCDF4.Variable, variable: ArchiveVariable) -> Any:
 
 
 def _declaration(stored: netCDF4.Variable) -> str:
-    if math.prod(stored.shape) > DECLARED:
+    if math.prod(stored.shape) > MAX_DECLARATION:
         raise DamagedError(f"is damaged: its declared model has {math.prod(stored.shape)} bytes")
     if stored.dtype is str:
         return str(stored[...])

@@ -65,7 +65,7 @@ def archived_poses(file: netCDF4.Dataset, rows: np.ndarray) -> np.ndarray | None
     return pose.pose(R, t)
 
 
-def nothing_checked(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
+def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
     """Return the values of the group before any check."""
     return {
         terms.CHECKED_REALIZATION: np.full(count, terms.UNFINISHED),

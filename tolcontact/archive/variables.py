@@ -10,8 +10,8 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.vocabulary import ArchiveVariable
 
-CHUNK = 1 << 22  # bytes: more would not stay in the library's cache
-LEAST_ROWS = 16
+MAX_CHUNK_BYTES = 1 << 22  # bytes: more would not stay in the library's cache
+MIN_CHUNK_ROWS = 16
 BLOCK_CHUNK = 256
 
 
@@ -34,7 +34,7 @@ def define(group: netCDF4.Dataset, variable: ArchiveVariable) -> None:
 def rows_together(width: int) -> int:
     """Return the rows in a chunk of the file, for rows of `width` bytes: those of a block, or fewer if they are too large."""
     rows = terms.BLOCK_ROWS
-    while rows > LEAST_ROWS and rows * width > CHUNK:
+    while rows > MIN_CHUNK_ROWS and rows * width > MAX_CHUNK_BYTES:
         rows //= 2
     return rows
 

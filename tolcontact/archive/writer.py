@@ -22,14 +22,14 @@ from tolcontact import poses
 from tolcontact import vocabulary as terms
 from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.disk_space import check_room, lay_out_rows
-from tolcontact.archive.header import no_field, nothing_touching, write_header
+from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.settings import Run, kept_rows, now, run_settings, versions
 from tolcontact.archive.stored_rows import StoredBlock, check_rows
-from tolcontact.archive.surface_rows import archived_poses, choose, nothing_checked
+from tolcontact.archive.surface_rows import archived_poses, choose, empty_checks
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
@@ -81,11 +81,11 @@ class ArchiveWriter:
                 software = "" if file.versions == versions() else f" with {versions()}"
                 file.setncattr("history", f"{file.history}\n{now()} resumed after {rows} realizations{software}")
             # Fields and checks were of the earlier rows.
-            initial = {terms.field_of(part.name): no_field(len(part.vertices)) for part in program.nominal.parts}
-            initial["surface"] = nothing_checked(run.surfaces, len(program.nominal.pairs))
+            initial = {terms.field_of(part.name): empty_field(len(part.vertices)) for part in program.nominal.parts}
+            initial["surface"] = empty_checks(run.surfaces, len(program.nominal.pairs))
             with contextlib.closing(LaidOut(copy)) as values:
                 if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
-                    initial["contact"] = nothing_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
+                    initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(initial)
         writer._go_on(path, program.nominal)
         return writer
@@ -189,7 +189,7 @@ class ArchiveWriter:
 
     def write_checked(self, rows: np.ndarray, penetration: np.ndarray, distance: np.ndarray) -> None:
         """Write the results (row, pair) [mm] of the check of some rows: penetration, and distance outside the faces."""
-        values = nothing_checked(self._checked, self._pairs)
+        values = empty_checks(self._checked, self._pairs)
         results = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: distance}
         for variable, array in results.items():
             values[variable][: len(rows)] = array
