@@ -72,7 +72,7 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
                     sides = faces(pair, R[[row], CORRECTED], t[[row], CORRECTED], run["deviations"][[row]])
                     inside = depth(nominal, pair, sides)
                     limit = (
-                        0.01 * nominal.assembly.finest()
+                        0.01 * nominal.assembly.smallest_zone()
                         + pair.facets
                         + chord_height(pair.moving_face)
                         + chord_height(pair.reference_face)

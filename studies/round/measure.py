@@ -66,15 +66,7 @@ CASES: dict[str, tuple[Callable[[], tc.Assembly], Errors]] = {
 
 def sampled(model: tc.Assembly, points: int | None) -> tc.Assembly:
     """Return the model with this number of points in each pair."""
-    return tc.Assembly.of(
-        model.name,
-        model.method,
-        parts=model.parts,
-        locations=model.locations,
-        pairs=[replace(pair, points=points) for pair in model.pairs],
-        measures=model.measures,
-        forces=model.forces,
-    )
+    return model.replaced(pairs=[replace(pair, points=points) for pair in model.pairs])
 
 
 def measured(make: Callable[[], tc.Assembly], errors: Errors, points: int | None, samples: int) -> str:

@@ -150,12 +150,9 @@ class RelocatedTrials:
 
     def _with_locators(self, scheme: tuple[Locator, ...]) -> Assembly:
         """Return the assembly with other locators of the part."""
-        a = self._assembly
-        locations = [replace(loc, scheme=scheme) if loc.part is self._part.part else loc for loc in a.locations]
-        return Assembly.of(
-            a.name, a.method, parts=a.parts, locations=locations, pairs=a.pairs, measures=a.measures,
-            forces=a.forces, variables=a.variables, correlations=a.correlations, populations=a.populations,
-        )  # fmt: skip
+        locations = self._assembly.locations
+        part = self._part.part
+        return self._assembly.replaced(locations=[replace(x, scheme=scheme) if x.part is part else x for x in locations])
 
 
 class Places:

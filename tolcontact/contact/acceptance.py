@@ -31,7 +31,7 @@ class Limits:
         self._max_turn = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
         self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
-        self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.finest())
+        self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())
         self._round = {}
         for k in curved_pairs(nominal, group):
             surface, points = self._group_pairs[k].reference_face, self._group_pairs[k].P_m

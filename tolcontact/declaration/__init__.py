@@ -186,7 +186,7 @@ assembly without running any code of the script. Functions of poses are kept as 
 contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
-from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.assembly import Assembly, has_supports, is_free, movers
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
@@ -205,7 +205,6 @@ from tolcontact.declaration.feature_tolerance import (
     TotalRunout,
 )
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.freedom import has_supports, is_free, movers
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure

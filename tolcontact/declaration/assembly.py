@@ -1,8 +1,8 @@
-"""The assembly: collects declarations in the order in which a script makes them."""
+"""The assembly: it collects declarations in the order of a script, and knows which parts contact may move."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
@@ -21,92 +21,61 @@ from tolcontact.declaration.vectors import vector as _vector
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
-CONSTANT = 1e-3
+T = TypeVar("T")
+
+CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
+LISTS = ("parts", "locations", "pairs", "measures", "forces", "variables", "correlations", "populations")
+
+
+class Declared(Generic[T]):
+    """A view of one of the lists of an assembly: a tuple in the order of the script."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, assembly: Any, owner: type) -> tuple[T, ...]:
+        return self if assembly is None else tuple(assembly._declared[self._name])  # type: ignore[return-value]
 
 
 class Assembly(Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
-    The methods only record what is declared; `faults()` lists everything that is wrong with it.
+    The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
+    this model is resolved; a run may state another one. Raises TypeError for an argument of a wrong type.
     """
 
+    parts = Declared[Part]()
+    locations = Declared[Location]()
+    pairs = Declared[ContactPair]()
+    measures = Declared[Measure]()
+    forces = Declared[Force]()
+    variables = Declared[Variable]()
+    correlations = Declared[Correlation]()
+    populations = Declared[Population]()
+
     def __init__(self, name: str, *, method: Method | None = None) -> None:
-        """`method` is how contact in this model is resolved, unless a run states another one."""
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         self.name = name
         self.method = method
-        self._parts: list[Part] = []
-        self._locations: list[Location] = []
-        self._pairs: list[ContactPair] = []
-        self._measures: list[Measure] = []
-        self._forces: list[Force] = []
-        self._variables: list[Variable] = []
-        self._correlations: list[Correlation] = []
-        self._populations: list[Population] = []
+        self._declared: dict[str, list[Any]] = {name: [] for name in LISTS}
 
-    @classmethod
-    def of(
-        cls,
-        name: str,
-        method: Method | None,
-        *,
-        parts: Iterable[Part],
-        locations: Iterable[Location],
-        pairs: Iterable[ContactPair],
-        measures: Iterable[Measure],
-        forces: Iterable[Force],
-        variables: Iterable[Variable] = (),
-        correlations: Iterable[Correlation] = (),
-        populations: Iterable[Population] = (),
-    ) -> "Assembly":
-        """An assembly of things that have been declared already."""
-        made = cls(name, method=method)
-        made._parts.extend(parts)
-        made._locations.extend(locations)
-        made._pairs.extend(pairs)
-        made._measures.extend(measures)
-        made._forces.extend(forces)
-        made._variables.extend(variables)
-        made._correlations.extend(correlations)
-        made._populations.extend(populations)
-        return made
+    def _add(self, name: str, thing: T) -> T:
+        """Append a declaration to a list and return it."""
+        self._declared[name].append(thing)
+        return thing
 
-    @property
-    def parts(self) -> tuple[Part, ...]:
-        return tuple(self._parts)
-
-    @property
-    def locations(self) -> tuple[Location, ...]:
-        return tuple(self._locations)
-
-    @property
-    def pairs(self) -> tuple[ContactPair, ...]:
-        return tuple(self._pairs)
-
-    @property
-    def measures(self) -> tuple[Measure, ...]:
-        return tuple(self._measures)
-
-    @property
-    def forces(self) -> tuple[Force, ...]:
-        return tuple(self._forces)
+    def replaced(self, **lists: Iterable[Any]) -> "Assembly":
+        """Return a copy of the assembly in which `lists` (parts=..., pairs=...) replace its own. Raises TypeError for other names."""
+        copy = Assembly(self.name, method=self.method)
+        copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
+        if lists:
+            raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(LISTS)}")
+        return copy
 
     @property
     def features(self) -> tuple[Feature, ...]:
-        """Those of all parts, one part after the other."""
-        return tuple(feature for part in self._parts for feature in part.features)
-
-    @property
-    def variables(self) -> tuple[Variable, ...]:
-        return tuple(self._variables)
-
-    @property
-    def correlations(self) -> tuple[Correlation, ...]:
-        return tuple(self._correlations)
-
-    @property
-    def populations(self) -> tuple[Population, ...]:
-        return tuple(self._populations)
+        """The features of all parts, part by part."""
+        return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
         self,
@@ -117,12 +86,10 @@ class Assembly(Pictured):
         rotation: Any = (0, 0, 0),
         fixed: bool | None = None,
     ) -> Part:
-        """Declare a part: its shape, and its place in the nominal assembly (see Part)."""
+        """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
         _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
         _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
-        part = Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line())
-        self._parts.append(part)
-        return part
+        return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
 
     def locate(
         self,
@@ -133,20 +100,19 @@ class Assembly(Pictured):
         on: Part | None = None,
         floating: bool = False,
     ) -> Location:
-        """Locate a part by six locators, on the ground or `on` another part; by fewer, if it is `floating` (see Location).
+        """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
-        `tolerance` holds for every locator that has none of its own: the full width of its zone [mm], a Tolerance, or
-        a frozen scipy.stats distribution.
+        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], a Tolerance, or a frozen
+        scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
         _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
         scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
         for locator in scheme if isinstance(scheme, tuple) else ():
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
-        common = None if tolerance is None else _tolerance(tolerance)
+        zone = None if tolerance is None else _tolerance(tolerance)
         _expect(f'locate "{part.name}": floating', floating, bool, "True or False")
-        self._locations.append(Location(part, scheme, common, on, script_line(), floating))
-        return self._locations[-1]
+        return self._add("locations", Location(part, scheme, zone, on, script_line(), floating))
 
     def contact(
         self,
@@ -162,14 +128,12 @@ class Assembly(Pictured):
         for side, face in (("moving", moving), ("reference", reference)):
             _expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         sides = face_of(moving), face_of(reference)
-        self._pairs.append(ContactPair(name, *sides, points, spacing, within, script_line()))
-        return self._pairs[-1]
+        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line()))
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         _expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
-        self._forces.append(Force(name, at, _vector(vector), script_line()))
-        return self._forces[-1]
+        return self._add("forces", Force(name, at, _vector(vector), script_line()))
 
     def measure(
         self,
@@ -185,151 +149,155 @@ class Assembly(Pictured):
     ) -> Measure:
         """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
         axis = None if along is None else direction(along)
-        allowed = tuple(limits) if isinstance(limits, list | tuple) else limits
-        self._measures.append(Measure(name, of, to, axis, tolerance, units, script_line(), allowed, absolute))  # type: ignore[arg-type]
-        return self._measures[-1]
+        bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
+        return self._add("measures", Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute))
 
     def variable(self, name: str, tolerance: Any, *, drives: Mapping[str, float], units: str = "mm") -> Variable:
-        """Declare a cause that several contributors share, each by a factor (see Variable)."""
-        self._variables.append(Variable(name, _tolerance(tolerance), dict(drives), units, script_line()))
-        return self._variables[-1]
+        """Declare a cause that drives several contributors, each by a factor (see Variable)."""
+        return self._add("variables", Variable(name, _tolerance(tolerance), dict(drives), units, script_line()))
 
     def correlate(self, labels: Sequence[str], matrix: Any) -> Correlation:
         """Declare that contributors are correlated: a matrix, or one coefficient for two of them (see Correlation)."""
-        self._correlations.append(_correlation(labels, matrix, script_line()))
-        return self._correlations[-1]
+        return self._add("correlations", _correlation(labels, matrix, script_line()))
 
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
-        self._populations.append(_population(source, columns, script_line()))
-        return self._populations[-1]
+        return self._add("populations", _population(source, columns, script_line()))
 
     def location_of(self, part: Part) -> Location | None:
-        """How `part` is located; None if it is not."""
-        return next((location for location in self._locations if location.part is part), None)
+        """Return the location of `part`; None for a part that is not located."""
+        return next((location for location in self.locations if location.part is part), None)
 
-    def finest(self) -> float:
-        """The smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite if there is none.
+    def smallest_zone(self) -> float:
+        """Return the smallest width of a tolerance zone [mm] of any locator, feature or measure; infinite without a zone.
 
-        The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one is
-        taken for a constant, and does not count.
+        The width of a scipy.stats distribution is six standard deviations. A width below a thousandth of the widest one
+        counts as a constant, and is left out.
         """
-        said = []
-        for location in self._locations:
-            own = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
-            said += [tolerance or location.tolerance for tolerance in own]
-        widths = [tolerance.width for tolerance in said if tolerance is not None]
-        sound = [each for feature in self.features for each in feature.tolerances if not any(each.faults())]
-        widths += [each.tolerance.width if isinstance(each, Size) else float(each.width) for each in sound]
-        widths += [float(m.width) for m in self._measures if m.width is not None and m.units == "mm"]
-        return min((width for width in widths if width > CONSTANT * max(widths)), default=math.inf)
+        zones = []
+        for location in self.locations:
+            scheme = [locator.tolerance for locator in location.scheme] if isinstance(location.scheme, tuple) else [None]
+            zones += [zone or location.tolerance for zone in scheme]
+        widths = [zone.width for zone in zones if zone is not None]
+        sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
+        widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
+        widths += [float(m.width) for m in self.measures if m.width is not None and m.units == "mm"]
+        return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
     def faults(self) -> Iterator[str]:
-        """What is wrong with the declarations themselves, one sentence each, naming the thing at fault."""
-        if not self._parts:
+        """Yield the faults of the declarations, one sentence each, which names the declaration and its script line."""
+        if not self.parts:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
-        if not self._measures:
+        if not self.measures:
             yield "it measures nothing; declare at least one measure with assembly.measure(...)"
-        kinds = {"part": self._parts, "contact pair": self._pairs, "measure": self._measures, "force": self._forces}
         yield from text_faults("assembly", [self.name])
-        for kind, things in kinds.items():
-            yield from key_faults(kind, [thing.name for thing in things])  # type: ignore[attr-defined]
-        for part in self._parts:
-            yield from _named("part", part, part.faults())
-            yield from _named("part", part, self._location_faults(part))
+        keyed = {"part": "parts", "contact pair": "pairs", "measure": "measures", "force": "forces"}
+        for kind, name in keyed.items():
+            yield from key_faults(kind, [thing.name for thing in self._declared[name]])
+        for part in self.parts:
+            yield from _located("part", part, part.faults())
+            yield from _located("part", part, self._location_faults(part))
             yield from self._feature_faults(part)
-        for location in self._locations:
-            yield from _named("part", location.part, location.faults(), location.declared_at)
-            yield from self._strangers(
-                f'locators of "{location.part.name}"', location.declared_at, location.part, location.on, *location.mentioned
-            )
-        for pair in self._pairs:
-            yield from _named("contact pair", pair, pair.faults())
-            yield from self._strangers(
-                f'contact pair "{pair.name}"', pair.declared_at, *pair.moving.parts, *pair.reference.parts
-            )
-        for force in self._forces:
-            yield from _named("force", force, force.faults())
-            yield from self._strangers(f'force "{force.name}"', force.declared_at, force.at.part)
-        for measure in self._measures:
-            yield from _named("measure", measure, measure.faults())
-            yield from self._strangers(
-                f'measure "{measure.name}"', measure.declared_at, *(point.part for point in measure.points)
-            )
-
-        for kind, causes in (("variable", self._variables), ("correlation", self._correlations)):
-            for cause in causes:
-                yield from _named(kind, cause, cause.faults())
-        for population in self._populations:
-            yield from _named("population", population, population.faults())
-        yield from key_faults("variable", [variable.name for variable in self._variables])
+        for location in self.locations:
+            yield from _located("part", location.part, location.faults(), location.declared_at)
+            mentioned = location.part, location.on, *location.mentioned
+            yield from self._unknown_parts(f'locators of "{location.part.name}"', location.declared_at, *mentioned)
+        references: list[tuple[str, Any, Iterable[Part]]] = [
+            *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
+            *(("force", force, (force.at.part,)) for force in self.forces),
+            *(("measure", measure, [point.part for point in measure.points]) for measure in self.measures),
+            *(("variable", variable, ()) for variable in self.variables),
+            *(("correlation", correlation, ()) for correlation in self.correlations),
+            *(("population", population, ()) for population in self.populations),
+        ]
+        for kind, thing, parts in references:
+            yield from _located(kind, thing, thing.faults())
+            yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
+        yield from key_faults("variable", [variable.name for variable in self.variables])
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
-        names = [feature.name for feature in part.features]
-        yield from key_faults(f'part "{part.name}": feature', names)
-        yield from repetitions(f'part "{part.name}": datum', [each.datum for each in part.features if each.datum])
-        letters = {feature.datum for feature in part.features if feature.datum}
+        letters = [feature.datum for feature in part.features if feature.datum]
+        yield from key_faults(f'part "{part.name}": feature', [feature.name for feature in part.features])
+        yield from repetitions(f'part "{part.name}": datum', letters)
         for feature in part.features:
-            yield from _named(f'part "{part.name}": feature', feature, feature.faults())
+            yield from _located(f'part "{part.name}": feature', feature, feature.faults())
             for tolerance in feature.geometric:
-                for letter in [letter for place in tolerance.system for letter in place]:
+                for letter in [letter for compartment in tolerance.system for letter in compartment]:
                     if letter not in letters:
-                        known = ", ".join(sorted(letters)) or "none"
+                        datums = ", ".join(sorted(set(letters))) or "none"
                         yield (
                             f'part "{part.name}": feature "{feature.name}" ({feature.declared_at}): {tolerance.kind} refers to '
-                            f"datum {letter}, which no feature of the part is; its datums are: {known}; "
+                            f"datum {letter}, which no feature of the part is; its datums are: {datums}; "
                             f'declare it with part.feature(..., datum="{letter}")'
                         )
 
     def _location_faults(self, part: Part) -> Iterator[str]:
-        own = self.location_of(part)
-        if own is not None and own.floating:
-            if not any(part in (pair.moving.part, pair.reference.part) for pair in self._pairs):
+        location = self.location_of(part)
+        if location is not None and location.floating:
+            if not any(part in (pair.moving.part, pair.reference.part) for pair in self.pairs):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
-        count = sum(location.part is part for location in self._locations)
+        count = sum(location.part is part for location in self.locations)
         if count > 1:
             yield f"it is located {count} times; locate it once"
         if count == 0 and part.fixed is not True:
             yield "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
-        seen: list[Part] = []
-        below: Part | None = part
-        while below is not None:
-            if below in seen:
-                yield f"it is located on itself, through {' on '.join(p.name for p in seen)}; break the circle"
+        chain: list[Part] = []
+        support: Part | None = part
+        while support is not None:
+            if support in chain:
+                yield f"it is located on itself, through {' on '.join(link.name for link in chain)}; break the circle"
                 return
-            seen.append(below)
-            location = self.location_of(below)
-            below = location.on if location else None
+            chain.append(support)
+            location = self.location_of(support)
+            support = location.on if location else None
 
-    def _strangers(self, who: str, line: str, *parts: Part | None) -> Iterator[str]:
+    def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:
-            if part is not None and not any(part is own for own in self._parts):
-                known = ", ".join(own.name for own in self._parts) or "none"
-                yield (f'{who} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {known}')
+            if part is not None and not any(part is member for member in self.parts):
+                names = ", ".join(member.name for member in self.parts) or "none"
+                yield f'{label} ({line}): unknown part "{getattr(part, "name", part)}"; the parts of "{self.name}" are: {names}'
 
     def __str__(self) -> str:
-        rows = [
-            *self._parts,
-            *self.features,
-            *self._variables,
-            *self._correlations,
-            *self._populations,
-            *self._locations,
-            *self._pairs,
-            *self._forces,
-            *self._measures,
-        ]
+        causes = *self.variables, *self.correlations, *self.populations
+        rows = *self.parts, *self.features, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 
-def _expect(what: str, value: Any, kind: Any, wanted: str) -> None:
+def is_free(assembly: Assembly, part: Part) -> bool:
+    """Return True if contact may move the part.
+
+    Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators.
+    """
+    if part.fixed is not None:
+        return not part.fixed
+    location = assembly.location_of(part)
+    floats = location is not None and location.floating
+    return floats or any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
+
+
+def has_supports(assembly: Assembly, part: Part) -> bool:
+    """Return True if a locator of the part is one-sided."""
+    location = assembly.location_of(part)
+    return location is not None and isinstance(location.scheme, tuple) and any(pin.one_sided for pin in location.scheme)
+
+
+def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
+    """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself."""
+    location = assembly.location_of(part)
+    supports = movers(assembly, location.on) if location and location.on else ()
+    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or has_supports(assembly, part)
+    return (*supports, part) if touches and is_free(assembly, part) else supports
+
+
+def _expect(label: str, value: Any, kind: Any, expected: str) -> None:
     """Raise TypeError at the script's own line if an argument has a type that no other check could handle."""
     if not isinstance(value, kind):
-        raise TypeError(f"{what} is a {type(value).__name__}; expected {wanted}")
+        raise TypeError(f"{label} is a {type(value).__name__}; expected {expected}")
 
 
-def _named(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:
-    where = line or thing.declared_at
-    return (f'{kind} "{thing.name}"{f" ({where})" if where else ""}: {fault}' for fault in faults)
+def _located(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:
+    """Return faults that begin with the name and the script line of a declaration."""
+    line = line or thing.declared_at
+    return (f'{kind} "{thing.name}"{f" ({line})" if line else ""}: {fault}' for fault in faults)

@@ -1,4 +1,4 @@
-"""Codecs: how a value stands in a document of plain values (dicts, lists, numbers, texts), and how it is read from there.
+"""Codecs: they write values into documents of plain values (dicts, lists, numbers, texts), and read them.
 
 A `Record` follows from a class: the names, the types and the defaults of its fields stand in that class alone. msgspec checks
 the structure of an entry and describes it as JSON schema; `faults()` of the class checks its values. Nothing is converted, and
@@ -21,7 +21,7 @@ from tolcontact.errors import TolcontactError
 
 
 class Codec:
-    """How values of a class are written and read. `wire` is the type of their entries for msgspec."""
+    """The writing and reading of the values of a class. `wire` is the type of their entries for msgspec."""
 
     wire: Any = Any
     cls: Any = object
@@ -35,19 +35,19 @@ class Codec:
         raise NotImplementedError
 
     def fits(self, entry: Any) -> bool:
-        """Whether an entry is meant to be of this kind."""
+        """Return True for an entry that has the outline of this kind."""
         return True
 
     def holds(self, value: Any) -> bool:
-        """Whether a value is of this kind."""
+        """Return True for a value of this kind."""
         return isinstance(value, self.cls)
 
 
 class Plain(Codec):
     """Numbers, texts and truth values, and tuples and mappings of them. Numbers are finite; whole ones stay whole.
 
-    write   gives the entry of a value, if that is not the value itself
-    read    gives the value of a sound entry, likewise
+    write   returns the entry of a value; by default the value itself
+    read    returns the value of a valid entry; by default the entry itself
     """
 
     def __init__(
@@ -95,7 +95,7 @@ def _wire(annotation: Any) -> Any:
 
 
 class Items(Codec):
-    """Lists of things of one kind; of `count` things, if that is not 0."""
+    """Lists of things of one kind; `count` is their length, or 0 for any length."""
 
     cls = tuple
 
@@ -132,7 +132,7 @@ class Named(Codec):
 
 
 class Choice(Named):
-    """One of several kinds: entries that the first fitting codec reads."""
+    """One of several kinds; the first fitting codec reads an entry."""
 
     def __init__(self, name: str, expected: str, *codecs: Codec) -> None:
         super().__init__(name)
@@ -153,11 +153,11 @@ class Choice(Named):
 
 @dataclass(frozen=True)
 class Inline:
-    """A field whose value stands under some of several keys of its record.
+    """A field whose value is spread over several keys of its record.
 
-    keys     their types for msgspec
-    encode   gives the entries of a thing under these keys
-    decode   gives the value of the field from these entries; UNSET leaves it to the class
+    keys     types of the keys, for msgspec
+    encode   returns the entries of a thing under these keys
+    decode   returns the value of the field from these entries; UNSET leaves it to the class
     """
 
     keys: Mapping[str, Any]
@@ -176,7 +176,7 @@ class Field:
     is_omitted: bool  # if it has its default value
 
     def value(self, thing: Any) -> Any:
-        """Return what a thing has there."""
+        """Return the value of a thing in this field."""
         return getattr(thing, self.names[0]) if len(self.names) == 1 else tuple(getattr(thing, name) for name in self.names)
 
 
@@ -185,9 +185,9 @@ class Record(Named):
 
     keys     in the order of the document: "name", "key=field", "key=field+field" for a list of several fields; "name?" is
              left out if it has its default value
-    kind     what an entry has under "kind"
-    mark     a key that tells these entries from others
-    codecs   of fields whose type does not tell theirs
+    kind     value of an entry under "kind"
+    mark     key that distinguishes these entries from others
+    codecs   codecs of fields whose type does not determine them
     """
 
     def __init__(
@@ -197,12 +197,12 @@ class Record(Named):
         self.cls, self.kind, self.mark = cls, kind, mark
         parameters, hints = inspect.signature(cls).parameters, get_type_hints(cls, include_extras=True)
         self.fields = []
-        for word in keys.split():
-            key, _, joined = word.removesuffix("?").partition("=")
+        for token in keys.split():
+            key, _, joined = token.removesuffix("?").partition("=")
             names = tuple((joined or key).split("+"))
             codec = codecs.get(key) or _codec_of(*(hints[name] for name in names))
             default = parameters[names[0]].default if names[0] in parameters else inspect.Parameter.empty
-            self.fields.append(Field(key, names, codec, default, word.endswith("?")))
+            self.fields.append(Field(key, names, codec, default, token.endswith("?")))
         self.struct = msgspec.defstruct(self.name, list(self._struct_fields()), forbid_unknown_fields=True, kw_only=True)
 
     def _struct_fields(self) -> Iterator[tuple[str, Any] | tuple[str, Any, Any]]:
@@ -268,7 +268,7 @@ class Record(Named):
 
 
 class Optional(Codec):
-    """Things that an entry has, or null."""
+    """Things that may be missing: their entry is then null."""
 
     def __init__(self, codec: Codec) -> None:
         self.codec, self.wire = codec, codec.wire | None

@@ -12,14 +12,14 @@ VERTICES = "vertices"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactPair(Readable):
-    """Points of the `moving` face are kept outside the `reference` face.
+    """Two faces that may touch: points of the `moving` face stay outside the `reference` face.
 
-    The points are `points` of them spread evenly, or as many as keep every spot of the face within `spacing` [mm] of
-    one, or the mesh's own vertices (`points="vertices"`). By default they are 200 spread evenly, with the
-    corners of the region where flat faces overlap, and on curved faces as many more as curvature requires; a ball or a shaft
-    beside walls touches exactly, with none of them.
-    A point takes part when the reference face lies within `within` [mm] of it in the nominal assembly (None: a tenth of
-    the moving part's diagonal).
+    points    the number of points, spread evenly, or "vertices" for the vertices of the mesh. By default 200 points, the
+              corners of the region where flat faces overlap, and more points on curved faces as their curvature requires; a
+              ball or a shaft against walls needs no points
+    spacing   [mm] largest distance of a spot of the face from a point, in place of a number of points
+    within    [mm] a point takes part if the reference face is this near in the nominal assembly; by default a tenth of the
+              diagonal of the moving part
     """
 
     name: str
@@ -37,10 +37,10 @@ class ContactPair(Readable):
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
         if self.points not in (None, VERTICES) and not (type(self.points) is int and self.points >= 1):
             yield f'points is {self.points!r}; expected a whole number, 1 or above, or "{VERTICES}"'
-        for word in ("spacing", "within"):
-            length = getattr(self, word)
+        for option in ("spacing", "within"):
+            length = getattr(self, option)
             if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):
-                yield f"{word} is {length!r}; expected a length in mm above 0"
+                yield f"{option} is {length!r}; expected a length in mm above 0"
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 
@@ -48,6 +48,6 @@ class ContactPair(Readable):
         if self.spacing is not None:
             points = f"spacing {self.spacing:g} mm"
         else:
-            said = VERTICES if self.points == VERTICES else f"{self.points} points"
-            points = "points by geometry" if self.points is None else said
+            count = VERTICES if self.points == VERTICES else f"{self.points} points"
+            points = "points by geometry" if self.points is None else count
         return f"contact {self.name}: {self.moving} (moving) against {self.reference} (reference), {points}"

@@ -1,4 +1,4 @@
-"""What makes deviations vary together: shared causes, correlation, and measured populations.
+"""Dependence between deviations: shared causes, correlations, and measured populations.
 
 Contributors are named by labels: "part.locator", "part.feature.freedom" ("cover.H1.size"), or the name of a variable.
 """
@@ -17,12 +17,15 @@ from tolcontact.declaration.vectors import is_length
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
-DEFINITE = 1e-12  # smallest eigenvalue of a correlation matrix
+MIN_EIGENVALUE = 1e-12  # of a correlation matrix
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Variable(Readable):
-    """A cause that several contributors share: each deviates by its own draw, and by `drives[label]` times this variable."""
+    """A cause that drives several contributors: `drives[label]` times its deviation is added to the draw of each.
+
+    `units` are those of the variable; a factor converts them to the units of its contributor.
+    """
 
     name: str
     tolerance: Tolerance
@@ -47,7 +50,7 @@ class Variable(Readable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Correlation(Readable):
-    """Contributors whose draws are correlated: a Gaussian copula with this matrix, which leaves their distributions alone."""
+    """A correlation of contributors: a Gaussian copula with this matrix, which leaves their distributions unchanged."""
 
     labels: tuple[str, ...]
     matrix: tuple[tuple[float, ...], ...]
@@ -69,9 +72,9 @@ class Correlation(Readable):
             yield f"its matrix is not {count} x {count} finite numbers, one row for each contributor"
         elif not (np.allclose(matrix, matrix.T, atol=1e-12) and np.allclose(np.diag(matrix), 1, atol=1e-12)):
             yield "its matrix is not symmetric with ones on the diagonal; expected correlation coefficients, not covariances"
-        elif (least := float(np.linalg.eigvalsh(matrix).min())) < DEFINITE:
+        elif (smallest := float(np.linalg.eigvalsh(matrix).min())) < MIN_EIGENVALUE:
             yield (
-                f"its matrix is not positive definite (smallest eigenvalue {least:.3g}): nothing is correlated like "
+                f"its matrix is not positive definite (smallest eigenvalue {smallest:.3g}): nothing is correlated like "
                 "that; check the signs, or make the coefficients smaller"
             )
 
@@ -81,11 +84,11 @@ class Correlation(Readable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Population(Readable):
-    """Measured parts: rows of deviations, drawn whole with replacement, so that their correlation stays.
+    """Measured parts: whole rows of deviations are drawn with replacement, which preserves their correlation.
 
     columns   labels of the contributors
     values    (row, column), in the units of the contributors
-    source    where they are from
+    source    the file or the kind of table
     """
 
     columns: tuple[str, ...]
@@ -105,27 +108,27 @@ class Population(Readable):
         elif len(self.values) < 2:
             yield f"it has {len(self.values)} row(s); a population needs two or more"
         for column, label in enumerate(self.columns[: self.values.shape[1]] if self.values.ndim == 2 else ()):
-            wrong = [row for row, value in enumerate(self.values[:, column]) if not np.isfinite(value)]
-            if wrong:
-                yield f"row {wrong[0] + 1} of the column for {label} is no finite number; mend the table, or leave out the row"
+            gaps = [row for row, value in enumerate(self.values[:, column]) if not np.isfinite(value)]
+            if gaps:
+                yield f"row {gaps[0] + 1} of the column for {label} is no finite number; mend the table, or leave out the row"
 
     def __str__(self) -> str:
         return f"population {self.source}: {len(self.values)} rows of {', '.join(self.columns)}"
 
 
 def population(source: Any, columns: Mapping[str, str] | None, declared_at: str) -> Population:
-    """A Population from a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
+    """Return the Population of a CSV file, a DataFrame, an xarray Dataset of one dimension, or a mapping of columns.
 
-    `columns` says for each contributor what its column is called there; by default as the contributor. What is no number
-    becomes NaN, and a fault of the population. Raises ValueError for a table that cannot be read, or a column it has not.
+    `columns` maps the label of each contributor to the name of its column; by default the two are equal. Entries that are not
+    numbers become NaN, and a fault of the population. Raises ValueError for an unreadable table or a missing column.
     """
     pd = importlib.import_module("pandas")
     if isinstance(source, str | Path):
-        said = shown(Path(source).name)
+        title = shown(Path(source).name)
         try:
             table = pd.read_csv(source)
         except (OSError, ValueError) as error:
-            raise ValueError(f'population "{said}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
+            raise ValueError(f'population "{title}" cannot be read as CSV: {str(error).splitlines()[0]}') from error
     else:
         try:
             table = source.to_dataframe() if hasattr(source, "to_dataframe") else pd.DataFrame(source)
@@ -134,20 +137,20 @@ def population(source: Any, columns: Mapping[str, str] | None, declared_at: str)
                 f"a population is a {type(source).__name__} that is no table ({error}); expected a CSV file, a DataFrame, a "
                 "Dataset, or columns of equal length by name"
             ) from error
-        said = f"of {len(table)} rows"
-    wanted = dict(columns) if columns is not None else {str(name): name for name in table.columns}
-    missing = [name for name in wanted.values() if name not in table.columns]
+        title = f"of {len(table)} rows"
+    names = dict(columns) if columns is not None else {str(name): name for name in table.columns}
+    missing = [name for name in names.values() if name not in table.columns]
     if missing:
         raise ValueError(
-            f'population "{said}" has no column {missing[0]!r}; its columns are: {", ".join(map(str, table.columns))}'
+            f'population "{title}" has no column {missing[0]!r}; its columns are: {", ".join(map(str, table.columns))}'
         )
-    numbers = [pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float) for name in wanted.values()]
+    numbers = [pd.to_numeric(table[name], errors="coerce").to_numpy(dtype=float) for name in names.values()]
     values = np.column_stack(numbers) if numbers else np.empty((len(table), 0))
-    return Population(tuple(wanted), values, said, declared_at)
+    return Population(tuple(names), values, title, declared_at)
 
 
 def correlation(labels: Sequence[str], matrix: Any, declared_at: str) -> Correlation:
-    """A Correlation; `matrix` may be an array, or one coefficient for two contributors."""
+    """Return the Correlation of contributors; `matrix` may be an array, or one coefficient for two of them."""
     if is_length(matrix):
         matrix = [[1.0, matrix], [matrix, 1.0]]
     try:

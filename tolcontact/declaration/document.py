@@ -1,6 +1,6 @@
-"""The document of an assembly: what an archive keeps of a model, and what a JSON model says.
+"""The document of an assembly, as an archive stores it and as a JSON model states it.
 
-The two differ in three things. An archive has faces as triangles, meshes beside the document, and nothing is left out of it.
+An archive differs in three ways: its faces are triangles, its meshes stand beside the document, and it states all defaults.
 """
 
 from collections.abc import Callable, Mapping
@@ -78,7 +78,7 @@ def _distribution_entries(thing: Any, writing: Writing) -> Document:
 
 
 def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
-    """Return the distribution that is named, or the one of scipy.stats."""
+    """Return the name of a distribution, or a frozen distribution of scipy.stats."""
     if "scipy" not in entries:
         for key in {"args", "kwds"} & set(entries):
             raise place[key].error('it goes with "scipy"; leave it out')
@@ -92,7 +92,7 @@ def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
     keywords = KEYWORDS.decode(entries.get("kwds", {}), place["kwds"])
     try:
         return family(*positional, **keywords)
-    except (TypeError, ValueError) as error:  # parameters that it does not have
+    except (TypeError, ValueError) as error:  # unknown parameters
         raise place.error(f"scipy.stats.{name}: {error}") from error
 
 
@@ -111,7 +111,7 @@ def _measured(entries: Mapping[str, Any], place: Place) -> Point | Tape:
 
 
 def _tolerance_record(cls: Any) -> Record:
-    """Return the record of a geometric tolerance: its width, and what is not at its default."""
+    """Return the record of a geometric tolerance: its width, and all fields that differ from their defaults."""
     keys = ["width", *(f"{member.name}?" for member in fields(cls) if member.name != "width")]
     return Record(
         cls, " ".join(keys), kind=cls.kind, width=Plain(NOT_NEGATIVE),
@@ -175,7 +175,7 @@ FEATURES = Inline(
     lambda part, writing: {"features": [FEATURE.encode(feature, writing) for feature in part.features]},
     lambda entries, place: UNSET,
 )
-LISTS = {
+RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
     "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
     "pairs": Record(
@@ -196,9 +196,9 @@ LISTS = {
     "populations": Record(Population, "values columns source declared_at"),
 }  # fmt: skip
 DOCUMENT = msgspec.defstruct("Document", [
-    ("name", str), ("parts", Items(LISTS["parts"]).wire), ("measures", Items(LISTS["measures"]).wire),
+    ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
-    *((name, Items(record).wire, []) for name, record in LISTS.items() if name not in ("parts", "measures")),
+    *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
 
@@ -207,14 +207,14 @@ def to_document(
 ) -> Document:
     """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
     writing = Writing(triangles, tapes, folder)
-    lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in LISTS.items()}
+    lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
     return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **lists}
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
     """Return the assembly of an archive's document; `meshes` holds a mesh (vertices and faces) for each mesh part.
 
-    Raises ArchiveError for a document that `to_document` cannot have made. Nothing in it is run.
+    Raises ArchiveError for a document that `to_document` cannot have written. No code in it is run.
     """
     try:
         return assembly_of(document, Sources(meshes))
@@ -227,7 +227,7 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     place = Place(sources)
     struct = place.converted(document, DOCUMENT)
     for k, entry in enumerate(struct.parts):
-        part = LISTS["parts"].decode(entry, place["parts"][k])
+        part = RECORDS["parts"].decode(entry, place["parts"][k])
         if part.name in sources.parts:
             raise place["parts"][k]["name"].mismatch("a name that no other part has", part.name)
         sources.parts[part.name] = part
@@ -236,14 +236,14 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         part.add(*Items(FEATURE).decode(entry.get("features", []), place["parts"][k]["features"], part=part))
 
     things: dict[str, Any] = {"parts": parts}
-    for name in [name for name in LISTS if name not in ("parts", "measures")]:
-        things[name] = Items(LISTS[name]).decode(getattr(struct, name), place[name])
+    for name in [name for name in RECORDS if name not in ("parts", "measures")]:
+        things[name] = Items(RECORDS[name]).decode(getattr(struct, name), place[name])
     locators = sum(len(location.scheme) if isinstance(location.scheme, tuple) else 6 for location in things["locations"])
     deviations = locators + MAX_FREEDOMS * sum(len(part.features) for part in parts) + len(things["variables"])
     sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
-    things["measures"] = Items(LISTS["measures"]).decode(struct.measures, Place(sources)["measures"])
+    things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
-    assembly = Assembly.of(struct.name, method, **things)
-    for fault in assembly.faults():  # a model that has any is not archived
+    assembly = Assembly(struct.name, method=method).replaced(**things)
+    for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly

@@ -1,4 +1,4 @@
-"""Entries of faces and their criteria, and of the values that all entries consist of: directions, numbers, references."""
+"""Entries of faces and their criteria, and of the values in all entries: directions, numbers, references."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping
@@ -25,7 +25,7 @@ MAX_INDEX = 2**31 - 1  # of triangles, points, faces
 
 @dataclass(frozen=True)
 class Writing:
-    """What a document is written with.
+    """The data for writing a document.
 
     triangles   the indices of the triangles of a face
     tapes       the steps of the users' own expressions, by measure
@@ -82,7 +82,7 @@ def floats(value: Any, writing: Writing) -> Any:
 
 
 def indices_of(value: Any, place: Place) -> Any:
-    """Return indices, or what else stands for them. Raises EntryError for one that no triangle, point or face can have."""
+    """Return indices, or an entry in their place. Raises EntryError for an index out of range."""
     for k, index in enumerate(value) if isinstance(value, tuple) else [(None, value)]:
         if isinstance(index, int) and not 0 <= index <= MAX_INDEX:
             raise (place if k is None else place[k]).mismatch(f"a whole number from 0 to {MAX_INDEX}", index)
@@ -153,9 +153,9 @@ class Faces(Named):
                 "select": [_criterion(value, criterion, writing) for criterion in value.selections],
             }
         boxes = [[box.lower, box.upper] for box in value.selections if isinstance(box, Inside)]
-        others = [criterion for criterion in value.selections if not isinstance(criterion, Inside)]
-        is_axis = len(others) == 1 and AXIS.holds(others[0])
-        triangles = {"direction": str(others[0])} if is_axis else {"triangles": writing.triangles(value)}
+        criteria = [criterion for criterion in value.selections if not isinstance(criterion, Inside)]
+        is_axis = len(criteria) == 1 and AXIS.holds(criteria[0])
+        triangles = {"direction": str(criteria[0])} if is_axis else {"triangles": writing.triangles(value)}
         return {"part": value.part.name, **triangles, "inside": boxes}
 
     def decode(self, entry: Any, place: Place, **arguments: Any) -> Face:
@@ -172,7 +172,7 @@ class Faces(Named):
 
 
 def _criterion(face: Face, criterion: Any, writing: Writing) -> Any:
-    """Return the entry of a criterion; what a function picks are triangles."""
+    """Return the entry of a criterion; a function is replaced by the triangles that it picks."""
     if isinstance(criterion, Picked):
         criterion = Triangles(tuple(map(int, writing.triangles(Face(face.part, (criterion,))))))
     return CRITERION.encode(criterion, writing)

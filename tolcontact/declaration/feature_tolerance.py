@@ -26,8 +26,8 @@ class Size(Readable):
     """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
 
     `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` has 8.05 and 8.15. Sizes vary about the
-    middle of the limits by `distribution` (see tc.Tolerance). Of two planes `moves` chooses those that move with the size:
-    "both" by a half each, or the "first" or "second" alone.
+    middle of the limits by `distribution` (see tc.Tolerance). `moves` states which of two planes moves with the size:
+    "both" by half each, or the "first" or "second" alone.
     """
 
     kind: ClassVar[str] = "size"
@@ -88,8 +88,9 @@ class GeometricTolerance(Readable):
                 which equal the width
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
 
-    A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. Of zone, along, material, projected
-    and outside it has those in `options`. `is_form` says that it limits form alone. `features/tolerance_kinds.py` has its zone.
+    A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
+    zone, along, material, projected and outside that it accepts. `is_form` is True for a kind that limits form alone.
+    `features/tolerance_kinds.py` defines the zones.
     """
 
     kind: ClassVar[str] = ""
@@ -112,7 +113,7 @@ class GeometricTolerance(Readable):
 
     @property
     def system(self) -> tuple[tuple[str, ...], ...]:
-        """The letters of the datum system: for each compartment one, or those of a common datum."""
+        """The letters of the datum system: one for each compartment, or several for a common datum."""
         matches = [COMPARTMENT.fullmatch(compartment) for compartment in self._compartments]
         return tuple(tuple(match.group(1).split("-")) for match in matches if match)
 

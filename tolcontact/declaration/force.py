@@ -1,4 +1,4 @@
-"""Positioning forces: gravity, clamps, whatever presses a part onto its supports."""
+"""Positioning forces: gravity, clamps, and others that press a part onto its supports."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

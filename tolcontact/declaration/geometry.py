@@ -36,11 +36,11 @@ UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  
 class Mesh(Readable):
     """A triangle surface: a file (STL, OBJ, PLY, GLB, STEP), or a `trimesh.Trimesh`. Normals point outward.
 
-    `units` ("mm", "in", ...) are those of the source. Without it a STEP file states its own, a GLB file is in m, `mesh.units`
-    of a Trimesh applies if it is set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
-    2 um, 5e-6 of the extent of files beyond 0.4 m, and coarser if that is too many), and keep their boundary representation for
-    `tc.Brep`; that needs the extra `tolcontact[step]`. Of a STEP file with several bodies, `body` is the name or the number
-    (from 1) of one, which is read in its own frame; the only body of a file is read where it stands.
+    `units` ("mm", "in", ...) are those of the source. By default a STEP file states its own, a GLB file is in m, a Trimesh has
+    its `units` if they are set, and all others are in mm. STEP faces are triangulated to within `chord` [mm] (by default
+    2 um, or 5e-6 of the extent of files beyond 0.4 m, and coarser if that gives too many triangles). They keep their boundary
+    representation for `tc.Brep`; this needs the extra `tolcontact[step]`. `body` is the name or the number (from 1) of a body
+    in a STEP file with several, which is read in its own frame; the only body of a file is read where it stands.
     """
 
     source: Any

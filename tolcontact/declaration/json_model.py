@@ -22,8 +22,8 @@ SCHEMA_NAME = "model.schema.json"
 def read_json(path: Path) -> Assembly:
     """Return the assembly that a JSON file declares; files of shapes are named from its folder.
 
-    What a script would leave out may be left out. Raises ScriptError, which states the place in the file, for a file of
-    another structure.
+    Defaults may be left out, as in a script. Raises ScriptError, which states the place in the file, for a file of another
+    structure.
     """
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
@@ -36,9 +36,9 @@ def read_json(path: Path) -> Assembly:
 
 
 def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> None:
-    """Write what an assembly declares as JSON; `triangles` gives those of faces that a function picks.
+    """Write the declarations of an assembly as JSON; `triangles` returns the triangles of a face that a function picks.
 
-    Raises ScriptError for a shape that no file holds.
+    Raises ScriptError for a shape that is not in a file.
     """
     for part in assembly.parts:
         if isinstance(part.geometry, Mesh) and not isinstance(part.geometry.source, str | Path):

@@ -1,4 +1,4 @@
-"""Locators: where a part is held, in which direction, and how much that varies."""
+"""Locators of parts, 3-2-1 schemes, and the locations that consist of them."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,12 +18,12 @@ from tolcontact.readable import Readable
 
 @dataclass(frozen=True, repr=False)
 class Locator(Readable):
-    """A point of a part [mm], a direction into the part, and the deviation along it; in the part's own frame.
+    """A point of a part [mm], a direction into the part, and the deviation along it, in the part's own frame.
 
-    A positive deviation moves the part along `direction`. `tolerance=None` takes that of the `locate` call. A
-    `one_sided` locator is a support: the part may lift off it along `direction`, and may not pass through it.
-    `stiffness` [N/mm] is used by the objective "locator stiffness". A locator `on` a feature of its part stands against it,
-    and moves the part as far as the feature deviates there.
+    A positive deviation moves the part along `direction`. `tolerance=None` takes the tolerance of the `locate` call. A
+    `one_sided` locator is a support: the part may lift off it along `direction`, but not pass through it. The objective
+    "locator stiffness" uses `stiffness` [N/mm]. A locator `on` a feature of its part touches this feature, and also moves the
+    part by the deviation of the feature at the point.
     """
 
     name: str
@@ -75,10 +75,10 @@ class Locator(Readable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ThreeTwoOne(Readable):
-    """A 3-2-1 scheme on three faces; its six points follow from the faces once their geometry is known.
+    """A 3-2-1 scheme on three faces; its six points follow from their geometry.
 
-    A1, A2 on the primary face beside the secondary one, `inset` from its ends; A3 opposite, half way; B1, B2 on the
-    secondary face at the same two stations, half way up; C1 in the middle of the tertiary face.
+    A1 and A2 lie on the primary face near the secondary one, `inset` [mm] from its ends, and A3 opposite, half way between
+    them. B1 and B2 lie on the secondary face at the same two stations, half way up. C1 is the middle of the tertiary face.
     """
 
     primary: Face
@@ -103,15 +103,16 @@ class ThreeTwoOne(Readable):
 def three_two_one(
     primary: Face | Feature, secondary: Face | Feature, tertiary: Face | Feature, *, inset: float = 0.0
 ) -> ThreeTwoOne:
-    """A 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne)."""
+    """Return a 3-2-1 locating scheme: three points on `primary`, two on `secondary`, one on `tertiary` (see ThreeTwoOne)."""
     return ThreeTwoOne(face_of(primary), face_of(secondary), face_of(tertiary), inset)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Location(Readable):
-    """How one part is located: its locators, their common tolerance, and what they are attached to (None: the ground).
+    """The location of a part: its locators, their common tolerance, and the part that they are `on` (None: the ground).
 
-    A `floating` part has fewer of them: what they leave open keeps its nominal value in the raw state, and contact decides it.
+    A `floating` part has fewer than six locators. The directions that they leave open are nominal in the raw state, and
+    contact determines them.
     """
 
     part: Part
@@ -123,7 +124,7 @@ class Location(Readable):
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
-        """The parts that the faces of its scheme refer to."""
+        """The parts to which the faces of the scheme refer."""
         faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()
         return tuple(part for face in faces for part in face.parts)
 
@@ -178,11 +179,11 @@ class Location(Readable):
 
 
 def _repeating(locators: list[Locator]) -> list[Locator]:
-    """Those that hold nothing which the ones before them do not hold."""
+    """Return the locators whose constraint depends linearly on those of earlier locators."""
     points = np.array([locator.point for locator in locators])
     arms = points - points.mean(axis=0)
     arms /= np.abs(arms).max() or 1.0
     directions = np.array([locator.direction for locator in locators])
     rows = np.nan_to_num(np.hstack([directions, np.cross(arms, directions)]))
     ranks = [0, *(int(np.linalg.matrix_rank(rows[: k + 1], tol=1e-6)) for k in range(len(rows)))]
-    return [locator for locator, before, after in zip(locators, ranks, ranks[1:], strict=False) if after == before]
+    return [locator for locator, rank, next_rank in zip(locators, ranks, ranks[1:], strict=False) if next_rank == rank]

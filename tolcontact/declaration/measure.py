@@ -13,15 +13,15 @@ from tolcontact.readable import Readable
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Measure(Readable):
-    """A number taken from the poses of the parts.
+    """A number that follows from the poses of the parts.
 
-        of one Point                how far it moved from its nominal place, along `along` [mm]; its coordinate, if `absolute`
-        of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush); how far that is
-                                    from the nominal one, if `absolute` is False
+        of one Point                its displacement from its nominal place, along `along` [mm]; its coordinate, if `absolute`
+        of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush); its deviation
+                                    from the nominal distance, if `absolute` is False
         of a function               the CasADi expression that the function returns for the symbolic poses
 
-    `limits` are the least and the largest allowed value of this number; None leaves a side open. `tolerance` is short for
-    limits that lie half of it below and above the nominal value.
+    `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits at half
+    of it below and above the nominal value.
     """
 
     name: str
@@ -36,12 +36,12 @@ class Measure(Readable):
 
     @property
     def points(self) -> tuple[Point, ...]:
-        """The declared points; none for an expression."""
+        """The declared points; empty for an expression."""
         return tuple(point for point in (self.of, self.to) if isinstance(point, Point))
 
     @property
     def quantity(self) -> str:
-        """What it is a value of."""
+        """The quantity that is measured: a displacement, a coordinate, a distance, its deviation, or an expression."""
         if not isinstance(self.of, Point):
             return "expression"
         if self.to is None:
@@ -50,14 +50,14 @@ class Measure(Readable):
 
     @property
     def width(self) -> float | None:
-        """Of the allowed zone; None if a side is open."""
+        """The width of the allowed zone; None if a side is open."""
         if self.limits is None:
             return self.tolerance
         lower, upper = self.limits
         return None if lower is None or upper is None else float(upper - lower)
 
     def bounds(self, nominal: float) -> tuple[float, float]:
-        """Least and largest allowed value, given the nominal one; infinite on an open side."""
+        """Return the smallest and the largest allowed value around the nominal one; infinite on an open side."""
         if self.limits is not None:
             lower, upper = self.limits
             return -math.inf if lower is None else lower, math.inf if upper is None else upper
@@ -97,26 +97,26 @@ class Measure(Readable):
     def _limits_faults(self) -> Iterator[str]:
         if self.tolerance is not None:
             yield "it has both a tolerance and limits; give one of them"
-        said = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
+        fault = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
         if not (isinstance(self.limits, tuple) and len(self.limits) == 2):
-            yield said
+            yield fault
             return
-        given = [limit for limit in self.limits if limit is not None]
-        if not given or not all(map(is_length, given)) or (len(given) == 2 and not given[0] < given[1]):
-            yield said
+        limits = [limit for limit in self.limits if limit is not None]
+        if not limits or not all(map(is_length, limits)) or (len(limits) == 2 and not limits[0] < limits[1]):
+            yield fault
 
     def __str__(self) -> str:
         along = "" if self.along is None else " along ({:g}, {:g}, {:g})".format(*self.along)
         if self.to is not None:
-            what = f"distance {self.of} to {self.to}{along}"
+            subject = f"distance {self.of} to {self.to}{along}"
         else:
-            what = f"{self.of}{along}" if isinstance(self.of, Point) else "expression of the poses"
+            subject = f"{self.of}{along}" if isinstance(self.of, Point) else "expression of the poses"
         if isinstance(self.of, Point) and self.absolute is not None:
-            what = f"{self.quantity}, {what}"
-        return f"measure {self.name}: {what}{self._limited}"
+            subject = f"{self.quantity}, {subject}"
+        return f"measure {self.name}: {subject}{self._limit_text}"
 
     @property
-    def _limited(self) -> str:
+    def _limit_text(self) -> str:
         if self.limits is None:
             return "" if self.tolerance is None else f", tolerance {self.tolerance:g} {self.units}"
         lower, upper = self.limits

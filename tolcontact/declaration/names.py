@@ -1,4 +1,4 @@
-"""What a declared thing may be called."""
+"""Checks of the names of declarations."""
 
 import re
 import unicodedata
@@ -12,14 +12,14 @@ _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
 
 def text_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
-    """What is wrong with names that are only shown."""
+    """Yield the faults of names that are only shown."""
     for name in dict.fromkeys(names):
         if not is_line(name):
             yield f"{kind} {name!r}: a name must be text without control characters (the archive uses it)"
 
 
 def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
-    """What is wrong with names by which the archive keeps things apart."""
+    """Yield the faults of names that identify things in the archive."""
     for name in dict.fromkeys(names):
         if not (is_line(name) and _KEY.fullmatch(name)):
             yield (
@@ -30,7 +30,7 @@ def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
 
 
 def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:
-    """Names that are given more than once. The same letters are the same name, however they are composed."""
+    """Yield a fault for each name that occurs more than once. Names are compared in the Unicode form NFC."""
     composed = Counter(unicodedata.normalize("NFC", name) for name in names if isinstance(name, str))
     for name, count in composed.items():
         if count > 1:
@@ -38,5 +38,5 @@ def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:
 
 
 def is_line(text: Any) -> bool:
-    """Whether it is a text of one line that can be printed without steering a terminal."""
+    """Return True for a text of one line without characters that control a terminal."""
     return isinstance(text, str) and not (STEERING.search(text) or "\t" in text or "\n" in text)

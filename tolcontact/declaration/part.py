@@ -1,4 +1,4 @@
-"""Parts, and what other declarations pick from them: faces, named features, points."""
+"""Parts, and their faces, features and points, to which other declarations refer."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -17,9 +17,9 @@ LETTER = re.compile(r"[A-Z]{1,2}")
 class Part(Readable):
     """A rigid body: its shape, its place in the nominal assembly, and whether contact may move it.
 
-    Its own coordinates `p` lie at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation
-    vector [rad], `at` a position [mm]. `fixed=None` leaves the choice to the model: a part that is the moving side of
-    a contact pair, or that has one-sided locators, is free; any other is fixed.
+    A point `p` of the part lies at `rotation * p + at` in the nominal assembly frame; `rotation` is a rotation vector [rad],
+    `at` a position [mm]. With `fixed=None` a part is free if it is the moving side of a contact pair, floats, or has
+    one-sided locators; otherwise it is fixed.
     """
 
     name: str
@@ -48,7 +48,7 @@ class Part(Readable):
         return self._features[-1]
 
     def add(self, *features: "Feature") -> None:
-        """Add features of this part that have been declared already."""
+        """Add declared features to this part."""
         self._features.extend(features)
 
     def point(self, x: float, y: float, z: float) -> "Point":
@@ -98,9 +98,9 @@ class Face(Readable):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Point(Readable):
-    """A point of a part, in the part's own frame [mm]; one `on` a feature moves with it when it deviates.
+    """A point of a part, in the part's own frame [mm]; a point `on` a feature moves with the deviation of the feature.
 
-    An `end` (0 or 1) of the feature's axis takes the place of a position.
+    An `end` (0 or 1) of the feature's axis may replace the position.
     """
 
     part: Part
@@ -127,7 +127,7 @@ class Point(Readable):
 class Feature(Readable):
     """A face of a part, or two that are opposed (a slot, a tab, a thickness), with a name and its tolerances.
 
-    It serves wherever a face or a point does. Whatever touches, holds or measures it goes with its one deviation, which is
+    A feature may be used in place of a face. Contact, locators and measures on a feature share its deviation, which is positive
     outward from the material. `datum` is the letter by which tolerances refer to it.
     """
 
@@ -140,12 +140,12 @@ class Feature(Readable):
 
     @property
     def size(self) -> Size | None:
-        """The tolerance of its size, if it has one."""
+        """The tolerance of the size; None without one."""
         return next((tolerance for tolerance in self.tolerances if isinstance(tolerance, Size)), None)
 
     @property
     def geometric(self) -> tuple[GeometricTolerance, ...]:
-        """Its other tolerances."""
+        """The geometric tolerances, without the size."""
         return tuple(tolerance for tolerance in self.tolerances if isinstance(tolerance, GeometricTolerance))
 
     def point(self, x: float, y: float, z: float) -> Point:
@@ -153,7 +153,7 @@ class Feature(Readable):
         return Point(self.part, vector((x, y, z)), self)
 
     def axis(self, end: int) -> Point:
-        """Return an end of the axis of a cylinder or cone; of a sphere the centre.
+        """Return an end of the axis of a cylinder or cone, or the centre of a sphere.
 
         The ends 0 and 1 are in the sense of the axis' largest component.
         """
@@ -207,7 +207,7 @@ class Feature(Readable):
 
 
 def face_of(face: Face | Feature) -> Face:
-    """Return the face itself, or the one face of a feature. Raises TypeError for a feature that has two of them."""
+    """Return the face itself, or the face of a feature. Raises TypeError for a feature of two faces."""
     if isinstance(face, Feature):
         if len(face.faces) != 1:
             raise TypeError(f'feature "{face.name}" has {len(face.faces)} faces; choose one of them: .faces[0]')

@@ -1,4 +1,4 @@
-"""Places in a document that is read, and the errors that state them."""
+"""Places in a document, and the errors that state them."""
 
 import re
 from collections.abc import Mapping
@@ -17,14 +17,18 @@ PLAIN_TYPES = {
 
 
 class EntryError(Exception):
-    """An entry of a document that is not what a codec expects; the message begins with its place."""
+    """An entry of a document that a codec cannot read; the message begins with the place of the entry."""
 
 
 @dataclass(frozen=True)
 class Sources:
-    """What a document is read with: meshes by part, the folder of its shape files (None: it may name none), its file name.
+    """The data for reading a document.
 
-    `parts` are those that have been read, by name, and `inputs` is the largest number of inputs of an expression.
+    meshes   meshes by part
+    folder   folder of the shape files; None for a document that may not name files
+    file     name of the document's file
+    parts    parts read before, by name
+    inputs   largest number of inputs of an expression
     """
 
     meshes: Mapping[str, Any]
@@ -54,7 +58,7 @@ class Place:
 
     @property
     def line(self) -> str:
-        """The text that takes the place of the script line that declared a thing."""
+        """The text in place of a script line."""
         return f"{self.sources.file}: {self.path.rpartition('.')[2]}" if self.sources.file else ""
 
     def error(self, reason: str) -> EntryError:
@@ -63,7 +67,7 @@ class Place:
         return EntryError(f"{self.path}: {reason}" if self.path else reason)
 
     def mismatch(self, expected: str, value: Any) -> EntryError:
-        """Return the error for a value that is not what is expected."""
+        """Return the error for an unexpected value."""
         if isinstance(value, Mapping):
             actual = "named values"
         elif isinstance(value, list | tuple):
@@ -77,7 +81,7 @@ class Place:
         return self.error(f"expected {expected}, got {actual}")
 
     def converted(self, value: Any, wire: Any) -> Any:
-        """Return the value as msgspec has it for the type `wire`. Raises EntryError if it has another structure."""
+        """Return the value converted to the type `wire`. Raises EntryError if it has another structure."""
         try:
             return msgspec.convert(value, wire)
         except msgspec.ValidationError as error:

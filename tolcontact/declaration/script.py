@@ -1,4 +1,4 @@
-"""Model scripts: a Python file with a function `assembly()` that returns the declared Assembly; or a model as JSON."""
+"""Loading of models: a Python script with a function `assembly()` that returns the declared Assembly, or a JSON file."""
 
 import contextlib
 import importlib.util
@@ -14,7 +14,7 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def load_model(path: Path) -> Assembly:
-    """The assembly that a script declares, or a JSON file.
+    """Return the assembly that a script or a JSON file declares.
 
     Raises ScriptError if the file is missing, fails, or has no function `assembly()` that returns an Assembly.
     """
@@ -22,7 +22,7 @@ def load_model(path: Path) -> Assembly:
         raise ScriptError(f'model script "{path}" does not exist')
     if path.suffix.lower() == ".json":
         return read_json(path)
-    # A name of its own: a model called random.py must not be what others then import as `random`.
+    # The module's name has a space: a model random.py must not shadow the module `random`.
     spec = importlib.util.spec_from_file_location(f"model {path.stem}", path.absolute())
     if spec is None or spec.loader is None:
         raise ScriptError(f'model script "{path}" is not a Python file; expected a name that ends in .py')
@@ -45,8 +45,8 @@ def load_model(path: Path) -> Assembly:
     except TolcontactError as error:
         raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {error}') from error
     except Exception as error:  # a user's script may raise anything
-        said = error.msg if isinstance(error, SyntaxError) else error
-        raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {type(error).__name__}: {said}') from error
+        reason = error.msg if isinstance(error, SyntaxError) else error
+        raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {type(error).__name__}: {reason}') from error
     finally:
         with contextlib.suppress(ValueError):  # a script may do anything to it
             sys.path.remove(folder)
@@ -56,18 +56,18 @@ def load_model(path: Path) -> Assembly:
 
 
 def _where(error: Exception, path: Path) -> str:
-    """The line of the script, and of the module from its folder, in which an error arose."""
+    """Return the lines of an error in the script, and in a module from its folder."""
     frames = traceback.extract_tb(error.__traceback__)
     lines = [(Path(f.filename).absolute(), f.lineno) for f in frames if Path(f.filename).is_file()]
     if isinstance(error, SyntaxError) and error.filename and error.lineno:
         lines.append((Path(error.filename).absolute(), error.lineno))
     in_script = [line for file, line in lines if file == path.absolute()]
-    beside = [f"{file.name}:{line}" for file, line in lines if file != path.absolute() and _is_beside(file, path)]
-    return (f" in line {in_script[-1]}" if in_script else "") + (f" ({beside[-1]})" if beside else "")
+    in_modules = [f"{file.name}:{line}" for file, line in lines if file != path.absolute() and _is_neighbour(file, path)]
+    return (f" in line {in_script[-1]}" if in_script else "") + (f" ({in_modules[-1]})" if in_modules else "")
 
 
-def _is_beside(file: Path, path: Path) -> bool:
-    """Whether a file is a module of the script's own, not this package or another one that is installed below its folder."""
+def _is_neighbour(file: Path, path: Path) -> bool:
+    """Return True for a module in the folder of the script that belongs to no installed package."""
     return (
         file.is_relative_to(path.parent.resolve()) and not file.is_relative_to(_PACKAGE) and "site-packages" not in file.parts
     )

@@ -1,4 +1,4 @@
-"""Criteria that pick the triangles of a face. Coordinates [mm] are those of the part's own frame."""
+"""Criteria that select the triangles of a face. Coordinates [mm] are in the part's own frame."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ KINDS = (*SURFACE_KINDS, "general")  # of surfaces
 
 
 class Selection(Protocol):
-    """One criterion; a face is what meets all of its criteria."""
+    """A criterion of triangles. A face consists of the triangles that meet all of its criteria."""
 
     def faults(self) -> Iterator[str]: ...
 
@@ -83,7 +83,7 @@ class Picked(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Inside(Readable):
-    """What lies inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there."""
+    """The surface inside the box from `lower` to `upper` [mm]; triangles that cross its sides are cut there."""
 
     lower: Vector
     upper: Vector
@@ -120,10 +120,7 @@ class Near(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Brep(Readable):
-    """The face of a STEP file's boundary representation that has a number (`tolcontact faces` lists them), or a point [mm].
-
-    Or those that have a name, where the file gives names.
-    """
+    """Faces of the B-rep of a STEP file: by number (`tolcontact faces` lists them), by name, or by a point [mm]."""
 
     number: int | None
     at: Vector | None
@@ -154,7 +151,7 @@ class Brep(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Cylinder(Readable):
-    """Cylindrical faces; `radius` [mm] of those of one size, `inner` of holes (True) or of pins (False)."""
+    """Cylindrical faces: of one `radius` [mm] only, and of holes (`inner=True`) or pins (`inner=False`) only."""
 
     radius: float | None = None
     inner: bool | None = None
@@ -172,10 +169,10 @@ class Cylinder(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Largest(Readable):
-    """The largest face of one `kind`; with a `direction` ("+x" to "-z", or a vector) of those along it.
+    """The largest face of one `kind`; with a `direction` ("+x" to "-z", or a vector), the largest one along it.
 
-    Planes look that way, cylinders, cones and tori have their axis along it, whichever way it points. Faces are the B-rep faces
-    of a STEP file, and the smooth pieces of other meshes.
+    The normal of a plane points along the direction; the axis of a cylinder, cone or torus is parallel to it in either sense.
+    Faces are the B-rep faces of a STEP file, and the smooth pieces of other meshes.
     """
 
     kind: str
@@ -196,18 +193,18 @@ class Largest(Readable):
         return f"largest {self.kind}" + ("" if self.direction is None else f" facing {self.direction}")
 
 
-def criterion(said: Any) -> Selection:
-    """The criterion that a user means by a direction, indices, a function, or a criterion itself."""
-    if isinstance(said, str):
-        return Facing(said)
-    if isinstance(said, Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest):
-        return said
-    if callable(said):
-        return Picked(said)
+def criterion(choice: Any) -> Selection:
+    """Return the criterion for a direction, indices of triangles, a function, or a criterion. Raises TypeError for others."""
+    if isinstance(choice, str):
+        return Facing(choice)
+    if isinstance(choice, Facing | Triangles | Picked | Inside | Near | Brep | Cylinder | Largest):
+        return choice
+    if callable(choice):
+        return Picked(choice)
     try:
-        return Triangles(tuple(said))
+        return Triangles(tuple(choice))
     except TypeError as error:
         raise TypeError(
-            f'a face cannot be chosen by {said!r}; expected a direction ("+x" to "-z"), a criterion such as tc.Facing(...), '
+            f'a face cannot be chosen by {choice!r}; expected a direction ("+x" to "-z"), a criterion such as tc.Facing(...), '
             "triangle indices, or a function of centres and normals"
         ) from error

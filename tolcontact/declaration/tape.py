@@ -1,4 +1,4 @@
-"""A user's expression as a list of elementary steps, so that an archive can hold it without any code.
+"""A user's expression as a list of elementary steps, which an archive can hold without code.
 
 A tape is a tuple of rows (operation, operands...): "input" with an index into the pose entries of all parts and the deviations
 that follow, "const" with a number, or the name of a CasADi operation with the positions of earlier rows. The last row is the
@@ -20,16 +20,16 @@ BINARY = (
     "atan2", "fmin", "fmax", "hypot", "if_else_zero",
 )  # fmt: skip
 OPERANDS = {"input": 1, "const": 1, **dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2)}
-LONGEST = 1_000_000  # steps: an expression of more takes minutes to compile
+MAX_STEPS = 1_000_000  # a longer expression takes minutes to compile
 
 
-def tape_of(rows: list[list[Any]], place: Place) -> Tape:
+def tape_of(rows: list[list[Any]], place: Place, max_steps: int = MAX_STEPS) -> Tape:
     """Return the tape that a document has at `place`.
 
-    Raises EntryError for a step that is unknown, or is not on inputs and earlier steps.
+    Raises EntryError for an unknown step, or an operand that is neither an input nor an earlier step.
     """
-    if not 0 < len(rows) <= LONGEST:
-        raise place.error("it has no steps" if not rows else f"it has more than {LONGEST} steps")
+    if not 0 < len(rows) <= max_steps:
+        raise place.error("it has no steps" if not rows else f"it has more than {max_steps} steps")
     for k, (operation, *operands) in enumerate(row or [None] for row in rows):
         if operation not in OPERANDS:
             raise place[k].mismatch("the name of an operation", operation)

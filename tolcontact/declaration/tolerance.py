@@ -1,4 +1,4 @@
-"""How much a locator varies: a tolerance range and the distribution that fills it."""
+"""The variation of a contributor: the range of its tolerance, and the distribution that fills this range."""
 
 import importlib  # scipy.stats takes longer to import than all the rest: only if it is needed
 import math
@@ -21,10 +21,10 @@ class Tolerance(Readable):
         triangular         between -range/2 and +range/2, mode 0
         truncated normal   6 sigma = range, cut at -range/2 and +range/2
 
-    The whole of it lies `shift` [mm] off. Of a normal distribution `cp` says how capable the process is: 6 sigma = range / cp,
-    and `cpk` how near its mean comes to a limit: it lies range / 2 * (1 - cpk / cp) farther up.
-    Instead of a name, `distribution` may be any frozen continuous distribution of `scipy.stats`. It defines the spread by
-    itself; leave `range` out.
+    `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal distribution:
+    6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
+    `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread by itself; leave
+    `range` out.
     """
 
     range: float | None = None
@@ -53,25 +53,25 @@ class Tolerance(Readable):
         elif fault := _not_archivable(self.distribution):
             yield fault
         elif self.range is not None:
-            yield "a range is given beside a scipy.stats distribution, which has its own width; leave the range out"
+            yield "a range is given with a scipy.stats distribution, which has its own width; leave the range out"
         elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
             yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
 
         if not is_length(self.shift):
             yield f"shift is {self.shift!r}; expected a number in mm"
-        for word, value in (("cp", self.cp), ("cpk", self.cpk)):
-            if value is not None and not (is_length(value) and (value > 0 or word == "cpk")):
-                yield f"{word} is {value!r}; expected a number{' above 0' if word == 'cp' else ''}"
+        for option, value in (("cp", self.cp), ("cpk", self.cpk)):
+            if value is not None and not (is_length(value) and (value > 0 or option == "cpk")):
+                yield f"{option} is {value!r}; expected a number{' above 0' if option == 'cp' else ''}"
             elif value is not None and self.distribution != "normal":
-                yield f"{word} is given, which goes with a normal distribution; leave it out"
+                yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk at most as large"
 
     @property
     def mean_shift(self) -> float:
-        """How far [mm] the middle of the distribution lies from 0 beyond that of `distribution` itself."""
-        off = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
-        return float(self.shift) + off
+        """The distance [mm] by which `shift` and `cpk` move the distribution."""
+        capability_shift = 0.0 if self.cp is None or self.cpk is None else float(self.range or 0) / 2 * (1 - self.cpk / self.cp)
+        return float(self.shift) + capability_shift
 
     @property
     def width(self) -> float:
@@ -80,15 +80,15 @@ class Tolerance(Readable):
 
     def __str__(self) -> str:
         if isinstance(self.distribution, str):
-            said = f"{self.distribution}, range {self.range:g} mm"
+            spread = f"{self.distribution}, range {self.range:g} mm"
         else:
-            said = f"scipy.stats.{self.distribution.dist.name}"
-        capable = "".join(f", {word} {value:g}" for word, value in (("cp", self.cp), ("cpk", self.cpk)) if value is not None)
-        return said + capable + (f", shifted by {self.shift:g} mm" if self.shift else "")
+            spread = f"scipy.stats.{self.distribution.dist.name}"
+        capability = "".join(f", {name} {value:g}" for name, value in (("cp", self.cp), ("cpk", self.cpk)) if value is not None)
+        return spread + capability + (f", shifted by {self.shift:g} mm" if self.shift else "")
 
 
 def tolerance(value: Any) -> Tolerance:
-    """A Tolerance from what a user may write: a range [mm], a frozen scipy.stats distribution, or a Tolerance."""
+    """Return the Tolerance for a range [mm], a frozen scipy.stats distribution, or a Tolerance."""
     if isinstance(value, Tolerance):
         return value
     if hasattr(value, "ppf"):
@@ -97,16 +97,16 @@ def tolerance(value: Any) -> Tolerance:
 
 
 def scipy_distribution(name: str) -> Any | None:
-    """The continuous distribution that scipy.stats has under that name; None if it has none."""
+    """Return the continuous distribution of scipy.stats with this name; None for an unknown name."""
     stats = importlib.import_module("scipy.stats")
-    found = getattr(stats, name, None)
-    return found if isinstance(found, stats.rv_continuous) and found.name == name else None
+    family = getattr(stats, name, None)
+    return family if isinstance(family, stats.rv_continuous) and family.name == name else None
 
 
 def _not_archivable(frozen: Any) -> str:
-    """Why a frozen distribution cannot be rebuilt from its name and its parameters; empty if it can."""
-    name, known = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
-    if known is None or type(frozen.dist) is not type(known):
+    """Return the reason why a frozen distribution cannot be rebuilt from its name and its parameters; empty if it can."""
+    name, family = frozen.dist.name, scipy_distribution(str(frozen.dist.name))
+    if family is None or type(frozen.dist) is not type(family):
         return (
             f'distribution "{name}" is a {type(frozen.dist).__name__}, which an archive cannot store; expected a '
             "continuous distribution that scipy.stats has under that name"

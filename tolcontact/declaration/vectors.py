@@ -1,4 +1,4 @@
-"""Small vocabulary of declarations: vectors, directions, and the script line that states them."""
+"""Vectors, directions and lengths of declarations, and the script line that states them."""
 
 import math
 import numbers
@@ -17,7 +17,7 @@ NOT_A_VECTOR: Vector = (math.nan, math.nan, math.nan)
 
 
 def vector(value: Any) -> Vector:
-    """Three floats; NaN if `value` is not a vector, so that the fault is found with all others."""
+    """Return three floats; NaN if `value` is not a vector, so that `faults()` reports it with all others."""
     try:
         x, y, z = (float(component) for component in value)
     except (TypeError, ValueError):
@@ -26,7 +26,7 @@ def vector(value: Any) -> Vector:
 
 
 def direction(value: Any) -> Vector:
-    """Unit vector of "+x", "-z", "y" or of any three numbers; NaN if `value` is no direction."""
+    """Return the unit vector of "+x", "-z", "y" or of three numbers; NaN if `value` is not a direction."""
     if isinstance(value, str):
         sign, axis = (-1.0, value[1:]) if value.startswith("-") else (1.0, value.removeprefix("+"))
         if axis not in _AXES:
@@ -41,17 +41,17 @@ def direction(value: Any) -> Vector:
 
 
 def is_finite(value: Vector) -> bool:
-    """Whether all three components are finite numbers."""
+    """Return True if all three components are finite."""
     return all(math.isfinite(component) for component in value)
 
 
 def is_length(value: Any) -> bool:
-    """Whether `value` is a finite number (True and False are not)."""
+    """Return True for a finite number; a truth value is not a number."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def script_line() -> str:
-    """`file.py:12`, the innermost line outside this package; empty if there is none."""
+    """Return the innermost line outside this package as `file.py:12`; empty if all lines are inside."""
     frame = sys._getframe(1)
     while frame is not None:
         name = frame.f_code.co_filename

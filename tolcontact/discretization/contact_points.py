@@ -92,7 +92,7 @@ def _candidates(
         count = DEFAULT_POINTS if _is_open(pair) else pair.points
         _announce(pair, mesh.area, count)
         points = spread(mesh, count, pair.spacing)
-    P_m, finest = moving.placed(points), assembly.finest()
+    P_m, finest = moving.placed(points), assembly.smallest_zone()
     if is_flat(moving_face) and is_flat(reference_face):
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])

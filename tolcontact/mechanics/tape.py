@@ -5,17 +5,17 @@ from typing import Any
 
 import casadi as ca
 
-from tolcontact.declaration.tape import BINARY, LONGEST, UNARY, Tape
+from tolcontact.declaration.tape import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.mechanics.pose import ENTRIES, Pose
 
-_UNARY: dict[str, Callable[[Any], Any]] = {
+UNARY_FUNCTIONS: dict[str, Callable[[Any], Any]] = {
     "neg": lambda a: -a, "exp": ca.exp, "log": ca.log, "sqrt": ca.sqrt, "sq": lambda a: a * a, "twice": lambda a: 2 * a,
     "sin": ca.sin, "cos": ca.cos, "tan": ca.tan, "asin": ca.asin, "acos": ca.acos, "atan": ca.atan, "floor": ca.floor,
     "ceil": ca.ceil, "fabs": ca.fabs, "sign": ca.sign, "erf": ca.erf, "inv": lambda a: 1 / a, "sinh": ca.sinh,
     "cosh": ca.cosh, "tanh": ca.tanh, "asinh": ca.asinh, "acosh": ca.acosh, "atanh": ca.atanh, "not": ca.logic_not,
     "log1p": ca.log1p, "expm1": ca.expm1, "assign": lambda a: a,
 }  # fmt: skip
-_BINARY: dict[str, Callable[[Any, Any], Any]] = {
+BINARY_FUNCTIONS: dict[str, Callable[[Any, Any], Any]] = {
     "add": lambda a, b: a + b, "sub": lambda a, b: a - b, "mul": lambda a, b: a * b, "div": lambda a, b: a / b,
     "pow": ca.power, "constpow": ca.power, "lt": ca.lt, "le": ca.le, "eq": ca.eq, "ne": ca.ne, "and": ca.logic_and,
     "or": ca.logic_or, "fmod": ca.fmod, "remainder": ca.remainder, "copysign": ca.copysign, "atan2": ca.atan2,
@@ -24,7 +24,7 @@ _BINARY: dict[str, Callable[[Any, Any], Any]] = {
 _NAMES = {getattr(ca, f"OP_{name.upper()}"): name for name in (*UNARY, *BINARY)}
 
 
-def record(expression: ca.SX, entries: ca.SX) -> Tape:
+def record(expression: ca.SX, entries: ca.SX, max_steps: int = MAX_STEPS) -> Tape:
     """Return the steps of a scalar expression of `entries`.
 
     entries   (12 * part + contributor, 1): the entries of all poses, then deviations
@@ -32,8 +32,8 @@ def record(expression: ca.SX, entries: ca.SX) -> Tape:
     Raises ValueError for an operation that has no place on a tape, or for too many of them.
     """
     function = ca.Function("expression", [entries], [expression])
-    if function.n_instructions() > LONGEST:
-        raise ValueError(f"an expression of {function.n_instructions()} steps cannot be archived; {LONGEST} can")
+    if function.n_instructions() > max_steps:
+        raise ValueError(f"an expression of {function.n_instructions()} steps cannot be archived; {max_steps} can")
     rows: list[tuple[Any, ...]] = []
     at: dict[int, int] = {}  # work register -> row
     for k in range(function.n_instructions()):
@@ -65,8 +65,8 @@ def replay(tape: Tape, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
             values.append(entries[operands[0]])
         elif operation == "const":
             values.append(ca.SX(operands[0]))
-        elif operation in _UNARY:
-            values.append(_UNARY[operation](values[operands[0]]))
+        elif operation in UNARY_FUNCTIONS:
+            values.append(UNARY_FUNCTIONS[operation](values[operands[0]]))
         else:
-            values.append(_BINARY[operation](values[operands[0]], values[operands[1]]))
+            values.append(BINARY_FUNCTIONS[operation](values[operands[0]], values[operands[1]]))
     return values[-1]
