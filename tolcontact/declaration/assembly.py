@@ -65,7 +65,7 @@ class Assembly(Pictured):
         return thing
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
-        """Return a copy in which `lists` (parts=..., pairs=...) replace those of this assembly. Raises TypeError for other names."""
+        """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
         copy = Assembly(self.name, method=self.method)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
