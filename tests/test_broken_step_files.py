@@ -8,7 +8,7 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.files import read_files, reader
+from tolcontact.geometry.files import Limits, read_files
 
 pytestmark = pytest.mark.slow
 WHOLE = (cases.MODELS / "cover.step").read_text()
@@ -54,13 +54,13 @@ NAMED = ("cut off in the middle", "without its data", "without points", "without
 
 
 @pytest.mark.parametrize("kinds", [NAMED, *nightly([*BROKEN])], ids=len)
-def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path, monkeypatch):
-    monkeypatch.setattr(reader, "SECONDS", 8.0)  # in which the whole one is read ten times over
+def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path):
+    limits = Limits(seconds=8.0)  # in which the whole one is read ten times over
     paths = {}
     for number, (kind, text) in enumerate((kind, BROKEN[kind]) for kind in kinds):
         paths[kind] = tmp_path / f"{number}.step"
         paths[kind].write_text(text)
-    found = {path: content for (path, _), content in read_files([tc.Mesh(path) for path in paths.values()]).items()}
+    found = {path: content for (path, _), content in read_files([tc.Mesh(path) for path in paths.values()], limits).items()}
     messages = {kind: str(found[path]) for kind, path in paths.items() if isinstance(found[path], GeometryFault)}
     for kind, message in messages.items():
         assert paths[kind].name in message and "\n" not in message and len(message) < 600, (kind, message)

@@ -18,7 +18,8 @@ from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cone, Cylinder, Plane, Sphere, Torus
-from tolcontact.geometry.files import BREP, SURFACES, product, reading
+from tolcontact.geometry.files import BREP, SURFACES, Limits, read_files
+from tolcontact.geometry.files.product import rigid_motion
 from tolcontact.geometry.files.reading import usual_chord
 from tolcontact.geometry.files.step_surfaces import credible, onto
 from tolcontact.geometry.files.step_text import step_text
@@ -217,18 +218,14 @@ def test_the_command_line_lists_bodies_and_faces(file):
 
 
 @pytest.mark.slow
-def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(monkeypatch, caplog):
+def test_a_file_that_would_be_too_fine_is_cut_more_coarsely(caplog):
     whole = len(shape(tc.Mesh(COVER)).mesh.faces)
-    monkeypatch.setattr(reading, "_known", {})
-    monkeypatch.setattr(reading, "MAX_TRIANGLES", whole - 1)
     with caplog.at_level(logging.WARNING):
-        coarse = shape(tc.Mesh(COVER)).mesh
+        coarse = shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], Limits(triangles=whole - 1))).mesh
     assert len(coarse.faces) < whole / 2 and coarse.is_watertight
     assert "triangles within 0.06 mm, since finer ones are too many" in caplog.text
-    monkeypatch.setattr(reading, "_known", {})
-    monkeypatch.setattr(reading, "MAX_TRIANGLES", 10)
-    with pytest.raises(tc.ModelError, match="more than the limit of 10"):
-        triangles("+z")
+    with pytest.raises(GeometryFault, match="more than the limit of 10"):
+        shape(tc.Mesh(COVER), read_files([tc.Mesh(COVER)], Limits(triangles=10)))
 
 
 @pytest.mark.slow
@@ -245,7 +242,7 @@ def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
     path = tmp_path / "part.step"
     path.write_text(step_block())
     before = tc.bodies_in(path)[0].upper
-    monkeypatch.setattr(reading.reader, "load", None)
+    monkeypatch.setattr("subprocess.Popen", None)
     assert tc.bodies_in(path)[0].upper == before  # from memory
     monkeypatch.undo()
     path.write_text(assembly(("pin", (0, 0, 0)), ("pin", (9, 0, 0))))
@@ -254,12 +251,12 @@ def test_a_file_is_read_again_once_it_has_changed(tmp_path, monkeypatch):
 
 def test_a_body_that_is_mirrored_in_its_place_is_refused(tmp_path):
     with pytest.raises(GeometryFault, match="mirrored or scaled"):
-        product._in_mm(tmp_path, np.diag([1.0, 1.0, -1.0, 1.0]))
+        rigid_motion(tmp_path, np.diag([1.0, 1.0, -1.0, 1.0]))
     with pytest.raises(GeometryFault, match="mirrored or scaled"):
-        product._in_mm(tmp_path, np.diag([1.0, 1.0, 1.001, 1.0]))
+        rigid_motion(tmp_path, np.diag([1.0, 1.0, 1.001, 1.0]))
     turned = trimesh.transformations.rotation_matrix(0.3, [1, 2, 3], [0.1, 0.2, 0.3])
     turned32 = turned.astype(np.float32).astype(float)
-    place = product._in_mm(tmp_path, turned32)
+    place = rigid_motion(tmp_path, turned32)
     assert place[:3, :3] @ place[:3, :3].T == pytest.approx(np.eye(3), abs=1e-14)
     assert place[:3, 3] == pytest.approx(1e3 * turned[:3, 3], abs=1e-4)
 

@@ -18,6 +18,7 @@ from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
 from tests.step_files import step_block
 from tolcontact.discretization import discretize
+from tolcontact.geometry.files import Limits, read_files
 from tolcontact.geometry.shapes import shape
 
 
@@ -32,7 +33,7 @@ def stalling():
 
 
 def alone(folder, *names):
-    """What is said of an assembly of some files in a folder, by another process, which they may end or stall."""
+    """The faults of some files in a folder, from another process, which they may end or stall."""
     done = run(script("read_shapes", 2, *names), cwd=folder, timeout=60)
     assert done.returncode == 0, (done.returncode, done.stderr)
     assert done.stderr == ""
@@ -67,10 +68,10 @@ def test_all_faults_are_said_at_once_though_the_reader_dies_twice(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path, monkeypatch):
+def test_a_file_that_takes_too_much_memory_is_a_fault(tmp_path):
     trimesh.creation.icosphere(7).export(tmp_path / "fine.obj")
-    monkeypatch.setattr("tolcontact.geometry.files.reader.MEMORY", 350 * 2**20)
-    assert "takes more than 0.342 GiB of memory" in refusal(tmp_path / "fine.obj")
+    (fault,) = read_files([tc.Mesh(tmp_path / "fine.obj")], Limits(memory=350 * 2**20)).values()
+    assert "takes more than 0.342 GiB of memory" in str(fault)
 
 
 def test_each_file_is_read_once_and_one_process_reads_them_all(tmp_path, monkeypatch):

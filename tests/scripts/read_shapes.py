@@ -1,16 +1,16 @@
-"""Discretize an assembly of files, and say its faults: read_shapes.py SECONDS FILE ..., where no file may take longer."""
+"""Read shape files and print their faults: read_shapes.py SECONDS FILE ..., where no small file may take longer."""
 
 import sys
 
 import tolcontact as tc
-from tolcontact.discretization import discretize
-from tolcontact.geometry.files import reader
+from tolcontact.errors import GeometryFault
+from tolcontact.geometry.files import Limits, read_files
+from tolcontact.geometry.shapes import shape
 
-reader.SECONDS = float(sys.argv[1])
-a = tc.Assembly("strange")
-for name in sys.argv[2:]:
-    a.part(name, tc.Mesh(name), fixed=True)
-try:
-    discretize(a)
-except tc.ModelError as error:
-    print(error)
+meshes = [tc.Mesh(name) for name in sys.argv[2:]]
+contents = read_files(meshes, Limits(seconds=float(sys.argv[1])))
+for mesh in meshes:
+    try:
+        shape(mesh, contents)
+    except GeometryFault as fault:
+        print(fault)

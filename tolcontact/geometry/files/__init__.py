@@ -1,6 +1,7 @@
-"""Files of shapes: looked at, read in a process of their own, and told apart into bodies."""
+"""Shape files: they are screened, read in another process, and split into bodies."""
 
 from tolcontact.geometry.files.product import BREP, FACE_NAMES, SURFACES
+from tolcontact.geometry.files.reader import Limits
 from tolcontact.geometry.files.reading import Contents, Shape, key_of, read, read_files
 
-__all__ = ["BREP", "FACE_NAMES", "SURFACES", "Contents", "Shape", "key_of", "read", "read_files"]
+__all__ = ["BREP", "FACE_NAMES", "SURFACES", "Contents", "Limits", "Shape", "key_of", "read", "read_files"]

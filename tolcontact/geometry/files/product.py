@@ -1,4 +1,4 @@
-"""What a STEP file holds: shapes, put back onto the surfaces that the file knows, and bodies in their places. Lengths in mm."""
+"""The product in a STEP file: shapes, moved onto the surfaces that it states, and bodies in their places. Lengths in mm."""
 
 import json
 import logging
@@ -18,24 +18,24 @@ from tolcontact.geometry.files.bodies import Body, ShapePlace, StepMesh, bodies,
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText
 
-STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # how far triangles of a STEP file may stay off its true faces [mm], and turn [rad]
-STEP_SHARE = 5e-6  # the former of larger files, in shares of their extent: more than 0.4 m
-FAR = 1e7  # [mm] no coordinate of a part is as large, and single precision leaves whole millimetres of it
-RIGID = 1e-5  # how far a motion may stretch lengths, having passed through single precision
-OFF = 3.0  # times that: vertices that are farther off the surface of their B-rep face are not moved onto it
-BREP = "brep_index"  # attribute of a mesh: the B-rep face of each triangle
-SURFACES = "surfaces"  # and the surface of each B-rep face, None if the file states none
-FACE_NAMES = "face_names"  # and what the file calls each; none if it calls no face anything
+STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
+STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
+MAX_COORDINATE = 1e7  # [mm]; single precision resolves only whole millimetres there
+STRETCH_TOLERANCE = 1e-5  # relative, for a rigid motion that passed through single precision
+MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
+BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
+SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
+FACE_NAMES = "face_names"  # in its metadata: the name of each B-rep face; empty if the file names none
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
 class Product:
-    """All shapes in one mesh, each in its own frame, and the bodies that they are at their places.
+    """All shapes in one mesh, each in its own frame, and the bodies in their places.
 
-    shape, brep   (face,) the shape of each triangle, and the B-rep face within it
-    surfaces       (shape,): what is known of the surface of each B-rep face
+    shape, brep   (face,) the shape of each triangle, and the B-rep face within the shape
+    surfaces      (shape,) lists of the surfaces of B-rep faces, None for an unknown one
     """
 
     path: Path
@@ -46,12 +46,12 @@ class Product:
     bodies: tuple[Body, ...]
     text: StepText
 
-    def body(self, wanted: str | int | None) -> Body:
-        """The body of that name, or number from 1; the only one, if none is named.
+    def body(self, selector: str | int | None) -> Body:
+        """Return the body with a name or a number from 1; with None, the only body.
 
-        Raises GeometryFault if there is none, or more than one.
+        Raises GeometryFault if no body matches, or more than one.
         """
-        if wanted is None:
+        if selector is None:
             if len(self.bodies) > 1:
                 raise GeometryFault(
                     f'"{self.path}" holds {len(self.bodies)} bodies, but a part is one body; name one, '
@@ -59,27 +59,32 @@ class Product:
                     f"or declare all with tc.parts_from: {listed(self.bodies)}"
                 )
             return self.bodies[0]
-        number = wanted - 1 if isinstance(wanted, int) else next((k for k, b in enumerate(self.bodies) if b.name == wanted), -1)
+        number = (
+            selector - 1
+            if isinstance(selector, int)
+            else next((k for k, b in enumerate(self.bodies) if b.name == selector), -1)
+        )
         if not 0 <= number < len(self.bodies):
-            raise GeometryFault(f'"{self.path}" holds no body {wanted!r}; it holds {len(self.bodies)}: {listed(self.bodies)}')
+            raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {len(self.bodies)}: {listed(self.bodies)}')
         if not len(self.bodies[number].triangles):
-            raise GeometryFault(f'"{self.path}": the triangles of body {wanted!r} cannot be told from others; export it alone')
+            raise GeometryFault(
+                f'"{self.path}": the triangles of body {selector!r} cannot be told from others; export it alone'
+            )
         return self.bodies[number]
 
-    def part(self, wanted: str | int | None) -> trimesh.Trimesh:
-        """The triangles of a body: in its own frame if it is named, in its place if it is the only one.
+    def part(self, selector: str | int | None) -> trimesh.Trimesh:
+        """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        B-rep faces are numbered from 0 within the body, in the file's order: attribute BREP of its triangles; SURFACES in the
-        metadata is what is known of each, FACE_NAMES what the file calls them.
+        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES and FACE_NAMES.
         """
-        body = self.body(wanted)
-        own = body.triangles
-        used, faces = np.unique(self.mesh.faces[own], return_inverse=True)
-        vertices = np.asarray(self.mesh.vertices)[used]
-        numbers, brep = np.unique(self.brep[own], return_inverse=True)
-        known = self.surfaces[int(self.shape[own[0]])]
-        surfaces = [known[number] if number < len(known) else None for number in numbers]
-        if wanted is None and not np.array_equal(body.place, np.eye(4)):
+        body = self.body(selector)
+        triangles = body.triangles
+        corners, faces = np.unique(self.mesh.faces[triangles], return_inverse=True)
+        vertices = np.asarray(self.mesh.vertices)[corners]
+        numbers, brep = np.unique(self.brep[triangles], return_inverse=True)
+        stated = self.surfaces[int(self.shape[triangles[0]])]
+        surfaces = [stated[number] if number < len(stated) else None for number in numbers]
+        if selector is None and not np.array_equal(body.place, np.eye(4)):
             vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
             surfaces = [
                 None if surface is None else surface.placed(body.place[:3, :3], body.place[:3, 3]) for surface in surfaces
@@ -103,97 +108,97 @@ class Product:
 
 
 def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Product:
-    """What `worker` read of a STEP file, in double precision.
+    """Return the product in a STEP file, in double precision, from the `arrays` of `worker` and the file's text.
 
-    Raises GeometryFault if it holds no surfaces, or coordinates are not finite or far off.
+    Raises GeometryFault if the file holds no surfaces, or coordinates are not finite or too large.
     """
     if not len(arrays["faces"]):
         raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
     mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
     mesh.apply_scale(UNITS["m"])
     check_numbers(mesh.vertices, f'"{path}"')
-    mesh.vertices = _resolved(np.asarray(mesh.vertices))
-    own = np.zeros(len(mesh.vertices), dtype=np.int64)
-    own[np.asarray(mesh.faces).ravel()] = np.repeat(arrays["piece"], 3)
-    mesh = _merged(mesh, own)
-    whole = _mended(path, mesh.faces)
-    mesh.update_faces(whole)
-    shape, brep = arrays["piece"][whole], arrays["brep"][whole]
-    vertices, off = np.array(mesh.vertices), OFF * float(arrays["chord"])
-    known: list[list[AnalyticSurface | None]] = []
-    for k, said in enumerate(arrays["surfaces"]):
-        chosen = np.flatnonzero(shape == k)
-        used, faces = np.unique(mesh.faces[chosen], return_inverse=True)
-        own, faces = vertices[used], faces.reshape(-1, 3)
-        known.append(credible(own, faces, brep[chosen], stated_surfaces(str(said)), off))
-        vertices[used] = onto(own, faces, brep[chosen], known[-1], off)
+    mesh.vertices = _rounded(np.asarray(mesh.vertices))
+    shape_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
+    shape_of_vertex[np.asarray(mesh.faces).ravel()] = np.repeat(arrays["piece"], 3)
+    mesh = _merge_vertices(mesh, shape_of_vertex)
+    proper = _proper_triangles(path, mesh.faces)
+    mesh.update_faces(proper)
+    shape, brep = arrays["piece"][proper], arrays["brep"][proper]
+    vertices, max_distance = np.array(mesh.vertices), MAX_OFFSET * float(arrays["chord"])
+    surfaces: list[list[AnalyticSurface | None]] = []
+    for k, stated in enumerate(arrays["surfaces"]):
+        triangles = np.flatnonzero(shape == k)
+        corners, faces = np.unique(mesh.faces[triangles], return_inverse=True)
+        faces, face_numbers = faces.reshape(-1, 3), brep[triangles]
+        surfaces.append(credible(vertices[corners], faces, face_numbers, stated_surfaces(str(stated)), max_distance))
+        vertices[corners] = onto(vertices[corners], faces, face_numbers, surfaces[-1], max_distance)
     mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
     places = [
-        ShapePlace(int(stands), _in_mm(path, transform), tuple(json.loads(str(names))))
-        for stands, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
+        ShapePlace(int(number), rigid_motion(path, transform), tuple(json.loads(str(names))))
+        for number, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
     ]
     step_mesh = StepMesh(
         np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"],
-        known, text.unit,
+        surfaces, text.unit,
     )  # fmt: skip
-    return Product(path, mesh, shape, brep, tuple(known), tuple(bodies(step_mesh, places, text.solids)), text)
+    return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(step_mesh, places, text.solids)), text)
 
 
-def _mended(path: Path, faces: np.ndarray) -> np.ndarray:
-    """Indices of the triangles (face, 3) that are one, and once; what is left out is mentioned.
+def _proper_triangles(path: Path, faces: np.ndarray) -> np.ndarray:
+    """Return indices of triangles (face, 3), without repeated ones and without those that have two corners in one place.
 
-    Of edges shorter than coordinates resolve, triangles with two corners in one place are left; of a face that stands twice in
-    its shell, triangles that stand twice.
+    Repeated triangles come from a face that stands twice in its shell. Corners fall together at the ends of an edge that is
+    shorter than coordinates resolve.
     """
-    whole = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
-    lowest = np.argmin(faces[whole], axis=1)
-    turned = np.take_along_axis(faces[whole], (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    first, _ = trimesh.grouping.unique_rows(turned)
-    for count, what in ((len(faces) - len(whole), "on edges of no length"), (len(whole) - len(first), "that stand twice")):
+    proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
+    lowest = np.argmin(faces[proper], axis=1)
+    turned = np.take_along_axis(faces[proper], (lowest[:, None] + np.arange(3)) % 3, axis=1)
+    unique, _ = trimesh.grouping.unique_rows(turned)
+    for count, kind in ((len(faces) - len(proper), "on edges of no length"), (len(proper) - len(unique), "that stand twice")):
         if count:
-            log.info('"%s": %d triangles %s are left out', path, count, what)
-    return np.asarray(whole[np.sort(first)])
+            log.info('"%s": %d triangles %s are left out', path, count, kind)
+    return proper[np.sort(unique)]
 
 
-def check_numbers(vertices: np.ndarray, who: str) -> None:
-    """Raise GeometryFault if coordinates [mm] are not finite, or far off."""
+def check_numbers(vertices: np.ndarray, subject: str) -> None:
+    """Raise GeometryFault if coordinates [mm] are not finite, or too large."""
     if not np.isfinite(vertices).all():
-        raise GeometryFault(f"{who} has vertices that are not finite; export it again")
-    far = float(np.abs(vertices).max(initial=0))
-    if far > FAR:
+        raise GeometryFault(f"{subject} has vertices that are not finite; export it again")
+    largest = float(np.abs(vertices).max(initial=0))
+    if largest > MAX_COORDINATE:
         raise GeometryFault(
-            f"{who} reaches as far as {far:.3g} mm, beyond the limit of {FAR:g} mm; it is damaged, or in other "
-            "units: export it again, or state its units"
+            f"{subject} reaches as far as {largest:.3g} mm, beyond the limit of {MAX_COORDINATE:g} mm; it is damaged, "
+            "or in other units: export it again, or state its units"
         )
 
 
-def _resolved(vertices: np.ndarray) -> np.ndarray:
-    """Vertices that passed through single precision [m]: rounding to what that resolves brings round lengths back."""
-    resolved = UNITS["m"] * float(np.spacing(np.float32(np.abs(vertices).max(initial=0) / UNITS["m"])))
-    power = 10.0 ** math.floor(math.log10(resolved))
-    step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolved)
-    return np.asarray(np.round(np.round(vertices / step) * step, 12))
+def _rounded(vertices: np.ndarray) -> np.ndarray:
+    """Return vertices [mm] that passed through single precision, rounded to its resolution: round lengths come back."""
+    resolution = UNITS["m"] * float(np.spacing(np.float32(np.abs(vertices).max(initial=0) / UNITS["m"])))
+    power = 10.0 ** math.floor(math.log10(resolution))
+    step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolution)
+    return np.round(np.round(vertices / step) * step, 12)
 
 
-def _merged(mesh: trimesh.Trimesh, shape: np.ndarray) -> trimesh.Trimesh:
-    """A mesh in which the vertices of one shape that stand in one place are one."""
-    _, first, place = np.unique(
+def _merge_vertices(mesh: trimesh.Trimesh, shape: np.ndarray) -> trimesh.Trimesh:
+    """Return a mesh without repeated vertices; vertices in one place stay apart if their `shape` (vertex,) differs."""
+    _, representative, number = np.unique(
         np.column_stack([shape, np.asarray(mesh.vertices)]), axis=0, return_index=True, return_inverse=True
     )
-    return trimesh.Trimesh(np.asarray(mesh.vertices)[first], place.ravel()[np.asarray(mesh.faces)], process=False)
+    return trimesh.Trimesh(np.asarray(mesh.vertices)[representative], number.ravel()[np.asarray(mesh.faces)], process=False)
 
 
-def _in_mm(path: Path, transform: np.ndarray) -> np.ndarray:
-    """A rigid motion (4, 4) [mm] from one [m] that passed through single precision: a rotation again, and round lengths.
+def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:
+    """Return a rigid motion (4, 4) [mm] from a transform [m] that passed through single precision.
 
-    Raises GeometryFault if it mirrors or scales.
+    Its rotation is orthogonal again, and its translation is rounded. Raises GeometryFault if the transform mirrors or scales.
     """
     place = np.eye(4)
     U, scales, V = np.linalg.svd(transform[:3, :3])
-    if np.abs(scales - 1).max() > RIGID or np.linalg.det(transform[:3, :3]) < 0:
+    if np.abs(scales - 1).max() > STRETCH_TOLERANCE or np.linalg.det(transform[:3, :3]) < 0:
         raise GeometryFault(
             f'"{path}" places a body mirrored or scaled, which bodies of a rigid assembly are not; export it as it is'
         )
     place[:3, :3] = U @ V
-    place[:3, 3] = _resolved(UNITS["m"] * transform[:3, 3]) if transform[:3, 3].any() else 0.0
+    place[:3, 3] = _rounded(UNITS["m"] * transform[:3, 3]) if transform[:3, 3].any() else 0.0
     return place

@@ -1,7 +1,7 @@
-"""Shape files read in a process of their own: no file ends or stalls this one.
+"""Shape files read in another process: no file can end or stall this one.
 
-`load` starts `worker` and waits for what it leaves. Where it dies or stalls, the file that it was at gets the blame, and
-another one goes on with the rest.
+`load` starts `worker` and waits for the files that it writes. If the worker dies or stalls, the shape file that it was reading
+is at fault, and another worker reads the remaining ones.
 """
 
 import json
@@ -20,21 +20,35 @@ import numpy as np
 from tolcontact.child import environment
 from tolcontact.errors import GeometryFault, clipped
 
-# A STEP file of 1 MB takes some 2 s, one of 20 MB 41 s, on one core; machines differ, and other jobs run on them.
-SECONDS, SECONDS_PER_MB = 30.0, 20.0
-START = 30.0  # [s] until it has loaded its libraries
-MEMORY = 6 * 2**30  # [byte]; a million triangles take some 0.5 GiB
-PAUSE = 0.02  # [s] between looks at what it has left
+MAX_START_SECONDS = 30.0  # until the worker has loaded its libraries
+POLL_SECONDS = 0.02  # between two looks for a file of the worker
 PROGRAM = Path(__file__).with_name("worker.py")
 
 
-class TooSlow(GeometryFault):
+class ReadTimeout(GeometryFault):
     """A file was not read in time: it is damaged, or its triangles are too fine."""
 
 
 @dataclass(frozen=True)
+class Limits:
+    """The limits for reading a file: time, memory [byte] and number of triangles.
+
+    On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
+    some 3 GiB on the way through a simulation with contact on all of them.
+    """
+
+    seconds: float = 30.0
+    seconds_per_mb: float = 20.0
+    memory: int = 6 * 2**30
+    triangles: int = 1_000_000
+
+
+DEFAULT_LIMITS = Limits()
+
+
+@dataclass(frozen=True)
 class Job:
-    """A file, its kind ("stl", ..., "step"), and how finely it is cut if it is STEP."""
+    """A file and its kind ("stl", ..., "step"); the chord [mm] and angle [rad] of its triangles if it is a STEP file."""
 
     path: Path
     kind: str
@@ -42,21 +56,24 @@ class Job:
     angle: float
 
 
-def load(jobs: Sequence[Job], most: int) -> list[dict[str, np.ndarray] | GeometryFault]:
-    """The arrays of each file, as `worker` describes them, or what is wrong with it. `count` alone: more than `most`."""
-    done: list[dict[str, np.ndarray] | GeometryFault] = []
-    while len(done) < len(jobs):
-        done.extend(_by_one_process(jobs[len(done) :], most))
-    return done
+def load(jobs: Sequence[Job], limits: Limits = DEFAULT_LIMITS) -> list[dict[str, np.ndarray] | GeometryFault]:
+    """Return the arrays of each file, as `worker` describes them, or its fault.
+
+    A file with too many triangles has only the array `count`.
+    """
+    results: list[dict[str, np.ndarray] | GeometryFault] = []
+    while len(results) < len(jobs):
+        results.extend(_by_one_process(jobs[len(results) :], limits))
+    return results
 
 
-def _by_one_process(jobs: Sequence[Job], most: int) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
-    """What one process makes of the first of some files, up to the one that it fails at."""
-    allowed = [SECONDS + SECONDS_PER_MB * job.path.stat().st_size / 1e6 for job in jobs]
+def _by_one_process(jobs: Sequence[Job], limits: Limits) -> Iterator[dict[str, np.ndarray] | GeometryFault]:
+    """Yield the results of one worker process, up to the file that it fails at."""
+    seconds = [limits.seconds + limits.seconds_per_mb * job.path.stat().st_size / 1e6 for job in jobs]
     order = {
-        "memory": MEMORY,
-        "seconds": int((START + sum(allowed)) * (os.cpu_count() or 1)) + 1,
-        "most": most,
+        "memory": limits.memory,
+        "seconds": int((MAX_START_SECONDS + sum(seconds)) * (os.cpu_count() or 1)) + 1,
+        "max_triangles": limits.triangles,
         "files": [{"path": str(job.path.absolute()), "kind": job.kind, "chord": job.chord, "angle": job.angle} for job in jobs],
     }
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
@@ -69,47 +86,47 @@ def _by_one_process(jobs: Sequence[Job], most: int) -> Iterator[dict[str, np.nda
                     stdin=subprocess.DEVNULL,
                     stdout=errors,
                     stderr=errors,
-                    # Threads that only wait, and memory set aside for them, would count against its memory.
+                    # The memory that is set aside for idle threads would count against the limit.
                     env={**environment(), "MALLOC_ARENA_MAX": "4"},
                 )
             except OSError as error:
                 yield from [GeometryFault(f'"{job.path}": its reader process cannot be started ({error})') for job in jobs]
                 return
         try:
-            _awaited(process, START, folder / "ready")
+            _wait_for(process, MAX_START_SECONDS, folder / "ready")
             for k, path in enumerate(job.path for job in jobs):
-                if not _awaited(process, allowed[k], folder / f"{k}.npz", folder / f"{k}.txt"):
-                    kind = TooSlow if process.poll() is None else GeometryFault
-                    yield kind(f'"{path}" {_end(process, folder, allowed[k])}')
+                if not _wait_for(process, seconds[k], folder / f"{k}.npz", folder / f"{k}.txt"):
+                    kind = ReadTimeout if process.poll() is None else GeometryFault
+                    yield kind(f'"{path}" {_end(process, folder, seconds[k])}')
                     return
-                yield _left(path, folder, k)
+                yield _result(path, folder, k)
         finally:
             process.kill()
             process.wait()
 
 
-def _awaited(process: subprocess.Popen, seconds: float, *left: Path) -> bool:
-    """Whether the process leaves one of some files within some `seconds`."""
+def _wait_for(process: subprocess.Popen, seconds: float, *paths: Path) -> bool:
+    """Return whether the process writes a file at one of the paths within some `seconds`."""
     end = time.monotonic() + seconds
     while True:
-        ended = process.poll() is not None  # asked first: what it left before it ended counts
-        if any(path.exists() for path in left):
+        ended = process.poll() is not None  # before the look for files: one that was written just before the end counts
+        if any(path.exists() for path in paths):
             return True
         if ended or time.monotonic() > end:
             return False
-        time.sleep(PAUSE)
+        time.sleep(POLL_SECONDS)
 
 
-def _left(path: Path, folder: Path, k: int) -> dict[str, np.ndarray] | GeometryFault:
-    said = folder / f"{k}.txt"
-    if said.exists():
-        return GeometryFault(f'"{path}" {clipped(said.read_text(encoding="utf-8", errors="replace"))}')
+def _result(path: Path, folder: Path, k: int) -> dict[str, np.ndarray] | GeometryFault:
+    message = folder / f"{k}.txt"
+    if message.exists():
+        return GeometryFault(f'"{path}" {clipped(message.read_text(encoding="utf-8", errors="replace"))}')
     with np.load(folder / f"{k}.npz", allow_pickle=False) as arrays:
         return dict(arrays)
 
 
 def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
-    """How a process ended that left nothing, as the rest of a sentence that begins with its file's name."""
+    """Return how a process ended without a result, as the rest of a sentence that begins with the name of its shape file."""
     code = process.poll()
     if code is None:
         return (
@@ -117,8 +134,7 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
             "export it again"
         )
     if code < 0:
-        known = code in {-known for known in signal.Signals}
-        what = f"signal {-code}" + (f", {signal.Signals(-code).name}" if known else "")
-        return f"is damaged: it crashed its reader process ({what}); export it again"
-    last = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
-    return f"was not read: its reader process ended with exit code {code} ({clipped(last) or 'no message'}); export it again"
+        name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
+        return f"is damaged: it crashed its reader process (signal {-code}{name}); export it again"
+    message = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
+    return f"was not read: its reader process ended with exit code {code} ({clipped(message) or 'no message'}); export it again"
