@@ -70,7 +70,9 @@ class ContactProgram:
 def contact_program(
     nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin
 ) -> ContactProgram:
-    """Return the Functions of a group; the inputs are described in `_inputs`. The outputs for `p` parts, `q` pairs, `k` rows:
+    """Return the Functions of a group.
+
+    `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
     corrected (12 p)     poses after the correction; in an exact resolution after as much of it as `stride` allows
     linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
