@@ -259,7 +259,7 @@ def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
 
 
 def test_a_run_that_all_workers_left_ends(dask_processes, tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "PATIENCE", 6.0)
+    monkeypatch.setattr(cluster, "WORKER_TIMEOUT", 6.0)
     port = free_port()
     scheduler(dask_processes, port)
     only = worker(dask_processes, port)

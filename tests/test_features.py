@@ -275,7 +275,7 @@ def test_a_summary_says_that_a_datum_shift_is_not_drawn():
     console = Console(width=200, file=io.StringIO())
     console.print(summary_text(tc.summarize(tc.run(a, samples=20))))
     said = console.file.getvalue()
-    assert "datum shift of ring.bore: not drawn; the contact of the datum features decides it" in said
+    assert "datum shift of ring.bore: not drawn; contact of the datum features determines it" in said
 
 
 @pytest.mark.slow
