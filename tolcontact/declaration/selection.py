@@ -163,8 +163,8 @@ class Cylinder(Readable):
             yield f"inner is {self.inner!r}; expected True, False or None"
 
     def __str__(self) -> str:
-        what = {None: "cylinders", True: "inner cylinders", False: "outer cylinders"}[self.inner]
-        return what + (f" of radius {self.radius:g} mm" if self.radius is not None else "")
+        noun = {None: "cylinders", True: "inner cylinders", False: "outer cylinders"}[self.inner]
+        return noun + (f" of radius {self.radius:g} mm" if self.radius is not None else "")
 
 
 @dataclass(frozen=True, repr=False)
