@@ -1,12 +1,12 @@
-"""Puts small faults into the package, one at a time, and sees which test notices. A tool to be run by hand:
+"""Mutation tests: put small faults into the package, one at a time, and see which test fails. A tool to be run by hand:
 
     python -m tests.faults --count 120 --seed 1 --out faults.jsonl
-    python -m tests.faults --survivors faults.jsonl                              what no test noticed, once more
+    python -m tests.faults --survivors faults.jsonl                              the survivors of a run, once more
     python -m tests.faults --survivors faults.jsonl --tests tests/test_new.py    against new tests only
 
-A first run of all tests says which of them reach which line, and how long each takes; it is kept, and made again once a source
-has changed (or never, with a --store of one's own). A fault is then tried in a copy of the repository, on the tests that reach
-it, cheapest first, until one fails. What survives changes nothing that anybody could see, or lacks a test.
+A first run of all tests records which test reaches which line, and how long each takes. Its record is stored and used until a
+source changes (with --store, always). Each fault is then tried in a copy of the repository, on the tests that reach it, from
+cheap to expensive, until one fails. A fault that survives has no visible effect, or lacks a test.
 """
 
 import argparse
@@ -34,14 +34,15 @@ import numba
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-# Rooms and modules that have no say in results, by name. All others are looked at, whatever they are called.
-SPARED = {"declaration", "discretization", "vocabulary", "workflow", "report", "cli", "method", "errors", "child", "compiled"}
-SPARED |= {"quiet", "inspection", "taking", "reader", "version", "__main__", "__init__"}
+# Packages and modules that get no faults, by name: they do not compute results. All others are tested.
+SPARED = {"declaration", "geometry", "features", "discretization", "vocabulary", "workflow", "report", "plot", "cli", "testing"}
+SPARED |= {"method", "errors", "child", "compiled", "readable", "version", "__main__", "__init__"}
+SPARED |= {"quiet", "inspection", "archive_lock", "reader"}
 WEIGHTS = {"contact": 4, "compilation": 3, "statistics": 3, "archive": 3, "simulation": 2, "mechanics": 2}  # others 1
-PATIENCE, TIMES = 40.0, 10.0  # s, and times what it takes without a fault: then a test is stopped, and the fault is found
+PATIENCE, TIMES = 40.0, 10.0  # s, and multiple of its usual time: then a test is stopped, and the fault counts as found
 OUTCOMES = ("found", "timeout", "survived", "not reached", "not run")
 
-FORKS = multiprocessing.get_context("forkserver")  # processes that begin with what takes seconds to import
+FORKS = multiprocessing.get_context("forkserver")  # processes that start with the slow imports done
 FORKS.set_forkserver_preload(["casadi", "igl", "netCDF4", "numba", "pandas", "pytest", "scipy.stats", "trimesh", "xarray"])
 
 COMPARED = {"Lt": ("<", "<=", ">"), "LtE": ("<=", "<"), "Gt": (">", ">=", "<"), "GtE": (">=", ">")}
@@ -56,7 +57,7 @@ Change = tuple[str, int, int, bytes]  # operator, and what stands in place of wh
 
 @dataclass(frozen=True)
 class Fault:
-    """What is written `after` instead of `before`, the lines that it touches; the `nth` of its like in a function."""
+    """A fault: the lines `before` and `after` it; it is the `nth` equal fault in its function."""
 
     file: str
     function: str
@@ -101,7 +102,7 @@ class Source:
 
 
 def changes(node, source: Source) -> Iterator[Change]:
-    """What may be wrong about a node."""
+    """Yield the changes that make a node wrong."""
     match node:
         case ast.Compare(left, ops, others):
             for one, op, other in zip([left, *others], ops, others, strict=False):
@@ -156,7 +157,7 @@ def walk(node, source: Source, function: str = "", lines: range = range(0)) -> I
 
 
 def all_faults(only: str) -> Iterator[Fault]:
-    """The faults that files may have whose path has `only` in it."""
+    """Yield the possible faults of all files whose path contains `only`."""
     for path in sorted((ROOT / "tolcontact").rglob("*.py")):
         file = path.relative_to(ROOT)
         if only in str(file) and not SPARED & {part.removesuffix(".py") for part in file.parts}:
@@ -169,7 +170,7 @@ def all_faults(only: str) -> Iterator[Fault]:
 
 
 def drawn(faults: list[Fault], count: int, seed: int) -> list[Fault]:
-    """Some faults: rooms get their shares by WEIGHTS, and in a room the operators take turns."""
+    """Return a sample of faults: packages get shares by WEIGHTS, and in a package the operators take turns."""
     shuffled, turns, places = random.Random(seed).sample(faults, len(faults)), Counter(), Counter()
     by_turn = []
     for number, fault in enumerate(shuffled):
@@ -193,7 +194,7 @@ def again(faults: list[Fault], records: list[dict]) -> Iterator[Fault]:
 
 
 class Store:
-    """What the first run told, and copies of the repository to spoil."""
+    """The record of the first run, and copies of the repository for faults."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -280,7 +281,7 @@ def _run_tests(copy: Path, folder: Path, options: list[str], environment: dict[s
 
 
 def pytest_runtest_logstart(nodeid: str) -> None:
-    """As a plugin: stop a test that takes far too long."""
+    """Stop a test that takes far too long (as a plugin of pytest)."""
     folder = Path(os.environ["FAULTS"])
     if (folder / "costs.json").exists():
         cost = json.loads((folder / "costs.json").read_text()).get(nodeid, 0.0)
@@ -288,13 +289,13 @@ def pytest_runtest_logstart(nodeid: str) -> None:
 
 
 def pytest_runtest_logreport(report) -> None:
-    """As a plugin: write down what became of a test."""
+    """Record the outcome of a test (as a plugin of pytest)."""
     with (Path(os.environ["FAULTS"]) / "log.jsonl").open("a") as log:
         print(json.dumps([report.nodeid, report.outcome, report.duration]), file=log)
 
 
 def tried(store: Store, copy: Path, fault: Fault, tests: list[str]) -> dict:
-    """What became of a fault."""
+    """Try a fault, and return its record."""
     if not tests:
         return fault.record(outcome="not reached", by="", tests=0)
     with tempfile.TemporaryDirectory() as name:
@@ -338,29 +339,29 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="faults that are tried at once")
     parser.add_argument("--store", type=Path, help="folder of the first run, whatever has changed since")
     parser.add_argument("--out", type=Path, help="file for the records, one JSON object a line; goes on with those in it")
-    asked = parser.parse_args()
-    faults = list(all_faults(asked.only))
-    before, known = records_in(asked.survivors), records_in(asked.out)
-    chosen = list(again(faults, before)) if asked.survivors else drawn(faults, asked.count, asked.seed)
+    arguments = parser.parse_args()
+    faults = list(all_faults(arguments.only))
+    before, known = records_in(arguments.survivors), records_in(arguments.out)
+    chosen = list(again(faults, before)) if arguments.survivors else drawn(faults, arguments.count, arguments.seed)
     chosen = [fault for fault in chosen if not any(record == record | fault.record() for record in known)]
     sources = b"".join(path.read_bytes() for room in ("tolcontact", "tests") for path in sorted((ROOT / room).rglob("*.py")))
     digest = hashlib.sha256(sources).hexdigest()[:12]
-    store = Store(asked.store or Path(tempfile.gettempdir()) / f"tolcontact-faults-{digest}")
+    store = Store(arguments.store or Path(tempfile.gettempdir()) / f"tolcontact-faults-{digest}")
     copies: queue.Queue[Path] = queue.Queue()
-    for number in range(asked.jobs):
+    for number in range(arguments.jobs):
         copies.put(store.copy(number))
 
     def judged(fault: Fault) -> dict:
         copy = copies.get()
-        record = tried(store, copy, fault, asked.tests or store.tests(fault, asked.budget))
+        record = tried(store, copy, fault, arguments.tests or store.tests(fault, arguments.budget))
         copies.put(copy)
         print(row(record), flush=True)
-        if asked.out:
-            with asked.out.open("a") as out:
+        if arguments.out:
+            with arguments.out.open("a") as out:
                 print(json.dumps(record), file=out)
         return record
 
-    with ThreadPoolExecutor(asked.jobs) as pool:
+    with ThreadPoolExecutor(arguments.jobs) as pool:
         print(summary(known + list(pool.map(judged, chosen))))
 
 

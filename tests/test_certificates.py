@@ -84,14 +84,14 @@ def test_every_solver_certifies_what_the_others_do(solver):
 def test_what_a_solver_misses_another_one_answers(monkeypatch):
     """A solver that stops after one iteration: the poses are those of a good one, and the archive says who answered."""
     _, good = simulate(cases.stack(), samples=100, solver="qpoases")
-    lazy = Plugin("daqp", {"daqp": {"iter_limit": 1}}, second=("qpoases",))
+    lazy = Plugin("daqp", {"daqp": {"iter_limit": 1}}, fallbacks=("qpoases",))
     monkeypatch.setitem(PLUGINS, "daqp", lazy)
     monkeypatch.setattr(plugins, "is_usable", lambda name: True)  # it fails the small problem, too
     _, run = simulate(cases.stack(), samples=100, solver="daqp")
     assert run["second_answers"].sum() > 30 and good["second_answers"].sum() == 0
     assert np.abs(run["poses"] - good["poses"]).max() < 1e-8
     assert (run["status"] == good["status"]).all()
-    monkeypatch.setitem(PLUGINS, "daqp", Plugin("daqp", lazy.options, second=()))
+    monkeypatch.setitem(PLUGINS, "daqp", Plugin("daqp", lazy.options, fallbacks=()))
     _, alone = simulate(cases.stack(), samples=100, solver="daqp")
     lost = alone["status"] == Status.NOT_CONVERGED
     assert lost.sum() > 30

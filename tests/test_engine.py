@@ -142,7 +142,7 @@ def test_what_is_no_number_is_a_row_that_did_not_converge(make):
 
 
 def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
-    monkeypatch.setattr(adaptive, "ENOUGH", 150)
+    monkeypatch.setattr(adaptive, "MIN_COMPILED_CALLS", 150)
     program = tc.build(cases.ra1(), solver="daqp")
     first, *_, last = (next(simulate_blocks(program, samples=100, seed=1)) for _ in range(4))
     assert program.place._evaluate._native is not None
@@ -175,7 +175,7 @@ def test_compiled_scans_equal_those_in_numpy(make, activity):
         level[:, 9:] = -0.05 * program.nominal.pairs[index].n_r[0]
         for poses in (relative[:, index], later[:, index], level):
             assert (
-                compiled.least(poses, block.deviations[: len(poses)]) == plain.least(poses, block.deviations[: len(poses)])
+                compiled.min_gap(poses, block.deviations[: len(poses)]) == plain.min_gap(poses, block.deviations[: len(poses)])
             ).all()
             for mask in (None, plain.gaps(relative[:, index], block.deviations)[: len(poses)] < activity):
                 (points, depth), expected = (

@@ -36,7 +36,7 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 TURNS, PAIRS = 5, 11
-adaptive.ENOUGH = 0  # compile Functions at once: what counts here is the cost of many realizations
+adaptive.MIN_COMPILED_CALLS = 0  # compile Functions at once: what counts here is the cost of many realizations
 EXACT = tc.Method(resolution="exact")
 CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn

@@ -41,7 +41,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
     return {
         "solver": program.plugin.name,
         "solver_options": json.dumps(program.plugin.options),
-        "solver_second": ", ".join(program.plugin.second),
+        "solver_second": ", ".join(program.plugin.fallbacks),
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,

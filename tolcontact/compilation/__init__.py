@@ -1,4 +1,4 @@
-"""Compile: the equations of a model become functions, and its contact problem a QP that is built once. A chapter of the guide.
+"""Compilation of a model: its equations become functions, its contact problem a QP that is built once. A chapter of the guide.
 
 `tc.build(model, solver=..., method=...)` returns a `tc.Program`. `tc.run` and `tc.simulate_blocks` accept it in place of a
 model, so that a model is compiled once for many runs.
@@ -32,11 +32,11 @@ Traceback (most recent call last):
     ...
 tolcontact.errors.OptionError: solver "superscs" is refused: it reports success with wrong answers; choose one of: ...
 
-## Accuracy, whatever the solver
+## Accuracy, for every solver
 
-Each answer is judged by its own KKT residual in mm, computed from the QP that was solved. An answer whose residual exceeds
-1e-9 mm is polished: the rows that carry are solved as one linear system. (Steps below 1e-3 mm are held to 1e-10 mm.) What then
-still exceeds 1e-8 mm is answered by `qpoases` or `daqp` instead, and counted in the archive's `second_answers`.
+Each answer is judged by its own KKT residual in mm, computed from the QP that was solved. An answer whose residual exceeds 1e-9
+mm is polished: the rows that carry are solved as one linear system. (For steps below 1e-3 mm the limit is 1e-10 mm.) If the
+residual then still exceeds 1e-8 mm, `qpoases` or `daqp` answers instead, and the archive counts it in `second_answers`.
 
 On 1000 realizations of RA1 the corrected poses of all these solvers agree with those of daqp to 2e-13 mm, of proxqp to 6e-11 mm
 and of piqp to 3e-8 mm; 8 answers of highs and 3 of piqp came from another solver.

@@ -1,4 +1,4 @@
-"""Conditioning: the QP in variables in which the objective is a sum of squares, rows have length 1, and slack opens all."""
+"""Conditioning of the QP: its objective has unit diagonal blocks, its rows have length 1, and slacks make it solvable."""
 
 import casadi as ca
 import numpy as np
@@ -7,14 +7,14 @@ from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.setting import Setting
 
-SLACK = 1e-3
-FAR = 1e3
+SLACK = 1e-3  # mm of gap that a slack of 1 mm opens
+IDLE_DISTANCE = 1e3  # lengths of the group: bound of an empty row, which never binds
 
 
 def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.SX) -> dict[str, ca.SX]:
-    """min 1/2 y'Hy + g'y with lba <= a y <= uba, y = (U z, slacks), and the rows' `length` before they had length 1.
+    """Return the QP min 1/2 y'Hy + g'y with lba <= a y <= uba, in y = (U z, slacks), and the `length` of the unscaled rows.
 
-    `misfit` (locator, 1) [mm] of two-sided locators that hold: the last rows, which are equations.
+    `misfit` (locator, 1) [mm] of exact two-sided locators gives the last rows, which are equations.
     """
     pairs, equations = len(setting.group.pairs), misfit.numel()
     H, U = _unit_blocks(Q)
@@ -25,7 +25,7 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
     length = ca.if_else(length > 0, length, 1)
     A = ca.diag(1 / length) @ A
     fill = rows.filled
-    A = ca.vertcat(*(A[k, :] if fill[k].is_one() else _or_idle(fill[k], A[k, :], k) for k in range(len(rows))))
+    A = ca.vertcat(*(A[k, :] if fill[k].is_one() else _row_or_idle(fill[k], A[k, :], k) for k in range(len(rows))))
     B = setting.slope(misfit) @ to_z
     opens = ca.sparsify(ca.DM(np.equal.outer(rows.pairs, range(pairs)).astype(float)))
     targets = -setting.at_rest(misfit)
@@ -33,7 +33,7 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
         "h": ca.diagcat(H, ca.SX.eye(pairs)),
         "g": ca.vertcat(to_z.T @ pull, ca.DM(np.full(pairs, setting.group.length))),
         "a": ca.blockcat([[A, ca.diag(SLACK / length) @ opens], [B, ca.SX(equations, pairs)]]),
-        "lba": ca.vertcat(ca.if_else(fill, -rows.gaps / length, -FAR * setting.group.length), targets),
+        "lba": ca.vertcat(ca.if_else(fill, -rows.gaps / length, -IDLE_DISTANCE * setting.group.length), targets),
         "uba": ca.vertcat(ca.DM(np.full(len(rows), np.inf)), targets),
         "u": U,
         "length": length,
@@ -41,13 +41,13 @@ def conditioned(setting: Setting, Q: ca.SX, pull: ca.SX, rows: Rows, misfit: ca.
 
 
 def whitening(U: ca.SX) -> ca.SX:
-    """U^-1, block by block: z = U^-1 y."""
+    """Return U^-1, block by block: z = U^-1 y."""
     movers = range(0, U.size1(), FREEDOMS)
     return ca.diagcat(*(ca.solve(U[k : k + FREEDOMS, k : k + FREEDOMS], ca.SX.eye(FREEDOMS)) for k in movers))
 
 
 def _unit_blocks(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """H = U^-T Q U^-1 with unit diagonal blocks, and U, block diagonal and upper triangular."""
+    """Return H = U^-T Q U^-1 with unit diagonal blocks, and U, block diagonal and upper triangular."""
     movers = range(0, Q.size1(), FREEDOMS)
     factors = [ca.chol(ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS])) for k in movers]
     blocks = [
@@ -60,11 +60,11 @@ def _unit_blocks(Q: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.sparsify(ca.blockcat(blocks)), ca.diagcat(*factors)
 
 
-def _or_idle(filled: ca.SX, row: ca.SX, seed: int) -> ca.SX:
-    """Return a row, or if its slot is empty one in general position that with a bound far away never binds.
+def _row_or_idle(filled: ca.SX, row: ca.SX, seed: int) -> ca.SX:
+    """Return a row; if its slot is empty, return a row in general position, which does not bind because its bound is far away.
 
-    Rows of zeros would do for other plugins, but qpOASES starts from the rows that carried in the previous problem, and
-    fails if one of those has become zero.
+    Other plugins accept rows of zeros. qpOASES starts from the rows that carried in the previous problem, and fails if one of
+    them has become zero.
     """
     idle = np.random.default_rng(seed).normal(size=row.nnz())
     return ca.SX(row.sparsity(), ca.if_else(filled, row.T.nz[:], ca.DM(idle / np.linalg.norm(idle))))

@@ -4,7 +4,7 @@ min 1/2 y'Hy + f'y + sum (L s_k + 1/2 s_k^2)   subject to   g_i + A_i y + SLACK 
 
 The increments z = (dt, L w) of a mover, all in mm (L is a length of the group's size), are z = U^-1 y, where U'U is the
 mover's own block of (11): H then has unit blocks on its diagonal, and the few freedoms that only the regularization holds
-are as well conditioned as the others. s_k, one for each pair k, make the problem solvable whatever the gaps are; their
+are as well conditioned as the others. s_k, one for each pair k, make the problem solvable for all gaps; their
 price is so high that they stay zero unless the rows contradict each other (an exact penalty). f, the pull of the
 objective at the present poses, is zero in the raw state but for forces; h are the two-sided locators, if the
 objective holds them.
@@ -33,7 +33,7 @@ from tolcontact.mechanics.setting import Setting
 from tolcontact.mechanics.two_sided import misfit
 from tolcontact.method import Method
 
-OF_ENERGY = ("poses", "raw", "moments", "deviations")
+ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,9 +42,9 @@ class ContactProgram:
 
     energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
     relate       X_RM of the pairs at `poses`: of poses, deviations
-    slacks       how many of the QP's last variables are slacks: they are not negative
-    equations    how many of its last rows are equations: two-sided locators, if the objective holds them
-    standing     for each pair of the group the contact points that always have a row, None if slots hold changing points
+    slacks       number of slacks: the QP's last variables, which are not negative
+    equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
+    standing     for each pair of the group the contact points that always have a row, or None if slots hold changing points
     """
 
     assemble: ca.Function
@@ -74,16 +74,16 @@ def contact_program(
 
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
-    corrected (12 p)     poses after the correction; in an exact resolution after as much of it as `stride` allows
-    linearized (12 q)    X_RM of every pair, linear in the increments: what the QP constrains
+    corrected (12 p)     poses after the correction; in an exact resolution after the part of it that `stride` allows
+    linearized (12 q)    X_RM of every pair, linear in the increments, as the QP constrains it
     relative (12 q)      X_RM of every pair at `corrected`
     multipliers (k)      reactions: of the rows, >= 0, in the units of the objective (see Objective)
     residual             KKT residual [mm], in y: the larger of max |Hy + f - A'lambda|, and max |min(row, lambda)| with rows
-                         of length 1, or how far a gap remains negative
+                         of length 1, or the depth of a gap that remains negative
     slack (q)            penetration of each pair that no increment could remove, to first order [mm]
-    step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|; of
+    step (2)             largest increment (dt, L w) of a mover [mm], and the same in the norm of the objective, max |y|, of
                          the whole correction
-    astray               how far two-sided locators, if they are held, are from their place at `corrected` [mm]
+    astray               largest misfit [mm] of exact two-sided locators at `corrected`
     """
     standing = tuple(standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs)
     inputs = _inputs(nominal, group, standing)
@@ -118,7 +118,7 @@ def contact_program(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
         finish=_function("finish", inputs | solution_symbols, results),
-        energy=_function("energy", {name: inputs[name] for name in OF_ENERGY}, {"energy": pure_energy}),
+        energy=_function("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": pure_energy}),
         relate=_function(
             "relate",
             {name: inputs[name] for name in ("poses", "deviations")},

@@ -29,8 +29,8 @@ class Rows:
     filled      (row, 1): 0 if a slot is empty
     pairs       (row,): position of the row's pair in the group
     relative    (12 * pair, 1): X_RM of every pair, to first order in z
-    bends       (12 * pair, 1): sums of the reactions of before times the gaps' gradients by the entries of X_RM
-    bow, wrap   (z, z): sums of the reactions of before times the second derivatives of gaps that are not linear in X_RM
+    bends       (12 * pair, 1): sums of the previous reactions times the gaps' gradients by the entries of X_RM
+    bow, wrap   (z, z): sums of the previous reactions times the second derivatives of gaps that are not linear in X_RM
                 (see round_gaps)
     """
 
@@ -48,9 +48,9 @@ class Rows:
 
 
 def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | None:
-    """Return the points of a pair that always have a row; None if slots hold changing points.
+    """Return the points of a pair that always have a row, or None if slots hold changing points.
 
-    These are the points of round faces, and points that can be the deepest, if they are few and stay the same.
+    Points of round faces always have a row. So have the points that can be the deepest, if they are few and fixed.
     """
     if gaps is None:
         return np.arange(len(pair.P_m))
@@ -64,7 +64,7 @@ def contact_rows(
     end_poses: Sequence[Pose],
     inputs: Mapping[str, ca.SX],
 ) -> Rows:
-    """Return the rows about the poses `now`, which the increments change to `moved`; `inputs` as in contact_program."""
+    """Return the rows about `start_poses`, which the increments change to `end_poses`; see contact_program for `inputs`."""
     slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     slopes: list[ca.SX] = []
     pairs: list[int] = []
@@ -76,11 +76,11 @@ def contact_rows(
         points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
             reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
-            of_points, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
+            point_gaps, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
                 start.vector(), heights(pair, setting.deviations), reactions
             )
             slopes.append(by_entries @ by_z)
-            gaps.append(of_points)
+            gaps.append(point_gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
             bends.append(by_entries.T @ reactions)
@@ -121,7 +121,7 @@ def _slots(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
 
 
 def _standing_rows(pair: ContactPoints, points: np.ndarray, deviations: ca.SX) -> list[Point]:
-    """Return points that always have a row: constants, but for the heights that deviations give them."""
+    """Return points that always have a row: constants, except for the heights that depend on deviations."""
     P_m, P_r, n_r = (ca.SX(ca.DM(values[points].T)) for values in (pair.P_m, pair.P_r, pair.n_r))
     offsets = pair.offsets.take(points)
     if offsets.columns.size:

@@ -10,18 +10,18 @@ from tolcontact.compilation.functions import InterpretedFunction, NamedFunction,
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
 from tolcontact.compilation.polishing import polished
-from tolcontact.mechanics.quiet import MAKING, quiet
+from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
-QP = ("h", "g", "a", "lba", "uba")  # what `assemble` gives a solver
-TOGETHER = 1024  # realizations whose QPs fit into a processor's cache
-ROUGH = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished, and
-NEARLY, FINE = 1e-3, 1e-2 * ACCURACY  # mm: so is one with that residual, if the step is so small that noise would be seen
+QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
+MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
+POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
+SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
 
 Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
 
 class ContactSolver:
-    """Solves the QPs of a ContactProgram. Not to be shared between threads."""
+    """A solver of the QPs of a ContactProgram. Threads must not share it."""
 
     def __init__(self, program: ContactProgram) -> None:
         self._program = program
@@ -31,37 +31,37 @@ class ContactSolver:
         self.start_over()
 
     def twin(self) -> "ContactSolver":
-        """Return the same for another thread."""
+        """Return an equal solver for another thread."""
         twin = copy.copy(self)
         twin.start_over()
         return twin
 
     def start_over(self) -> None:
-        """Forget all problems solved before: some plugins start from the last one."""
-        self._first: _PluginSolver = _PluginSolver(self._program, self._plugin)
-        self._others: dict[str, _PluginSolver] = {}
+        """Forget all previous problems: some plugins start from the last one."""
+        self._solver: _PluginSolver = _PluginSolver(self._program, self._plugin)
+        self._fallbacks: dict[str, _PluginSolver] = {}
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
 
-        Besides `second` (realization, 1): whether another plugin had to answer. What the plugin misses is tried again by
-        others, without curvature. `residual` is infinite, and other outputs may be NaN, if all gave up.
+        A further output is `second` (realization, 1): whether another plugin had to answer. Other plugins solve the problems
+        that this plugin misses, without curvature. If all fail, `residual` is infinite, and other outputs may be NaN.
         """
         inputs = {name: flat(values) for name, values in arrays.items()}
-        answer = self._solved(self._first, inputs)
+        answer = self._solved(self._solver, inputs)
         answer["second"] = np.zeros_like(answer["residual"])
-        for name in self._plugin.second:
+        for name in self._plugin.fallbacks:
             lost = np.flatnonzero(~(answer["residual"][:, 0] <= ACCURACY))
             if not lost.size:
                 break
-            if name not in self._others:
-                self._others[name] = _PluginSolver(self._program, PLUGINS[name])
-            polished_outputs = self._solved(self._others[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
-            polished_outputs["second"] = np.ones((len(lost), 1))
-            better = polished_outputs["residual"][:, 0] < answer["residual"][lost, 0]
-            _replace(answer, lost[better], _of(polished_outputs, better))
+            if name not in self._fallbacks:
+                self._fallbacks[name] = _PluginSolver(self._program, PLUGINS[name])
+            retry = self._solved(self._fallbacks[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
+            retry["second"] = np.ones((len(lost), 1))
+            better = retry["residual"][:, 0] < answer["residual"][lost, 0]
+            _replace(answer, lost[better], _of(retry, better))
             if PLUGINS[name].remembers:
-                del self._others[name]
+                del self._fallbacks[name]
         return answer
 
     def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
@@ -69,21 +69,21 @@ class ContactSolver:
         return self._energy(**arrays)["energy"][:, 0]
 
     def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization _"]:
-        """X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
+        """Return X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
         return self._relate(**arrays)["relative"]
 
     def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])
-        parts = [self._solved_together(solver, _of(inputs, slice(k, k + TOGETHER))) for k in range(0, max(count, 1), TOGETHER)]
+        parts = [self._solved_batch(solver, _of(inputs, slice(k, k + MAX_BATCH))) for k in range(0, max(count, 1), MAX_BATCH)]
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def _solved_together(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+    def _solved_batch(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
         solution, failed = solver(problem, inputs["reactions"])
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         residual = outputs["residual"][:, 0]
-        is_rough = residual > np.where(outputs["step"][:, 0] < NEARLY, FINE, ROUGH)
+        is_rough = residual > np.where(outputs["step"][:, 0] < SMALL_STEP, SMALL_STEP_RESIDUAL, POLISHED_RESIDUAL)
         rough = np.flatnonzero(is_rough & np.isfinite(residual))
         if rough.size:
             problem = _of(problem, rough)
@@ -104,7 +104,7 @@ class ContactSolver:
         return polished(dense, solution, self._program.equations, self._program.slacks)
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
-        """All entries of an output of `assemble`, (realization, row, column), or (realization, row) of a vector."""
+        """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
         sparsity = self._program.assemble.sparsity_out(name)
         columns = np.zeros((len(stored), sparsity.numel()))
         columns[:, sparsity.find()] = stored
@@ -114,27 +114,27 @@ class ContactSolver:
 
 
 class _PluginSolver:
-    """A plugin's solver, with a memory of its own."""
+    """A plugin's solver with its own memory."""
 
     def __init__(self, program: ContactProgram, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
-        with MAKING, quiet():
+        with CONSTRUCTION_LOCK, quiet():
             qp = program.qp(plugin)
         self._inputs = [name for name in qp.name_in() if name in QP]
         self._results = [qp.name_out().index(name) for name in SOLUTION]
-        at_least = np.zeros(qp.numel_in("g"))
-        at_least[: -program.slacks] = -np.inf
-        bounds = {"lbx": at_least, "ubx": np.full(at_least.shape, np.inf)}
-        # The other inputs are zero, and starting points that no plugin is told to use.
+        lower_bounds = np.zeros(qp.numel_in("g"))
+        lower_bounds[: -program.slacks] = -np.inf
+        bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
+        # The other inputs are zero: starting points that no plugin uses.
         fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in QP}
-        with MAKING, quiet():
+        with CONSTRUCTION_LOCK, quiet():
             self._solve = InterpretedFunction(qp, fixed_inputs)
 
     def __call__(self, problem: Arrays, reactions: np.ndarray) -> tuple[Arrays, np.ndarray]:
-        """x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
+        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
 
-        A solver that starts from the previous problem's rows has less to change where problems alike follow each other:
-        those in which the same rows probably carry, that did `before` (realization, row), or in a first step are violated.
+        A solver that starts from the previous problem is faster if similar problems follow each other. So they are sorted by
+        the rows that probably carry: rows with `reactions` (realization, row), or in a first step violated rows.
         """
         inputs = [problem[name] for name in self._inputs]
         if not self._remembers:
@@ -149,11 +149,11 @@ class _PluginSolver:
 
 
 def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:
-    """Return some rows of all arrays."""
+    """Return the given rows of all arrays."""
     return {name: values[rows] for name, values in arrays.items()}
 
 
 def _replace(arrays: Arrays, rows: np.ndarray, replacements: Arrays) -> None:
-    """Put `others` where some rows of all arrays are."""
+    """Overwrite the given rows of all arrays."""
     for name, values in replacements.items():
         arrays[name][rows] = values

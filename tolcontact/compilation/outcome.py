@@ -1,4 +1,4 @@
-"""Outcome: from a QP and its solution to poses, reactions, and residuals that judge them."""
+"""The outcome of a QP: poses, reactions, and residuals that judge them."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,7 +12,7 @@ from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.setting import Setting
 from tolcontact.mechanics.two_sided import misfit
 
-SOLVED = ("h", "g", "a", "lba", "u", "length")  # what the residuals are of: the QP as it was solved
+QP_ENTRIES = ("h", "g", "a", "lba", "u", "length")  # the QP as it was solved, whose residuals are computed
 SOLUTION = ("x", "lam_a", "lam_x")
 
 
@@ -24,13 +24,14 @@ def outcome(
     problem: Mapping[str, ca.SX],
     stride: ca.SX,
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
-    """Symbols of the QP and its solution, and the outputs of contact_program as expressions of those; `poses` are after z.
+    """Return symbols of the QP and its solution, and the outputs of contact_program as expressions of them.
 
-    The QP's matrices are inputs, so that nothing is computed twice and the residuals are of what was solved.
+    `poses` are those after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals are those of
+    the QP that was solved.
     """
     group, z, count = setting.group, setting.z, len(rows)
     size, equations = z.numel() + len(group.pairs), problem["a"].size1() - count
-    symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in SOLVED}
+    symbols = {name: ca.SX.sym(name, problem[name].sparsity()) for name in QP_ENTRIES}
     symbols |= {"x": ca.SX.sym("x", size), "lam_a": ca.SX.sym("lam_a", count + equations), "lam_x": ca.SX.sym("lam_x", size)}
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]

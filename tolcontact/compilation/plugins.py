@@ -1,4 +1,4 @@
-"""The QP solvers that CasADi offers: options, what to expect of each, and which are refused and why."""
+"""The QP solvers that CasADi offers: their options, and the reasons why some are refused."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -8,36 +8,36 @@ import numpy as np
 
 from tolcontact.errors import OptionError
 
-ACCURACY = 1e-8  # mm: KKT residual up to which a QP is taken as solved, whichever plugin solved it
+ACCURACY = 1e-8  # mm: KKT residual up to which a QP counts as solved, for every plugin
 
 
 @dataclass(frozen=True)
 class Plugin:
     """A conic plugin of CasADi.
 
-    options     what we ask of it
-    second      names of the plugins that answer in its place, one after the other, if its own answer misses ACCURACY
+    options     its options in CasADi
+    fallbacks   names of the plugins that answer in its place, one after the other, if its answer misses ACCURACY
     remembers   whether it starts each problem from the answer to the previous one
     """
 
     name: str
     options: dict[str, Any] = field(default_factory=dict)
-    second: tuple[str, ...] = ("qpoases", "daqp")
+    fallbacks: tuple[str, ...] = ("qpoases", "daqp")
     remembers: bool = False
 
 
 PLUGINS = {
     plugin.name: plugin
     for plugin in (
-        # Rarely (some 1e-5 of all problems) it loses its way from the problem before: a new memory finds it.
+        # Rarely (about 1e-5 of all problems) it fails to get there from the previous problem; with a new memory it succeeds.
         Plugin("qpoases", {"printLevel": "none", "terminationTolerance": 1e-14, "boundTolerance": 1e-14}, remembers=True),
         Plugin(
             "osqp",
             {"osqp": {"verbose": False, "eps_abs": 1e-10, "eps_rel": 1e-10, "max_iter": 50_000, "polishing": True}},
             remembers=True,
         ),
-        # Where rows contradict each other, and two-sided locators hold besides, it goes in circles.
-        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}, second=("qpoases",)),
+        # It cycles if rows contradict each other and two-sided locators are exact.
+        Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}, fallbacks=("qpoases",)),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
         Plugin("highs", {"highs": {"output_flag": False}}, remembers=True),
         Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}),
@@ -60,7 +60,7 @@ REFUSED = {
 
 
 def plugin(name: str) -> Plugin:
-    """The table's entry for `name`, once it has solved a small problem correctly.
+    """Return the table's entry for `name`, after it has solved a small problem correctly.
 
     Raises OptionError for a solver that is unknown, refused, not installed, or answers wrongly.
     """
@@ -77,17 +77,17 @@ def plugin(name: str) -> Plugin:
 
 
 def usable_plugins() -> list[str]:
-    """Names of the plugins that are installed and solve a small problem correctly."""
+    """Return the names of the plugins that are installed and solve a small problem correctly."""
     return [name for name in PLUGINS if is_usable(name)]
 
 
 def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
-    """A QP solver for these sparsities; it reports failure in its outputs, never by an exception."""
+    """Return a QP solver for these sparsities; it reports failure in its outputs, never by an exception."""
     return ca.conic("qp", plugin.name, {"h": h, "a": a}, {**plugin.options, "error_on_fail": False})
 
 
 def is_usable(name: str) -> bool:
-    """Whether the plugin loads and finds min x'x/2 subject to x1 + x2 >= 2, that is (1, 1)."""
+    """Return whether the plugin loads and finds the solution (1, 1) of min x'x/2 subject to x1 + x2 >= 2."""
     if not ca.has_conic(name):
         return False
     try:

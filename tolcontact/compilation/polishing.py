@@ -1,52 +1,52 @@
-"""Polish: the solution of a QP, from the rows that carry in a solver's answer to it, at the level of rounding.
+"""Polishing of a solver's answer to a QP, down to rounding.
 
-Solvers stop where their own tolerance is met, in which more or less of the true residual shows. Which rows carry they know
-long before; the rest is one linear system, the optimality conditions with those rows as equations.
+Solvers stop at their own tolerance, which limits the true residual only loosely. But they know much earlier which rows carry.
+With these rows as equations the optimality conditions are one linear system.
 """
 
 from collections.abc import Mapping
 
 import numpy as np
 
-GIVE = 1e-9  # by which rows may give way, so that rows that depend on each other have a solution; refinement takes it back
+COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; refinement removes its effect
 REFINEMENTS = 4
 
 
 def polished(
     problem: Mapping[str, np.ndarray], answer: Mapping[str, np.ndarray], equations: int, slacks: int
 ) -> dict[str, np.ndarray]:
-    """x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba, with the last rows equations and the last x >= 0.
+    """Return x, lam_a and lam_x (QP, entry) of min x'Hx/2 + g'x, a x >= lba; the last rows are equations, the last x >= 0.
 
     problem     h (QP, n, n), g (QP, n), a (QP, m, n), lba (QP, m)
     answer      x (QP, n), lam_a (QP, m), lam_x (QP, n) of a solver; multipliers are below 0 if a row carries
 
-    NaN if the conditions have no solution.
+    They are NaN if the conditions have no solution.
     """
     H, g, A, lower = (problem[name] for name in ("h", "g", "a", "lba"))
     x, lam_a, lam_x = (answer[name] for name in ("x", "lam_a", "lam_x"))
     count, rows, size = A.shape
-    # Of a row and its multiplier the smaller one is rounding, whatever the solver.
+    # Of a row and its multiplier the smaller one is rounding, for every solver.
     carries = -lam_a > np.einsum("kij,kj->ki", A, x) - lower
     carries[:, rows - equations :] = True
     at_zero = (-lam_x > x)[:, size - slacks :]
-    bounds = np.zeros((count, slacks, size))
-    bounds[:, :, size - slacks :] = np.eye(slacks)
-    all_rows = np.concatenate([A, bounds], axis=1)
+    slack_rows = np.zeros((count, slacks, size))
+    slack_rows[:, :, size - slacks :] = np.eye(slacks)
+    all_rows = np.concatenate([A, slack_rows], axis=1)
     is_equation = np.concatenate([carries, at_zero], axis=1)
-    bounds_of_rows = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
+    all_bounds = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
     C = np.where(is_equation[..., None], all_rows, 0.0)
     idle = np.eye(rows + slacks) * ~is_equation[:, None, :]
     K = np.concatenate(
         [np.concatenate([H, -C.swapaxes(1, 2)], axis=2), np.concatenate([C, idle], axis=2)],
         axis=1,
     )
-    right = np.concatenate([-g, np.where(is_equation, bounds_of_rows, 0.0)], axis=1)
+    right_side = np.concatenate([-g, np.where(is_equation, all_bounds, 0.0)], axis=1)
     regularized = K.copy()
-    regularized[:, size:, size:] += GIVE * np.eye(rows + slacks) * is_equation[:, None, :]
-    solution = np.zeros_like(right)
+    regularized[:, size:, size:] += COMPLIANCE * np.eye(rows + slacks) * is_equation[:, None, :]
+    solution = np.zeros_like(right_side)
     inverse = _inverse(regularized)
     for _ in range(REFINEMENTS):
-        remainder = right - np.einsum("kij,kj->ki", K, solution)
+        remainder = right_side - np.einsum("kij,kj->ki", K, solution)
         solution += np.einsum("kij,kj->ki", inverse, remainder)
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
@@ -55,7 +55,7 @@ def polished(
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:
-    """Inverses (QP, n, n), NaN if there is none: one such matrix must not spoil the others."""
+    """Return the inverses (QP, n, n), NaN for a singular matrix, which must not spoil the others."""
     try:
         return np.linalg.inv(matrices)
     except np.linalg.LinAlgError:

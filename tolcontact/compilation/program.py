@@ -1,4 +1,4 @@
-"""The compiled model: built once, called by name for blocks of realizations, read by name."""
+"""The compiled model: it is built once, and evaluated by name for blocks of realizations."""
 
 import logging
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
-from tolcontact.mechanics.quiet import MAKING, quiet
+from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.tape import record
 from tolcontact.method import Method
@@ -42,12 +42,12 @@ class ContactGroup:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Program(Pictured):
-    """Everything a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
+    """The functions of a model that a simulation evaluates. Poses have 12 entries: R row by row, t [mm].
 
-    draws        of everything that varies
+    draws        the draws of all contributors
     place        deviations (realization, contributor) -> poses (realization, 12 * part)
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
-    gaps         one per pair: its gaps at X_RM, if they are affine in it; None of round faces, which have
+    gaps         gaps of each pair at X_RM, which are affine in it; None for round faces
     round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by number of the pair
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
@@ -85,7 +85,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     is seating, for forces that are missing or move nothing.
     """
     draws = Draws(nominal)
-    with MAKING:  # which also calls users' functions, that may print
+    with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
             conic_plugin = plugin(solver)
         d = ca.SX.sym("deviations", len(nominal.contributors))
@@ -108,7 +108,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         )
         groups = contact_groups(nominal)
         gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
-        of_round = {k: _gaps_only(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round}
+        round_functions = {k: _round_gap_function(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round}
         if method.minimizes.presses:
             _check_forces(nominal, groups)
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
@@ -120,8 +120,10 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
             observe=NamedFunction.dense(observe),
             gaps=gaps,
-            round_gaps={k: NamedFunction.dense(function) for k, function in of_round.items()},
-            groups=tuple(_ready(group, contact_program(nominal, group, gaps, method, conic_plugin)) for group in groups),
+            round_gaps={k: NamedFunction.dense(function) for k, function in round_functions.items()},
+            groups=tuple(
+                _contact_group(group, contact_program(nominal, group, gaps, method, conic_plugin)) for group in groups
+            ),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -131,13 +133,13 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         )
 
 
-def _gaps_only(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
+def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
     gaps, *_, distances = round_gaps(points)(X_RM, heights(pair, deviations), ca.SX.zeros(len(points)))
     return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
 
 
-def _ready(group: Group, program: ContactProgram) -> ContactGroup:
+def _contact_group(group: Group, program: ContactProgram) -> ContactGroup:
     return ContactGroup(group, program, ContactSolver(program))
 
 

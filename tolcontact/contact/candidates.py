@@ -8,7 +8,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.projection import half_spacing, project
-from tolcontact.contact.scan import PairScan, RoundScan, Scan, fixed, least_gaps, pair_scan
+from tolcontact.contact.scan import PairScan, RoundScan, Scan, fixed, min_gaps, pair_scan
 from tolcontact.contact.state import State
 from tolcontact.mechanics import curved_pairs
 
@@ -19,14 +19,14 @@ OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travell
 class RawSurvey(NamedTuple):
     """Gaps and active points of realizations in their raw state.
 
-    scans     for each pair the points that may carry
-    least     (realization, pair) [mm]: least gaps
-    active    (realization, pair): number of active points
-    moments   (realization, side, moment) of the points that count in the objective
+    scans       for each pair the points that may carry
+    min_gap     (realization, pair) [mm]: the least gaps
+    active      (realization, pair): number of active points
+    moments     (realization, side, moment) of the points that count in the objective
     """
 
     scans: list[Scan]
-    least: Float[Array, "realization pair"]
+    min_gap: Float[Array, "realization pair"]
     active: Int[Array, "realization pair"]
     moments: Float[Array, "realization side moment"]
 
@@ -99,7 +99,7 @@ class Candidates:
         surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
         return RawSurvey(
             scans=scans,
-            least=least_gaps(scans, relative, deviations),
+            min_gap=min_gaps(scans, relative, deviations),
             active=np.stack([survey.active for survey in surveys], axis=1),
             moments=np.concatenate([self._counted(k, survey.moments) for k, survey in enumerate(surveys)], axis=1),
         )

@@ -13,7 +13,7 @@ import numpy as np
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
-from tolcontact.contact.scan import least_gaps, undone
+from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -70,8 +70,8 @@ def _empty_slots(state: State) -> None:
 def _depth_left(scans: list, unsettled: Unsettled) -> np.ndarray:
     """Return by how much points are deeper inside than the slack (n,) [mm], among points projected at the poses reached."""
     task, state = unsettled.task, unsettled.state
-    least = least_gaps(scans, state.relative, task.deviations)
-    return undone(scans, least, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)
+    gaps = min_gaps(scans, state.relative, task.deviations)
+    return undone(scans, gaps, state.relative, task.deviations, task.may_carry, state.slack).max(axis=1)
 
 
 def _adapted(cautions: np.ndarray, stalls: np.ndarray, gain_ratio: np.ndarray) -> np.ndarray:

@@ -57,18 +57,18 @@ def untouched_numbers(count: int) -> dict[str, np.ndarray]:
     return {entry.name: np.zeros(count, _dtype(entry)) for entry in NUMBERS}
 
 
-def join_groups(whole: Record, rows: np.ndarray, group: Record) -> None:
+def join_groups(totals: Record, rows: np.ndarray, group: Record) -> None:
     """Write the numbers of one group of parts into some rows of the numbers of all groups."""
     for entry in NUMBERS:
-        values = getattr(whole, entry.name)
+        values = getattr(totals, entry.name)
         values[rows] = entry.metadata["groups"](values[rows], getattr(group, entry.name))
 
 
-def accumulate_starts(whole: Record, rows: np.ndarray, attempt: Record) -> None:
+def accumulate_starts(totals: Record, rows: np.ndarray, attempt: Record) -> None:
     """Add up the numbers that accumulate, of another attempt at some rows; both records then hold the sums."""
     for entry in NUMBERS:
         if entry.metadata["accumulates"]:
-            values = getattr(whole, entry.name)
+            values = getattr(totals, entry.name)
             values[rows] += getattr(attempt, entry.name)
             getattr(attempt, entry.name)[:] = values[rows]
 

@@ -11,7 +11,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
-from tolcontact.contact.scan import least_gaps
+from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
@@ -65,7 +65,7 @@ def repeat(step: LinearStep, limits: Limits, task: Task, state: State, stride: f
 
 def true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:
     """Return the penetration of each pair at the poses reached (n, pair) [mm]."""
-    return np.maximum(-least_gaps(task.scans, state.relative, task.deviations), 0)
+    return np.maximum(-min_gaps(task.scans, state.relative, task.deviations), 0)
 
 
 def better_state(best: State | None, state: State, penetration: Float[Array, "n pair"]) -> State:

@@ -20,7 +20,7 @@ from tolcontact.contact.iterated_search import search
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
-from tolcontact.contact.scan import least_gaps, undone
+from tolcontact.contact.scan import min_gaps, undone
 from tolcontact.contact.state import Resolved, State, Task
 
 STRIDE, SMALL_STRIDE = 0.5, 0.05  # rad: the largest turn of a part in one step; linear rows are wrong long before
@@ -89,7 +89,7 @@ class ContactResolver:
         """
         relative = relative[:, self.pairs]
         survey = self._candidates.survey(relative, deviations)
-        moves = (survey.least < -PENETRATION).any(axis=1) | self._method.minimizes.presses
+        moves = (survey.min_gap < -PENETRATION).any(axis=1) | self._method.minimizes.presses
         touched = np.flatnonzero(moves)
         scans = [scan.take(touched) for scan in survey.scans]
         task = Task(
@@ -104,7 +104,7 @@ class ContactResolver:
         self._attempt(task, state, Start())
         if self._method.is_exact:
             self._try_other_starts(task, state)
-        gap_min = np.stack([survey.least, survey.least], axis=1)
+        gap_min = np.stack([survey.min_gap, survey.min_gap], axis=1)
         gap_min[touched, 1] = state.gap_min
         return Resolved(touched, state, gap_min, survey.active)
 
@@ -121,7 +121,7 @@ class ContactResolver:
         state.searched[:] = projected
         self._leave_adrift(task, state)
         task = replace(task, scans=self._candidates.scans(state.relative, projected=projected))
-        state.gap_min[:] = least_gaps(task.scans, state.relative, task.deviations)
+        state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
             state.kkt_residual[:] = checked_residual(state, depth.max(axis=1))
@@ -141,7 +141,7 @@ class ContactResolver:
             rolled = np.flatnonzero(self._limits.rolled(k, state))
             if rolled.size:
                 relative = state.relative[rolled, k]
-                depth = -self._candidates.projected(k, relative).least(relative, task.deviations[rolled])
+                depth = -self._candidates.projected(k, relative).min_gap(relative, task.deviations[rolled])
                 state.doubtful[rolled] |= depth > self._limits.allowed(k)
 
     def _try_other_starts(self, task: Task, state: State) -> None:

@@ -68,7 +68,7 @@ class Scan:
         moments = np.array(sums).transpose(2, 0, 1) if sums else np.empty((len(active), 0, MOMENTS))
         return Survey(active.sum(axis=1), moments)
 
-    def least(
+    def min_gap(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
         """Return the least gap of all points (realization,) [mm]."""
@@ -164,7 +164,7 @@ class CompiledScan(PairScan):
         kernel.survey(self._points, self._tables, *self._sums, poses, heights, activity, active, flat)
         return Survey(active, moments)
 
-    def least(
+    def min_gap(
         self, relative: Float[Array, "realization 12"], deviations: Float[Array, "realization contributor"]
     ) -> Float[Array, " realization"]:
         return self._deepest(self.clusters[[0, -1]], relative, deviations, None, np.inf)[1][:, 0]
@@ -269,7 +269,7 @@ def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
 
 def undone(
     scans: Sequence[Scan],
-    least: Float[Array, "realization pair"],
+    min_gap: Float[Array, "realization pair"],
     relative: Float[Array, "realization pair 12"],
     deviations: Float[Array, "realization contributor"],
     may_carry: Sequence[Bool[Array, "realization _"] | None],
@@ -277,18 +277,18 @@ def undone(
 ) -> Float[Array, "realization pair"]:
     """Return by how much points that may carry are deeper inside than the slack (realization, pair) [mm].
 
-    least       (realization, pair) [mm]: the least gaps of all points
+    min_gap     (realization, pair) [mm]: the least gaps of all points
     may_carry   for each pair (realization, point), or None if all points may
     """
     depths = [
-        -least[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
+        -min_gap[:, k] if may is None else fixed(scan).deepest(relative[:, k], deviations, may).depth.max(axis=1)
         for k, (scan, may) in enumerate(zip(scans, may_carry, strict=True))
     ]
     return np.stack(depths, axis=1) - slack
 
 
-def least_gaps(
+def min_gaps(
     scans: Sequence[Scan], relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
 ) -> Float[Array, "realization pair"]:
     """Return the least gap (realization, pair) [mm] of each pair at X_RM (realization, pair, 12)."""
-    return np.stack([scan.least(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)
+    return np.stack([scan.min_gap(relative[:, k], deviations) for k, scan in enumerate(scans)], axis=1)

@@ -1,4 +1,4 @@
-"""The equations: poses, gaps, the contact QP, and what the corrected pose minimizes. A chapter of the guide.
+"""The equations: poses, gaps, the contact QP, and the objectives of the corrected pose. A chapter of the guide.
 
 Numbers in parentheses are those of the method paper (Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg, *Variation Simulation
 of Rigid Bodies with Contact Representation*). Each equation is written once, as a CasADi expression, in a file of this
@@ -15,9 +15,9 @@ A locator is a point p, a unit direction n into the part, and a deviation d. Wit
     (delta, theta) = J^-1 d        R = exp([theta]x)        t = c + delta - R c
 
 Of more than six locators the two-sided ones are met exactly, and the one-sided ones in the sense of least squares. A part that
-is located on another part follows its raw pose. A locator that stands against a feature has d larger by what the feature comes
-out of its part there. Where a floating part has fewer than six, q is the least motion (rotations times the part's size) that
-meets them.
+is located on another part follows its raw pose. The deviation d of a locator that stands against a feature is
+larger by the height to which the feature rises there. If a floating part has fewer than six locators, q is the least motion
+(rotations times the part's size) that meets them.
 
 ## Gaps
 
@@ -25,20 +25,20 @@ The gap of a contact point is (2) to (5)
 
     g = n . (x_m - x_r)        x_m = R_m P_m + t_m        x_r = R_r P_r + t_r        n = R_r n_r
 
-It is negative if the moving point lies inside the reference part. Faces of features come first: each has a small pose of its
-own in its part, p -> p + tau + rho x (p - centre) turned properly, linear in the deviations, which is composed into the
-relative pose; so it adds no rows. What varies in size is subtracted from the gap, or added to the radius of a ball or shaft.
-Between the two parts it is affine in the relative pose X_RM, so that all gaps of a pair are one product of 13 numbers with a
+It is negative if the moving point lies inside the reference part. The face of a feature has a small pose in its part, to first
+order p -> p + tau + rho x (p - centre), with tau and rho linear in the deviations. It is composed into the relative pose, so it
+adds no rows. A variation of size is subtracted from the gap, or added to the radius of a ball or shaft.
+The gap is affine in the relative pose X_RM, so that all gaps of a pair are one product of 13 numbers with a
 constant matrix. A one-sided locator is a contact point against the part that it stands on, or the ground, raised by its
 deviation.
 
 ## The QP
 
-Variables are increments dq = (dt, w) of all parts that contact can move. Of the parts that contact couples (9) to (11) is
+The variables are the increments dq = (dt, w) of all parts that contact can move. For parts that contact couples, (9) to (11) is
 
     minimize  1/2 dq' Q dq + f' dq     subject to     g_i + A_i dq >= 0
 
-with a slack for each pair, whose price is so high that it stays zero unless rows contradict each other: the QP always has a
+with a slack for each pair. Its price is so high that it stays zero unless rows contradict each other. The QP always has a
 solution, and no realization is dropped. The paper's step ends with R <- (I + [w]x) R (12), which keeps the linearized gap
 exactly, and stretches the part by the order of |w|^2; a part that others rest on turns by exp([w]x) instead. The exact
 resolution repeats steps with exp([w]x), until the true gaps are open and the objective is least.

@@ -13,10 +13,10 @@ FREEDOMS = 6
 
 @dataclass(frozen=True, eq=False)
 class Carried:
-    """A part of a group and what may move it.
+    """A part of a group, with the free parts that move it.
 
-    movers    the free parts whose increments move it, those that it is located on first; positions in the group's movers
-    centre    the point (3,) [mm], nominal, about which its increments turn: the centroid of its contact points
+    movers    positions, among the group's movers, of the free parts whose increments move it; parts it is located on come first
+    centre    nominal point (3,) [mm] about which its increments turn: the centroid of its contact points
     is_reference  whether other parts rest on it
     """
 
@@ -34,7 +34,7 @@ class Twist:
     W: ca.SX
 
     def at(self, x: ca.SX) -> ca.SX:
-        """Displacement of a point at x (3, 1) [mm]."""
+        """Return the displacement of a point at x (3, 1) [mm]."""
         return self.d + ca.cross(self.W, x - self.c)
 
     def moving(self, X: Pose, turn: ca.SX) -> Pose:
@@ -44,14 +44,14 @@ class Twist:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """The increments of the movers of a group, about the poses `now` of its parts."""
+    """The increments of the movers of a group, about the present `poses` of its parts."""
 
     carried: Sequence[Carried]
     poses: Sequence[Pose]
     movers: Sequence[Twist]
 
     def by(self, update: Callable[[Carried, Pose, Sequence[Twist]], Pose]) -> list[Pose]:
-        """Return the poses that the increments cause, as `linear`, `rigid`, `quadratic` or `published` has it."""
+        """Return the poses after the increments, by the rule `linear`, `rigid`, `quadratic` or `published`."""
         return [update(part, X, self.movers) for part, X in zip(self.carried, self.poses, strict=True)]
 
 
@@ -67,14 +67,14 @@ def linear(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def rigid(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Return the pose after the increments as rigid motions: R <- exp([w]x) R for its own, then for those that carry it."""
+    """Return the pose after rigid motions R <- exp([w]x) R: those of the part itself, then of the parts that carry it."""
     for mover in reversed(part.movers):
         X = movers[mover].moving(X, rotation(movers[mover].W))
     return X
 
 
 def quadratic(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """What `rigid` gives, to second order in the increments."""
+    """Return the pose of `rigid` to second order in the increments."""
     for mover in reversed(part.movers):
         K = ca.skew(movers[mover].W)
         X = movers[mover].moving(X, ca.SX.eye(3) + K + K @ K / 2)
@@ -82,9 +82,10 @@ def quadratic(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Paper (12), which keeps the linearized gap exactly; but a part that others rest on turns by exp([W]x).
+    """Return the pose of paper (12), which keeps the linearized gap exactly; a part that others rest on turns by exp([W]x).
 
-    Stretched by (12), the normals (4) of a reference part would no longer be normal to it. To first order the two agree.
+    Equation (12) would stretch a reference part, and its normals (4) would no longer be normal to it. To first order both
+    updates agree.
     """
     if not part.is_reference:
         return linear(part, X, movers)
@@ -93,7 +94,7 @@ def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def _total(part: Carried, X: Pose, movers: Sequence[Twist]) -> Twist:
-    """What all its movers together do to a part, about its own centre."""
+    """Return the sum of the twists of all movers of a part, about the part's own centre."""
     c = X.apply(ca.DM(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)
     for mover in part.movers:

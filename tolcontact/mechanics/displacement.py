@@ -1,7 +1,7 @@
 """Displacement energies of many points, from ten moments of them.
 
 The moments of points P about a nominal centre c are N, sum (P - c) and the six distinct entries of
-sum (P - c)(P - c)': enough for every weighting of points, whatever their number.
+sum (P - c)(P - c)'. They suffice for every weighting and any number of points.
 """
 
 import casadi as ca
@@ -14,15 +14,15 @@ _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 def moment_table(P: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """What each point adds to the moments about `centre`, shape (moment, point), for points P (point, 3) [mm]."""
+    """Return the moments (moment, point) of each of the points P (point, 3) [mm] about `centre`."""
     p = (P - centre).T
     return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] for i, j in _UPPER)])
 
 
 def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Pose) -> ca.SX:
-    """1/2 sum |x_end - x_start|^2 [mm^2] over the points that `moments` (10, 1) sums up; quadratic in the pose `end`.
+    """Return 1/2 sum |x_end - x_start|^2 [mm^2] over the points with the given `moments` (10, 1); it is quadratic in `end`.
 
-    x_end - x_start = a + D (P - c), with a the displacement of the centre and D the difference of the rotations.
+    It is x_end - x_start = a + D (P - c), where a is the displacement of the centre and D the difference of the rotations.
     """
     count, first_moment = moments[0], moments[1:4]
     second_moment = ca.SX.zeros(3, 3)

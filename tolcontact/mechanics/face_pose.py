@@ -1,6 +1,6 @@
-"""Faces that deviate: the pose of a face in its part, and of the two faces of a pair to each other.
+"""Poses of deviating faces: of a face in its part, and of the two faces of a pair relative to each other.
 
-A small rigid deviation enters as the pose of the face. So it costs no rows: contact points, their hull and the QP stay.
+A small rigid deviation enters as the pose of the face. It adds no rows: contact points, their hull and the QP stay the same.
 """
 
 import casadi as ca
@@ -11,7 +11,7 @@ from tolcontact.mechanics.pose import Pose, relative, rotation
 
 
 def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
-    """Return the pose that moves points of the nominal face to where they are, in the nominal assembly frame."""
+    """Return the pose that moves points of the nominal face to the actual face, in the nominal assembly frame."""
     if face is None or not face.twist.any():
         return None
     q = ca.DM(face.twist) @ deviations[face.columns.tolist()]
@@ -20,7 +20,7 @@ def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
 
 
 def face_height(face: FaceDeviation | None, deviations: ca.SX) -> ca.SX:
-    """Return by how much a face has grown out of the material [mm]."""
+    """Return the growth of a face out of the material [mm]."""
     if face is None or not face.grows:
         return ca.SX(0)
     return ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
@@ -33,12 +33,12 @@ def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pos
 
 
 def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose | None) -> Pose:
-    """X_RM of a pair: the pose of its moving face in the frame of its reference face; X_WR of the ground is None.
+    """Return X_RM of a pair: the pose of its moving face in the frame of its reference face.
 
-    `faces` are the poses of the two in their parts.
+    `faces` are the poses of the moving and the reference face in their parts. X_WR is None for the ground.
     """
     moving, reference = faces
-    of_moving = X_WM if moving is None else X_WM @ moving
+    X_WF = X_WM if moving is None else X_WM @ moving
     if X_WR is None:
-        return of_moving
-    return relative(of_moving, X_WR if reference is None else X_WR @ reference)
+        return X_WF
+    return relative(X_WF, X_WR if reference is None else X_WR @ reference)

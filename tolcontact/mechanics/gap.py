@@ -12,15 +12,15 @@ from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
 
 def gap(X_RM: Pose, P_m: ca.SX, P_r: ca.SX, n_r: ca.SX) -> ca.SX:
-    """Signed gap [mm], negative if the moving point lies inside the reference part. Paper (5).
+    """Return the signed gap [mm] of paper (5), negative if the moving point lies inside the reference part.
 
-    With x^m - x^r turned into the reference frame, n = R_r n^r (4) becomes n^r; R_r must be a rotation.
+    In the reference frame the normal n = R_r n^r of (4) is n^r. R_r must be a rotation.
     """
     return ca.dot(n_r, X_RM.apply(P_m) - P_r)
 
 
 def gap_gradient() -> ca.Function:
-    """Function (P_m, P_r, n_r) -> (gradient of the gap by the 12 entries of X_RM, gap at X_RM = 0), for one point."""
+    """Return the Function (P_m, P_r, n_r) -> (gradient of the gap by the 12 entries of X_RM, gap at X_RM = 0) of one point."""
     X_RM, P_m, P_r, n_r = ca.SX.sym("X_RM", ENTRIES), ca.SX.sym("P_m", 3), ca.SX.sym("P_r", 3), ca.SX.sym("n_r", 3)
     g = gap(pose_of(X_RM), P_m, P_r, n_r)
     constant = ca.substitute(g, X_RM, ca.SX.zeros(ENTRIES))

@@ -2,7 +2,7 @@
 
 The gaps of all points at a pose are [X_RM, 1] @ G, with G constant. Where both faces are planes, gaps are affine in two
 coordinates of the points: G = basis @ coordinates, with three rows of coordinates instead of thirteen. An affine function has
-its least value at a corner of the points' convex hull, so that only the corners can be the deepest, whatever the pose.
+its least value at a corner of the points' convex hull, so that only the corners can be the deepest, at any pose.
 """
 
 from dataclasses import dataclass
@@ -20,8 +20,8 @@ class GapMap:
     """All gaps of a pair: [[X_RM, 1] @ basis, deviations[columns]] @ coordinates [mm].
 
     basis         (13, r)
-    columns       (k,) of the deviations by which points stand out
-    coordinates   (r + k, point), the first row is 1, the last k are what deviations take from the gaps
+    columns       (k,) of the deviations that raise points above their faces
+    coordinates   (r + k, point): the first row is 1, the last k rows are the derivatives of the gaps by these deviations
     corners       numbers of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
     """
 
@@ -32,7 +32,7 @@ class GapMap:
 
 
 def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
-    """Take the matrix G (13, point) apart, exactly but for rounding."""
+    """Factor the matrix G (13, point), up to rounding."""
     centre = G.mean(axis=1)
     U, S, V = np.linalg.svd(G - centre[:, None], full_matrices=False)
     tolerance = FLATNESS * np.abs(G).max()
@@ -45,9 +45,9 @@ def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
 
 
 def _corners(coordinates: np.ndarray) -> np.ndarray:
-    """Corners of the convex hull of points (coordinate, point), in order; beyond two coordinates all points.
+    """Return the corners of the convex hull of points (coordinate, point), in order; all points beyond two coordinates.
 
-    What all points have in common tells none from the others.
+    Coordinates that are equal for all points are left out.
     """
     coordinates = coordinates[[np.ptp(row) > 0 for row in coordinates]] if len(coordinates) else coordinates
     if len(coordinates) == 0:
@@ -57,6 +57,6 @@ def _corners(coordinates: np.ndarray) -> np.ndarray:
     if len(coordinates) == 2 and coordinates.shape[1] > 3:
         try:
             return np.sort(ConvexHull(coordinates.T).vertices)
-        except QhullError:  # all but on one line
+        except QhullError:  # the points lie almost on one line
             pass
     return np.arange(coordinates.shape[1])

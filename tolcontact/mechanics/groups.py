@@ -10,12 +10,12 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Carried
 from tolcontact.mechanics.displacement import moment_table
 
-BALL = 0.01
+BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point represents
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One side of a pair whose points can be displaced: where they are, and the part (of the group) that they belong to."""
+    """One side of a pair whose points can be displaced: its points, and the position of their part in the group."""
 
     pair: int
     part: int
@@ -24,11 +24,11 @@ class Side:
 
     @property
     def table(self) -> np.ndarray:
-        """What each point adds to the moments, shape (moment, point)."""
+        """The moments of each point, shape (moment, point)."""
         return moment_table(self.points, self.centre)
 
-    def candidates(self, radius: float) -> np.ndarray:
-        """Moments of all points, each of them a small ball, so that points on a line hold all rotations, too."""
+    def ball_moments(self, radius: float) -> np.ndarray:
+        """Return the moments of all points as small balls, so that points on a line hold all rotations, too."""
         moments = self.table.sum(axis=1)
         moments[[4, 7, 9]] += len(self.points) * radius**2
         return np.asarray(moments)
@@ -53,17 +53,17 @@ class Group:
     length: float
 
     def position(self, part: int) -> int:
-        """Where a part stands in `parts`."""
+        """Return the position of a part in `parts`."""
         return self.parts.index(part)
 
     @property
     def ball(self) -> float:
         """Radius of the ball [mm] that a contact point represents in the regularization."""
-        return BALL * self.length
+        return BALL_SHARE * self.length
 
 
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
-    """Positions of the pairs of a group whose points are held by fixed planes for a curved reference face."""
+    """Return the positions of a group's pairs in which fixed planes stand for a curved reference face."""
     pairs = [nominal.pairs[index] for index in group.pairs]
     return [
         k
@@ -73,7 +73,7 @@ def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
 
 
 def contact_groups(nominal: Nominal) -> list[Group]:
-    """Return the groups of parts that contact couples: what touches only fixed parts in common stays apart."""
+    """Return the groups of parts that contact couples. Parts that share only a fixed neighbour are in different groups."""
     chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:

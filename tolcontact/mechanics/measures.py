@@ -15,7 +15,7 @@ from tolcontact.mechanics.tape import replay
 
 
 class SymbolicPoses:
-    """What a user's own measure gets: the symbolic poses of the parts, by their declarations."""
+    """The symbolic poses of the parts, by their declarations: the argument of a user's own measure."""
 
     def __init__(self, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> None:
         self._nominal = nominal
@@ -29,7 +29,7 @@ class SymbolicPoses:
         return self._poses[self._nominal.part_index(part)]
 
     def position(self, point: Point) -> ca.SX:
-        """Where a declared point is, (3, 1) [mm], in the assembly frame."""
+        """Return the position (3, 1) [mm] of a declared point in the assembly frame."""
         X, p, face = self._pose(point.part), ca.SX(ca.DM(self._nominal.position(point))), self._nominal.face_at(point)
         if face is None:
             return X.apply(p)
@@ -39,16 +39,16 @@ class SymbolicPoses:
         return X.apply(p if X_face is None else X_face.apply(p))
 
     def rotation(self, part: Part) -> ca.SX:
-        """R (3, 3) of a part: its rotation from its nominal place."""
+        """Return the rotation R (3, 3) of a part from its nominal place."""
         return self._pose(part).R
 
     def translation(self, part: Part) -> ca.SX:
-        """t (3, 1) [mm] of a part: x = R x0 + t, x0 in the nominal assembly frame."""
+        """Return t (3, 1) [mm] of a part: x = R x0 + t, with x0 in the nominal assembly frame."""
         return self._pose(part).t
 
 
 def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list[ca.SX]:
-    """One scalar expression per declared measure, of poses and deviations (contributor, 1).
+    """Return one scalar expression per declared measure, of poses and deviations (contributor, 1).
 
     Raises ModelError if a user's function fails or does not return a scalar.
     """
@@ -68,17 +68,17 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
 
 
 def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> ca.SX:
-    symbolic = SymbolicPoses(nominal, poses, deviations)
+    part_poses = SymbolicPoses(nominal, poses, deviations)
     if isinstance(measure.of, Point):
         of, to = measure.of, measure.to
         if to is not None:
             origin = nominal.position(to) - nominal.position(of) if measure.quantity == "deviation of distance" else np.zeros(3)
-            moved = symbolic.position(to) - symbolic.position(of) - ca.DM(origin)
+            moved = part_poses.position(to) - part_poses.position(of) - ca.DM(origin)
         else:
             origin = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
-            moved = symbolic.position(of) - ca.DM(origin)
+            moved = part_poses.position(of) - ca.DM(origin)
         return ca.dot(ca.DM(np.array(measure.along)), moved)
-    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(symbolic)
+    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(part_poses)
     expression = ca.SX(value)
     if expression.shape != (1, 1):
         raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")

@@ -1,7 +1,7 @@
-"""What the corrected pose minimizes: the energies of the named objectives, and the regularization beside them. Paper (9), (11).
+"""The objectives that the corrected pose minimizes, and their regularization. Paper (9), (11).
 
-All of them are quadratic in the poses, so that a linear step about any pose has the same quadratic term as one from the
-raw state, and the exact resolution (repeated steps) the residuals from the raw state in its linear term.
+All of them are quadratic in the poses. A linear step about any pose therefore has the same quadratic term as one from the raw
+state. In the exact resolution (repeated steps) the linear term holds the residuals from the raw state.
 """
 
 from collections.abc import Callable, Sequence
@@ -16,9 +16,9 @@ from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.setting import Setting
 from tolcontact.mechanics.two_sided import elongation
 
-# Seating: the share of the forces that the quadratic term holds when all points have moved by the group's length. Small enough
-# to leave it to the contacts who carries, large enough for the solvers.
-YIELD = 1e-3
+# Seating: the share of the forces that the quadratic term carries when all points have moved by the group's length. It is small
+# enough for the contacts to carry nearly the whole load, and large enough for the solvers.
+SEATING_SHARE = 1e-3
 
 
 class Energy(NamedTuple):
@@ -33,18 +33,18 @@ class Energy(NamedTuple):
 
 
 def energy(setting: Setting, poses: Sequence[Pose]) -> Energy:
-    """Return the objective at the poses `now`, affine in the increments."""
+    """Return the objective at `poses`, which are affine in the increments."""
     return _ENERGIES[setting.method.objective](setting, poses)
 
 
 def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Mean squared displacement of all contact points [mm^2] between two poses, halved."""
+    """Return half the mean squared displacement of all contact points [mm^2] between two poses."""
     sides = setting.group.sides
-    return sum((_of_all_points(setting, side, start, end) for side in sides), ca.SX(0)) / _count(setting)
+    return sum((_side_energy(setting, side, start, end) for side in sides), ca.SX(0)) / _count(setting)
 
 
 def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
-    """Displacements of the points that count."""
+    """Return the mean displacement energy of the points that count."""
     value = setting.firmness * _regularization(setting, poses)
     for k, side in enumerate(setting.group.sides):
         value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], poses[side.part])
@@ -53,7 +53,7 @@ def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
 
 
 def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
-    """Energy of the two-sided locators of the movers, 1/2 sum k e^2 [N mm], over the sum of the k [N/mm]."""
+    """Return the energy 1/2 sum k e^2 [N mm] of the movers' two-sided locators, divided by the sum of the k [N/mm]."""
     regularization = setting.firmness * _regularization(setting, poses)
     value, total = ca.SX(0), 0.0
     for part in setting.group.free:
@@ -67,7 +67,7 @@ def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
 
 
 def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
-    """Less the work of the declared forces [N mm], over the sum of their sizes [N] (1 if there are none)."""
+    """Return the negative work of the declared forces [N mm], divided by the sum of their sizes [N] (1 without forces)."""
     nominal, group = setting.nominal, setting.group
     work, total = ca.SX(0), 0.0
     for force in nominal.assembly.forces:
@@ -77,7 +77,7 @@ def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
             work += ca.dot(ca.DM(np.array(force.vector)), poses[k].apply(p) - setting.raw[k].apply(p))
             total += float(np.linalg.norm(force.vector))
     total = total or 1.0
-    quadratic = setting.firmness * YIELD * proximity(setting, setting.raw, poses) / group.length
+    quadratic = setting.firmness * SEATING_SHARE * proximity(setting, setting.raw, poses) / group.length
     return Energy(quadratic - work / total, ca.SX(total))
 
 
@@ -90,16 +90,18 @@ _ENERGIES: dict[str, Callable[[Setting, Sequence[Pose]], Energy]] = {
 
 
 def _regularization(setting: Setting, poses: Sequence[Pose]) -> ca.SX:
-    return sum((setting.method.eta * term for term in _HOLDS[setting.method.regularization](setting, poses)), ca.SX(0))
+    return sum(
+        (setting.method.eta * term for term in _REGULARIZATIONS[setting.method.regularization](setting, poses)), ca.SX(0)
+    )
 
 
-def _of_points(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
-    """Displacement energies of all contact points, side by side."""
-    return [_of_all_points(setting, side, setting.raw, poses) for side in setting.group.sides]
+def _point_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
+    """Return the displacement energy of all contact points of each side."""
+    return [_side_energy(setting, side, setting.raw, poses) for side in setting.group.sides]
 
 
-def _of_identity(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
-    """Energies of the paper's eta I: translations [mm] and rotations [rad] of the movers."""
+def _identity_energies(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
+    """Return the energies of the paper's eta I: translations [mm] and rotations [rad] of the movers."""
     energies = []
     for part in map(setting.group.position, setting.group.free):
         dt, D = poses[part].t - setting.raw[part].t, poses[part].R - setting.raw[part].R
@@ -107,19 +109,19 @@ def _of_identity(setting: Setting, poses: Sequence[Pose]) -> list[ca.SX]:
     return energies
 
 
-_HOLDS = {"points": _of_points, "identity": _of_identity}
+_REGULARIZATIONS = {"points": _point_energies, "identity": _identity_energies}
 
 
-def _of_all_points(setting: Setting, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Displacement energy of all points of a side, seen from the free part that carries it, if one does."""
+def _side_energy(setting: Setting, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
+    """Return the displacement energy of all points of a side, relative to the free part that carries it, if there is one."""
     group, part = setting.group, side.part
-    moments = ca.SX(side.candidates(group.ball))
+    moments = ca.SX(side.ball_moments(group.ball))
     carriers = group.carried[part].movers[:-1]
     if not carriers:
         return displacement_energy(moments, side.centre, start[part], end[part])
     carrier = group.position(group.free[carriers[-1]])
-    end_elongation = setting.linear(relative(end[part], end[carrier]))
-    return displacement_energy(moments, side.centre, relative(start[part], start[carrier]), end_elongation)
+    end_relative = setting.linear(relative(end[part], end[carrier]))
+    return displacement_energy(moments, side.centre, relative(start[part], start[carrier]), end_relative)
 
 
 def _count(setting: Setting) -> int:

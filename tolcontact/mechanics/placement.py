@@ -8,17 +8,17 @@ from tolcontact.mechanics.pose import Pose, rotation
 
 def raw_poses(nominal: Nominal, deviations: ca.SX) -> list[Pose]:
     """Return the raw pose of every part for deviations (contributor, 1) [mm] in the order of `nominal.contributors`."""
-    local = [_on_its_locators(part, held(nominal, index, deviations)) for index, part in enumerate(nominal.parts)]
+    local = [_locator_pose(part, locator_steps(nominal, index, deviations)) for index, part in enumerate(nominal.parts)]
 
-    def follow(index: int) -> Pose:
+    def raw_pose(index: int) -> Pose:
         parent = nominal.parts[index].parent
-        return local[index] if parent is None else follow(parent) @ local[index]
+        return local[index] if parent is None else raw_pose(parent) @ local[index]
 
-    return [follow(index) for index in range(len(local))]
+    return [raw_pose(index) for index in range(len(local))]
 
 
-def held(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
-    """How far each locator of a part moves it (locator, 1) [mm]: its deviation, and what its face comes out of the part."""
+def locator_steps(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
+    """Return the step (locator, 1) [mm] of a part at each locator: its deviation and the growth of its face."""
     local, locators = deviations[nominal.columns(part).tolist()], nominal.parts[part].locators
     for number in range(len(locators)):
         columns, factors = locators.pushes(number)
@@ -27,11 +27,11 @@ def held(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
     return local
 
 
-def _on_its_locators(part: NominalPart, d: ca.SX) -> Pose:
-    """R = exp([theta]x) about the centroid c of the locators, which moves by delta; (delta, theta) = J^-1 d.
+def _locator_pose(part: NominalPart, d: ca.SX) -> Pose:
+    """Return the pose that locators give a part: R = exp([theta]x) about their centroid c, which moves by delta.
 
-    Turning about c, not about the origin, makes the pose the same wherever the assembly stands: the two differ by
-    terms of order theta^2 times the distance of the origin.
+    (delta, theta) = J^-1 d. A rotation about c gives the same pose wherever the assembly stands. A rotation about the origin
+    would differ by terms of order theta^2 times the distance of the origin.
     """
     if not len(part.locators):
         return Pose(ca.SX.eye(3), ca.SX.zeros(3))

@@ -16,17 +16,17 @@ _TINY = 1e-300
 
 
 class Pose(NamedTuple):
-    """R (3, 3) and t (3, 1) [mm]."""
+    """A pose: R (3, 3) and t (3, 1) [mm]."""
 
     R: ca.SX
     t: ca.SX
 
     def __matmul__(self, inner: "Pose") -> "Pose":  # type: ignore[override]
-        """Composition: first `inner`, then this pose."""
+        """Return the composition: first `inner`, then this pose."""
         return Pose(self.R @ inner.R, self.R @ inner.t + self.t)
 
     def apply(self, p: ca.SX | ca.DM) -> ca.SX:
-        """Where the point with nominal coordinates `p` (3, 1) [mm] is now."""
+        """Return the position of the point with nominal coordinates `p` (3, 1) [mm]."""
         return self.R @ p + self.t
 
     def vector(self) -> ca.SX:
@@ -45,7 +45,7 @@ def poses_of(vector: ca.SX) -> list[Pose]:
 
 
 def rotation(theta: ca.SX) -> ca.SX:
-    """exp([theta]x), Rodrigues' formula; exact and differentiable down to theta = 0 [rad]."""
+    """Return exp([theta]x) by Rodrigues' formula; it is exact and differentiable down to theta = 0 [rad]."""
     angle = ca.sqrt(ca.dot(theta, theta) + _TINY)
     half = ca.sin(angle / 2) / (angle / 2)
     K = ca.skew(theta)
@@ -53,5 +53,5 @@ def rotation(theta: ca.SX) -> ca.SX:
 
 
 def relative(X_WM: Pose, X_WR: Pose) -> Pose:
-    """X_RM: the pose of the moving part in the frame of the reference part."""
+    """Return X_RM, the pose of the moving part in the frame of the reference part."""
     return Pose(X_WR.R.T @ X_WM.R, X_WR.R.T @ (X_WM.t - X_WR.t))

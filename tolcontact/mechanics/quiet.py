@@ -1,7 +1,7 @@
-"""Plugins print: banners, and messages about problems that cannot be solved, which no option turns off for good.
+"""Silence for plugins, which print banners and messages that no option turns off for good.
 
-CasADi passes all of that on to Python's streams, in the thread that called it. So those streams are replaced, while any thread
-is in `quiet`, by ones that let through what the other threads write.
+CasADi passes their output to Python's streams, in the thread that called it. While any thread is in `quiet`, other streams take
+their place, which pass on only the output of the other threads.
 """
 
 import contextlib
@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-MAKING = threading.RLock()  # CasADi's objects are made one after the other, whatever the thread
+CONSTRUCTION_LOCK = threading.RLock()  # CasADi's objects must be made one after the other, in all threads
 
 _LOCK = threading.Lock()
 _THREAD = threading.local()
@@ -19,7 +19,7 @@ _inside = 0  # how many times threads are in `quiet`
 
 
 class _Muffled:
-    """A stream that drops what the threads in `quiet` write."""
+    """A stream that drops the output of threads in `quiet`."""
 
     def __init__(self, stream: Any) -> None:
         self.stream = stream
@@ -31,7 +31,7 @@ class _Muffled:
         return getattr(self.stream, name)
 
 
-# Those of the last streams: `print` of another thread does not keep the one alive that it writes to.
+# The latest ones are kept alive: `print` in another thread holds no reference to the stream that it writes to.
 _kept: deque[_Muffled] = deque(maxlen=16)
 
 
@@ -45,8 +45,8 @@ def _muffled(stream: Any) -> _Muffled:
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
-    """Swallow what plugins print in this thread; other threads print on."""
-    global _inside  # noqa: PLW0603  the streams are global, so is who has replaced them
+    """Drop the output of plugins in this thread; other threads print as before."""
+    global _inside  # noqa: PLW0603  the streams are global, so is their replacement
     with _LOCK:
         _inside += 1
         for name in ("stdout", "stderr"):

@@ -1,4 +1,4 @@
-"""What an objective, and the rows of a QP, are expressions of: a group of a model, and the symbols of its inputs."""
+"""The setting of an objective and of the rows of a QP: a group of a model, and the symbols of its inputs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class Setting:
     raw          poses from which displacements count
     moments      (10, side) of the points of each side that count in the objective
     deviations   (contributor, 1) of the model
-    firmness     what multiplies the regularization: 1 in the end
+    firmness     factor of the regularization: 1 in the last step
     z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
     """
 
@@ -38,11 +38,11 @@ class Setting:
         return ca.substitute(expression, self.z, ca.SX.zeros(self.z.shape))
 
     def slope(self, expression: ca.SX) -> ca.SX:
-        """Its Jacobian by z, at z = 0."""
+        """Return the expression's Jacobian by z, at z = 0."""
         return self.at_rest(ca.jacobian(expression, self.z))
 
     def curvature(self, expression: ca.SX) -> ca.SX:
-        """Its Hessian by z, at z = 0."""
+        """Return the expression's Hessian by z, at z = 0."""
         return self.at_rest(ca.hessian(expression, self.z)[0])
 
     def linear(self, X: Pose) -> Pose:
@@ -51,7 +51,7 @@ class Setting:
         return pose_of(self.at_rest(entries) + self.slope(entries) @ self.z)
 
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
-        """X_RM of the faces of the group's pairs."""
+        """Return X_RM of the faces of each pair of the group."""
         relative_poses = []
         for index, faces in zip(self.group.pairs, self._faces, strict=True):
             pair = self.nominal.pairs[index]
@@ -61,5 +61,5 @@ class Setting:
 
     @cached_property
     def _faces(self) -> list[tuple[Pose | None, Pose | None]]:
-        """Poses of the faces of the group's pairs in their parts: expressions that all else shares."""
+        """Poses of the faces of the group's pairs in their parts, as shared expressions."""
         return [face_poses(self.nominal.pairs[index], self.deviations) for index in self.group.pairs]

@@ -1,4 +1,4 @@
-"""Users' expressions onto tapes and back: see tolcontact.declaration.tape."""
+"""Users' expressions as tapes: see tolcontact.declaration.tape."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -29,7 +29,7 @@ def record(expression: ca.SX, entries: ca.SX, max_steps: int = MAX_STEPS) -> Tap
 
     entries   (12 * part + contributor, 1): the entries of all poses, then deviations
 
-    Raises ValueError for an operation that has no place on a tape, or for too many of them.
+    Raises ValueError for an operation that tapes do not support, or for too many operations.
     """
     function = ca.Function("expression", [entries], [expression])
     if function.n_instructions() > max_steps:

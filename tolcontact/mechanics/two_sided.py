@@ -1,19 +1,19 @@
-"""Two-sided locators as expressions of the poses: how far they are from where they hold their part."""
+"""Two-sided locators as expressions of the poses: their elongations and misfits."""
 
 from collections.abc import Sequence
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.mechanics.placement import held
+from tolcontact.mechanics.placement import locator_steps
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.setting import Setting
 
 
 def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
-    """How far each two-sided locator of a part is from its nominal place, along its direction [mm] (locator, 1).
+    """Return the distance (locator, 1) [mm] of each two-sided locator of a part from its nominal place, along its direction.
 
-    Seen from what the part is located on; to first order in the increments, if `linear`.
+    It is measured in the frame that the part is located on, and to first order in the increments if `linear`.
     """
     group, entry = setting.group, setting.nominal.parts[part]
     X = poses[group.position(part)]
@@ -26,11 +26,11 @@ def elongation(setting: Setting, part: int, poses: Sequence[Pose], *, linear: bo
 
 
 def misfit(setting: Setting, poses: Sequence[Pose], *, linear: bool = False) -> ca.SX:
-    """How far the two-sided locators of the movers are from their deviations [mm] (locator, 1)."""
+    """Return the elongations of the movers' two-sided locators less their deviations (locator, 1) [mm]."""
     errors = []
     for part in setting.group.free:
         exact = ~setting.nominal.parts[part].locators.one_sided
         if exact.any():
-            expected = held(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
+            expected = locator_steps(setting.nominal, part, setting.deviations)[np.flatnonzero(exact).tolist()]
             errors.append(elongation(setting, part, poses, linear=linear) - expected)
     return ca.vertcat(*errors) if errors else ca.SX(0, 1)

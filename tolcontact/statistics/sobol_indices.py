@@ -3,14 +3,14 @@
 A measure f of independent groups of contributors has the indices
 
     first order  S_i = Var(E[f | x_i]) / Var(f)          what fixing the group would remove on average
-    total        T_i = E[Var(f | all but x_i)] / Var(f)  what is left if all others are fixed
+    total        T_i = E[Var(f | all but x_i)] / Var(f)  share that remains if all others are fixed
 
 With A and B two independent sets of draws, and A_i the set A with group i from B (Saltelli et al., 2010; Jansen, 1999)
 
     S_i = mean(f(B) (f(A_i) - f(A))) / V,    T_i = mean((f(A) - f(A_i))^2) / 2 V,    V = mean(f(A)^2 + f(B)^2) / 2, f centred
 
 Of groups that are correlated neither says what a group's share is. Shapley effects do: each is what a group adds to the
-variance that those before it explain, or what is left without it, on average over all orders (Owen, 2014; Song, Nelson, Staum,
+variance that those before it explain, or that remains without it, on average over all orders (Owen, 2014; Song, Nelson, Staum,
 2016). They add up to 1. With f_m a realization that has the groups of A at the first m places of a random order, and others
 drawn anew, given these, the group at place m has
 
@@ -27,36 +27,36 @@ CONSTANT = 1e-24  # of the square of the mean: less variance than that is roundi
 
 
 def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
-    """First-order and total indices of each group, of values f (n, 2 + group): of A, of B, and of A with each group from B."""
-    middle = f[:, :2].mean()
-    A, B, mixed = f[:, 0] - middle, f[:, 1] - middle, f[:, 2:] - middle
+    """Return first-order and total indices of each group, for values f (n, 2 + group) of A, B, and A with each group from B."""
+    mean = f[:, :2].mean()
+    A, B, mixed = f[:, 0] - mean, f[:, 1] - mean, f[:, 2:] - mean
     v = (A**2 + B**2) / 2
-    if not np.isfinite(f).all() or not v.mean() > CONSTANT * middle**2:
+    if not np.isfinite(f).all() or not v.mean() > CONSTANT * mean**2:
         return [UNDEFINED] * mixed.shape[1], [UNDEFINED] * mixed.shape[1]
-    first, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
-    return [ratio(u, v) for u in first.T], [ratio(u, v) for u in total.T]
+    first_order, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
+    return [ratio(u, v) for u in first_order.T], [ratio(u, v) for u in total.T]
 
 
 def shapley_effects(f: np.ndarray, places: np.ndarray) -> list[Estimate]:
-    """Of each group, of values f (n, 1 + group) with ever more groups of A, the last one A; places (n, group) in its order."""
-    left = (f[:, -1:] - f) ** 2
-    if not np.isfinite(f).all() or not left[:, 0].mean() > CONSTANT * f.mean() ** 2:
+    """Return each group's Shapley effect, for values f (n, 1 + group) with ever more groups of A, at `places` (n, group)."""
+    remaining = (f[:, -1:] - f) ** 2
+    if not np.isfinite(f).all() or not remaining[:, 0].mean() > CONSTANT * f.mean() ** 2:
         return [UNDEFINED] * places.shape[1]
-    freed = np.take_along_axis(left[:, :-1] - left[:, 1:], places, axis=1)
-    return [ratio(u, left[:, 0]) for u in freed.T]
+    reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], places, axis=1)
+    return [ratio(u, remaining[:, 0]) for u in reductions.T]
 
 
 def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
-    """Share of the variance of f (n,) that a prediction (n,) misses; more than 1 if it is worse than none."""
-    middle, off = f.mean(), f - linear
-    f = f - middle
-    if not np.isfinite(f).all() or not (f**2).mean() > CONSTANT * middle**2:
+    """Return the share of the variance of f (n,) that a prediction (n,) misses; it exceeds 1 if the mean predicts better."""
+    mean, errors = f.mean(), f - linear
+    f = f - mean
+    if not np.isfinite(f).all() or not (f**2).mean() > CONSTANT * mean**2:
         return UNDEFINED
-    return ratio((off - off.mean()) ** 2, f**2)
+    return ratio((errors - errors.mean()) ** 2, f**2)
 
 
 def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
-    """Mean of u over mean of v, of the same realizations, with the interval of its influence function."""
-    below = v.mean()
-    estimate = u.mean() / below
-    return from_influence(estimate, (((u - estimate * v) / below) ** 2).sum(), len(u))
+    """Return the mean of u over the mean of v, of the same realizations, with the interval of its influence function."""
+    mean_v = v.mean()
+    estimate = u.mean() / mean_v
+    return from_influence(estimate, (((u - estimate * v) / mean_v) ** 2).sum(), len(u))

@@ -1,4 +1,4 @@
-"""Ways to call a CasADi Function for many realizations at once: by name, interpreted, compiled, or as it pays."""
+"""Ways to call a CasADi Function for many realizations at once: by name, interpreted, compiled, or whichever is faster."""
 
 from tolcontact.compilation.functions.interpreted import InterpretedFunction
 from tolcontact.compilation.functions.named import NamedFunction, flat

@@ -6,16 +6,16 @@ from collections.abc import Iterator, Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from tolcontact.mechanics.quiet import MAKING, quiet
+from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
 
 
 class InterpretedFunction:
-    """A Function that CasADi evaluates, by its position of inputs and outputs.
+    """A Function that CasADi evaluates; inputs and outputs go by position.
 
-    Not to be shared between threads: one evaluation at a time uses its buffers. `given` are inputs, by position, that are
-    the same in all realizations.
+    Threads must not share it, since each evaluation uses its buffers. `fixed_inputs` are inputs, by position, that are the same
+    in all realizations.
     """
 
     def __init__(self, function: ca.Function, fixed_inputs: Mapping[int, np.ndarray] | None = None) -> None:
@@ -28,9 +28,9 @@ class InterpretedFunction:
         self._solvers = [function] if function.is_a("Conic") else []
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        """For the inputs (realization, stored entry) that are not given: outputs, likewise, and `failed` (realization,).
+        """Return the outputs (realization, stored entry), and `failed` (realization,), for the inputs that are not fixed.
 
-        Outputs are NaN if the evaluation gave up.
+        Outputs are NaN if the evaluation failed.
         """
         count = len(inputs[0])
         results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
@@ -38,7 +38,7 @@ class InterpretedFunction:
         for call, start, stop in self._turns(count):
             rows = slice(start, stop)
             if not call([array[rows] for array in inputs], [result[rows] for result in results]):
-                # A plugin that gives up on one realization ends the whole call (qpOASES does), so find out which.
+                # A plugin that gives up on one realization ends the whole call (qpOASES does), so each is evaluated alone.
                 self._forget()
                 for k in range(start, stop):
                     entry = slice(k, k + 1)
@@ -50,7 +50,7 @@ class InterpretedFunction:
         return results, failed
 
     def _turns(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
-        """Who evaluates which realizations; the narrower of WIDTHS may have idle places at the end."""
+        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have idle places at the end."""
         start = 0
         while start < count:
             remaining = count - start
@@ -62,7 +62,7 @@ class InterpretedFunction:
             start = stop
 
     def _forget(self) -> None:
-        """Give the solvers a new memory. qpOASES starts from its last problem, and once it has failed it fails for ever."""
+        """Give the solvers a new memory. qpOASES starts from its last problem, and after one failure it always fails."""
         for solver in self._solvers:
             solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
         for call in self._calls:
@@ -70,7 +70,7 @@ class InterpretedFunction:
 
 
 class _Buffers:
-    """One Function, of `width` realizations at once, with arrays that stay where they are."""
+    """A Function of `width` realizations at once, with arrays at fixed addresses."""
 
     def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
         self._buffer, self._evaluate = function.buffer()
@@ -89,14 +89,14 @@ class _Buffers:
         self.is_new = True
 
     def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
-        """Evaluate for up to `width` realizations; idle places repeat the last one. False if the Function gave up."""
+        """Evaluate for up to `width` realizations; idle places repeat the last one. Return whether it succeeded."""
         count = len(inputs[0])
         for buffer, array in zip(self._inputs, inputs, strict=True):
             buffer[:count] = array
             buffer[count:] = array[-1:]
         try:
-            # A first evaluation makes what the Function needs. Plugins may print in any.
-            with MAKING if self.is_new else contextlib.nullcontext(), quiet():
+            # The first evaluation constructs objects of CasADi. Plugins may print in every one.
+            with CONSTRUCTION_LOCK if self.is_new else contextlib.nullcontext(), quiet():
                 self._evaluate()
         except RuntimeError:  # CasADi's only exception: bounds that are not numbers
             return False

@@ -1,4 +1,4 @@
-"""Functions that are called by name, and read by name."""
+"""Functions whose inputs and outputs go by name."""
 
 import math
 
@@ -18,20 +18,20 @@ class NamedFunction:
 
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
-        """With all entries of inputs and outputs, also those that are always zero."""
+        """Return a function with all entries of inputs and outputs, including those that are always zero."""
         inputs = [ca.SX.sym(name, *function.size_in(name)) for name in function.name_in()]
         outputs = [ca.densify(output) for output in function.call(inputs)]
         return cls(ca.Function(function.name(), inputs, outputs, function.name_in(), function.name_out()))
 
     def __call__(self, **arrays: Real[Array, "realization ..."]) -> dict[str, Float[Array, "realization _"]]:
-        """Outputs by name, (realization, stored entry), for inputs `name=(realization, ...)`.
+        """Return outputs by name, (realization, stored entry), for inputs `name=(realization, ...)`.
 
-        Arrays of other names are left alone.
+        Arrays with other names are ignored.
         """
         outputs = self._evaluate([flat(arrays[name]) for name in self._names])
         return dict(zip(self._results, outputs, strict=True))
 
 
 def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:
-    """(realization, entry) of an array that is flat or (column, row), CasADi's order, inside a realization."""
+    """Return (realization, entry) of an array that is flat or (column, row), CasADi's order, in each realization."""
     return np.ascontiguousarray(array, dtype=float).reshape(len(array), math.prod(array.shape[1:]))

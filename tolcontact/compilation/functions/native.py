@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from llvmlite import binding, ir
 
-from tolcontact.compilation.functions import kept_code
+from tolcontact.compilation.functions import code_cache
 
 LANES = 4
 _INDEX = ir.IntType(64)
@@ -32,7 +32,7 @@ class NativeFunction:
     """A compiled Function, called for many realizations at once: `inputs` and results are (realization, stored entry)."""
 
     def __init__(self, function: ca.Function, code: bytes | None = None) -> None:
-        """From machine code that was kept of the same Function, or compiled, and then kept.
+        """Load the given machine code of the Function, or compile the Function and store its code in the cache.
 
         Raises UnknownInstructionError for a Function that cannot be compiled.
         """
@@ -44,9 +44,9 @@ class NativeFunction:
         self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointers, pointers)(address)
 
     @classmethod
-    def kept(cls, function: ca.Function) -> "NativeFunction | None":
-        """From code that an earlier process left; None if there is none."""
-        code = kept_code.kept(key_of(function))
+    def from_cache(cls, function: ca.Function) -> "NativeFunction | None":
+        """Return the compiled Function from the code of an earlier process; None if there is none."""
+        code = code_cache.load(key_of(function))
         return None if code is None else cls(function, code)
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -62,7 +62,7 @@ def _pointers(arrays: Sequence[np.ndarray]) -> ctypes.Array:
 
 
 def _module(function: ca.Function) -> ir.Module:
-    """void evaluate(count, inputs, results): all instructions, for LANES realizations at once.
+    """Return a module with `void evaluate(count, inputs, results)`: all instructions, for LANES realizations at once.
 
     In the last turn of the loop the lanes beyond `count` repeat the last realization.
     """
@@ -102,7 +102,7 @@ def _module(function: ca.Function) -> ir.Module:
 
 
 def _translate(function: ca.Function, builder: ir.IRBuilder, inputs: list, results: list) -> None:
-    """Return the instructions of a Function; `inputs` and `results` hold, for each argument and lane, where it is."""
+    """Emit the instructions of a Function; `inputs` and `results` hold the address of each argument and lane."""
     work: dict[int, ir.Value] = {}
     for number in range(function.n_instructions()):
         operation = function.instruction_id(number)
@@ -133,7 +133,7 @@ ZERO, ONE = _constant(0.0), _constant(1.0)
 
 
 def _truth(builder: ir.IRBuilder, value: ir.Value) -> ir.Value:
-    """1.0 or 0.0 of a bit."""
+    """Return 1.0 or 0.0 for a bit."""
     return builder.select(value, ONE, ZERO)
 
 
@@ -142,7 +142,7 @@ def _holds(builder: ir.IRBuilder, x: ir.Value) -> ir.Value:
 
 
 def _extreme(builder: ir.IRBuilder, sign: str, x: ir.Value, y: ir.Value) -> ir.Value:
-    """As C's fmin ("<=") and fmax (">="): a NaN gives way to the other number, and of equals the first is kept."""
+    """Return C's fmin ("<=") or fmax (">="): the other number for a NaN, and the first of two equal numbers."""
     return builder.select(builder.or_(builder.fcmp_ordered(sign, x, y), builder.fcmp_unordered("uno", y, y)), x, y)
 
 
@@ -180,13 +180,13 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
 
 
 def key_of(function: ca.Function) -> str:
-    """What tells the machine code of a Function from all other code."""
+    """Return the key of a Function's machine code."""
     return hashlib.blake2b(function.serialize().encode() + _surroundings(), digest_size=20).hexdigest()
 
 
 @functools.cache
 def _surroundings() -> bytes:
-    """What machine code depends on, besides the Function: the processor, the libraries, and how it is translated."""
+    """Return a description of the processor, the libraries and the translation, on which machine code depends, too."""
     translation = Path(__file__).read_bytes()
     features = binding.get_host_cpu_features().flatten()
     parts = [binding.get_default_triple(), binding.get_host_cpu_name(), features, version("llvmlite"), version("casadi")]
@@ -195,7 +195,7 @@ def _surroundings() -> bytes:
 
 def _compiled(module: ir.Module, key: str) -> binding.ExecutionEngine:
     engine = _engine(str(module))
-    engine.set_object_cache(notify_func=lambda _, code: kept_code.keep(key, code))
+    engine.set_object_cache(notify_func=lambda _, code: code_cache.store(key, code))
     engine.finalize_object()
     return engine
 
