@@ -26,18 +26,18 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | read shapes | `tolcontact.geometry` | meshes, STEP files, faces and their surfaces |
 | tolerances of a drawing | `tolcontact.features` | kinds of features and tolerances, datums |
 | discretize | `tolcontact.discretization` | contact points, balls and shafts, warnings |
-| draw | `tolcontact.variation` | from tolerances and zones to deviations; seeds |
+| draw | `tolcontact.variation` | distributions of deviations, zones of features, seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |
-| resolve contact | `tolcontact.contact` | linearized or exact, statuses, what a certificate covers, limits |
+| resolve contact | `tolcontact.contact` | linearized or exact resolution, statuses, what a certificate covers, limits |
 | simulate | `tolcontact.simulation` | blocks, threads, reproducibility |
 | summarize | `tolcontact.statistics` | estimates and their intervals, displacement fields |
 | archive | `tolcontact.archive` | the netCDF file: layout, reading, resuming, checksums |
 | report | `tolcontact.report` | tables, pages for a browser, notebooks |
 | draw pictures | `tolcontact.plot` | histograms, fields and assemblies for papers and slides |
-| all of it | `tolcontact.workflow` | `run`, `build`, `check`, `simulate`, `compare`, `summarize` from Python |
-| ask | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and places suffice |
-| all of it | `tolcontact.cli` | the command `tolcontact`, its exit codes |
+| whole flow in Python | `tolcontact.workflow` | `run`, `build`, `check`, `simulate`, `compare`, `summarize` |
+| analyse | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and positions suffice |
+| whole flow in a shell | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
 `python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.
 
@@ -55,12 +55,12 @@ Each stage of a run is a package, and its documentation is a chapter: read them 
 | commands | `main`, `command_line` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
-| ask what matters | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
+| analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
 | warnings | `ContactWarning`, `UnitsWarning` |
 
-`tolcontact.testing` has asserts for tests of your own models.
+`tolcontact.testing` has assertions for tests of your own models.
 """
 
 from importlib import import_module

@@ -29,9 +29,9 @@ A face consists of the triangles that meet every criterion you give; without any
 |---|---|
 | `"+x"` to `"-z"` | triangles whose outward normal has this direction, to within 1 degree |
 | `tc.Facing((0, 1, 2), angle)` | triangles whose outward normal is within `angle` of any direction |
-| `tc.Inside(lower, upper)` | what lies inside a box; triangles that cross its sides are cut there |
+| `tc.Inside(lower, upper)` | the surface inside a box; triangles that cross its sides are cut there |
 | `tc.Near(other, within)` | faces that face another part and come within a distance of it |
-| `tc.Cylinder(radius, inner)` | cylinders: of one size, or holes (`inner=True`), or neither |
+| `tc.Cylinder(radius, inner)` | cylinders: all, those of one radius, or holes only (`inner=True`) |
 | `tc.Largest("plane", "+z")` | the largest face of a kind, along a direction |
 | `tc.Brep((x, y, z))`, `tc.Brep(12)` | the face of a STEP file that passes through a point, or has a number |
 | `tc.Brep("seat")` | the faces of a STEP file that have a name, where it gives names |
@@ -45,12 +45,12 @@ base +z inside (0, 0, 9) to (50, 50, 11)
 
 `locate(part, scheme)` states what positions a part: six locators, each a point of the part, a direction into the part, and a
 deviation along it. `tc.three_two_one(primary, secondary, tertiary, inset=...)` derives them from three faces: A1, A2, A3 on
-the primary face, B1, B2 on the secondary one, C1 on the tertiary one, `inset` mm inside the edges. A list of
-`tc.Locator(name, point, direction)` gives them one by one.
+the primary face, B1, B2 on the secondary one, C1 on the tertiary one, `inset` mm inside the edges. A list of `tc.Locator(name,
+point, direction)` declares them one by one.
 
-A tolerance is the full width of its zone: 0.6 means -0.3 to +0.3. `locate(..., tolerance=...)` applies to every locator
-without one of its own. By default the deviation is normal with 6 sigma equal to the width; `tolcontact.variation` lists the
-other distributions.
+A tolerance is the full width of its zone: 0.6 means -0.3 to +0.3. The tolerance of `locate(..., tolerance=...)` applies to
+every locator that does not have its own. By default the deviation is normal with 6 sigma equal to the width;
+`tolcontact.variation` lists the other distributions.
 
 >>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
 >>> location = clamp.locate(plate, scheme, tolerance=0.6)
@@ -67,16 +67,17 @@ have more than six locators, of which at most six are two-sided. `stiffness` (N/
 "locator stiffness" alone.
 
 A part that contact alone holds in some directions (a shaft in a V, a lid over studs) is `floating=True` and has fewer
-locators, or none. In the raw state it keeps its nominal place in the directions that they leave open; there it moves as the
-objective wants, from nowhere else: with "active points" or "all points" only as far as it must not to penetrate, with
-"seating" as its forces pull. Locators that hold the same direction twice are named, and rejected.
+locators, or none. In the directions that its locators leave open, it keeps its nominal position in the raw state. Contact then
+moves it as the objective requires: with "active points" or "all points" only as far as needed to avoid penetration, with
+"seating" as its forces pull. Locators that hold the same direction twice are rejected by name.
 
 ## Features, and the tolerances of a drawing
 
 `part.feature(name, face, tolerances..., datum=...)` names a face: a plane, cylinder, cone, sphere or a general surface, or two
 opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and can be used in place of a
-face. Its one deviation moves everything that touches it, is located by it, or is measured at `feature.point(x, y, z)` or at an
-end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 schemes that choose its triangles without naming it.
+face. The same deviation moves everything that touches the feature, is located by it, or is measured at `feature.point(x, y,
+z)` or at an end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 schemes that choose the triangles of the feature
+without naming it.
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
@@ -91,7 +92,7 @@ feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
 
 ## Shared causes, correlation, measured parts
 
-All that varies is a *contributor* with a label: "part.locator", "part.feature.freedom" ("cover.width.size",
+Every quantity that varies is a *contributor* with a label: "part.locator", "part.feature.freedom" ("cover.width.size",
 "cover.top.offset"), or the name of a variable. `print(tc.build(model).nominal.contributors)` lists them.
 
 >>> warmth = clamp.variable("warmth", 20, drives={"cover.width.size": 0.0007, "cover.top.offset": 0.00006}, units="K")
@@ -99,17 +100,17 @@ All that varies is a *contributor* with a label: "part.locator", "part.feature.f
 >>> batch = clamp.population({"cover.side.tilt z": [0.004, -0.002, 0.001]})
 
 A variable adds its factor times its own deviation to each contributor that it drives. A correlation is a matrix, or a number
-for two contributors; their distributions stay. A population is a table of measured parts (a CSV file, a DataFrame, a Dataset,
-a mapping) whose rows are drawn whole, with replacement; its columns replace the draws of the contributors that they are named
-after.
+for two contributors; it leaves their distributions unchanged. A population is a table of measured parts (a CSV file, a
+DataFrame, a Dataset, a mapping) whose rows are drawn as a whole, with replacement. Each column replaces the draws of the
+contributor that it is named after.
 
 ## Contact pairs
 
-`contact(name, moving=..., reference=...)` keeps points of the `moving` face outside the `reference` face. The points are 200
-spread evenly, and more where the rims of flat faces cross or faces are curved; `points=` sets their number, `spacing=` their
-distance, and `points="vertices"` takes the vertices of the mesh. A point takes part if the reference face lies within
-`within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part). A ball or a shaft beside
-walls needs no sampled points (see Balls and shafts in `tolcontact.discretization`), unless you ask for some.
+`contact(name, moving=..., reference=...)` keeps points of the `moving` face outside the `reference` face. By default it
+spreads 200 points evenly, and adds more where the rims of flat faces cross or faces are curved; `points=` sets their number,
+`spacing=` their distance, and `points="vertices"` takes the vertices of the mesh. A point takes part if the reference face
+lies within `within` mm of it in the nominal assembly (by default a tenth of the diagonal of the moving part). A ball or a
+shaft beside walls needs no sampled points, unless you request them (see Balls and shafts in `tolcontact.discretization`).
 
 >>> pair = clamp.contact("seat", moving=plate.face("-z"), reference=base.face("+z"), spacing=5)
 >>> print(pair)
@@ -118,14 +119,13 @@ contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 ## What contact may move
 
 Contact can move any part that is the moving side of a pair, or that has one-sided locators; prevent it with `fixed=True`. A
-part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact
-can move are corrected together, each with six degrees of freedom, also those that are located on other parts.
+part that is only ever a reference stays where its locators put it; let it move with `fixed=False`. All parts that contact can
+move are corrected together, each with six degrees of freedom, including parts that are located on other parts.
 
 ## Forces
 
-`force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Forces enter the objective
-"seating" alone (see `tolcontact.mechanics`): there they press parts onto their supports and neighbours, and decide which of
-the supports carry load.
+`force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Only the objective "seating" uses
+forces (see `tolcontact.mechanics`): they press parts onto their supports and neighbours, and decide which supports carry load.
 
 >>> weight = clamp.force("weight", at=plate.point(30, 20, 4), vector=(0, 0, -100))
 >>> print(weight)
@@ -133,10 +133,11 @@ force weight: (0, 0, -100) N at plate (30, 20, 4)
 
 ## Measures
 
-A measure is the displacement of a point along a direction, the distance of two points along a direction (`to=`), or a
-function of the symbolic poses that returns a CasADi expression. `absolute=True` makes it the coordinate of the point,
-`absolute=False` how far the distance is from the nominal one. `limits=(lower, upper)` are the allowed values of this number,
-None for an open side; `tolerance` is short for limits half of it below and above the nominal value.
+A measure is the displacement of a point along a direction, the distance of two points along a direction (`to=`), or a function
+of the symbolic poses that returns a CasADi expression. With `absolute=True` a displacement becomes the coordinate of the
+point; with `absolute=False` a distance becomes its difference from the nominal distance. `limits=(lower, upper)` are the
+allowed values of the measure, with None for an open side. `tolerance` is short for limits at half the tolerance below and
+above the nominal value.
 
 >>> height = clamp.measure("height", plate.point(0, 0, 8), along="z", tolerance=0.5)
 >>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z", limits=(None, 0.2))
@@ -144,15 +145,16 @@ None for an open side; `tolerance` is short for limits half of it below and abov
 ...     return poses.rotation(plate)[2, 0]
 >>> slope = clamp.measure("slope", tilt, units="rad")
 
-The poses that such a function receives have `position(point)`, `rotation(part)` and `translation(part)`.
+The function receives poses with the methods `position(point)`, `rotation(part)` and `translation(part)`.
 
 ## The model's method, and faults
 
-A model states the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells", method=tc.Method(resolution="exact",
-objective="all points"))`. Options of the command line, or `tc.run(..., method={"objective": "seating"})`, replace single
-choices. The archive states which method was used, and whether it was the model's own, the defaults, or set by options.
+A model can state the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells",
+method=tc.Method(resolution="exact", objective="all points"))`. Options of the command line, or `tc.run(...,
+method={"objective": "seating"})`, replace single choices. The archive states which method was used, and whether it was the
+model's own, the defaults, or set by options.
 
-`tc.check(model)`, or `tolcontact check MODEL.py`, lists every fault of a model at once, each with the line of the script.
+`tc.check(model)`, or `tolcontact check MODEL.py`, lists all faults of a model at once, each with its line in the script.
 
 >>> tc.check(clamp)
 ('part "cover" (...): it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place',)

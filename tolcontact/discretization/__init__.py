@@ -1,4 +1,4 @@
-"""Discretize: shapes become surfaces, contact points and locator points in the nominal assembly frame. A chapter of the guide.
+"""Discretize: surfaces, contact points and locators of the nominal assembly, in its frame. A chapter of the guide.
 
 `tc.build(model)` reads the shapes, finds the faces (see `tolcontact.geometry`) and spreads contact points, which are the same
 in all realizations.
@@ -17,20 +17,21 @@ in all realizations.
 
 ## Contact points
 
-Points are spread over the moving face, as far apart as possible, starting from the corners of its rim. They follow `points=`
-or `spacing=`, not the tessellation. Each point is projected onto the reference face. It takes part if it does not overhang the
-rim of that face and lies within `within` of it. A contact point has a place on the moving part, a place on the reference part,
-and the outward normal of the reference face there.
+Points are spread over the moving face, as far apart as possible, starting from the corners of its rim. Their number depends on
+`points=` or `spacing=`, not on the tessellation. Each point is projected onto the reference face. It takes part if it does not
+overhang the rim of that face and lies within `within` of it. A contact point consists of a position on the moving part, a
+position on the reference part, and the outward normal of the reference face there.
 
 If you leave out both `points` and `spacing`, contact points are added. For two flat faces these are the points where their
-rims cross or where a corner of one lies over the other: tilted parts touch there first. For curved faces the points follow
-curvature. They are at most 5000, and so close that the faces cannot sink into each other between them by more than a
-two-thousandth of the smallest tolerance range. This is the smallest range of any locator or measure in mm; a range narrower
-than a thousandth of the widest one is taken for a constant and does not count.
+rims cross or where a corner of one lies over the other: tilted parts touch there first. For curved faces the density of points
+follows the curvature. There are at most 5000 points, close enough that between them the faces cannot penetrate each other by
+more than a two-thousandth of the smallest tolerance range. This is the smallest range of any locator or measure in mm; a range
+narrower than a thousandth of the widest one is treated as a constant and ignored.
 
 ## Warnings
 
-A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, leave more than that open.
+A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, allow more penetration than
+that.
 
 >>> import trimesh, warnings
 >>> ball = tc.Assembly("ball")
@@ -47,16 +48,18 @@ A `tc.ContactWarning` states the error in mm if your points, or the triangles of
 >>> print(caught[0].message)
 contact pair "foot" (...): parts may be off by up to 0.0092 mm between flat triangles and the round faces ...
 
-A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, by itself (below 1 mm, above 10 m) or
-beside a part that it touches. It also names a mesh if a locator, measure or force is farther from it than its own size.
+A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, either in itself (below 1 mm or above 10
+m) or compared with a part that it touches. It also names a mesh if a locator, measure or force is farther from it than its own
+size.
 
 ## Balls and shafts
 
 If a ball or a shaft of one part lies beside walls of the other, no points are sampled at all. A ball (a sphere) is its centre
 beside a plane, cylinder, cone or sphere, or a convex torus. A shaft (an outer cylinder) is the two ends of its axis in a
-parallel hole (an inner cylinder), or along a plane. The points of contact are computed at every pose, also a tilted one: a pin
-jams in its hole at the right angle for any tessellation. Where an edge of the wall, a gap in it or another curve may touch
-first, the pair has sampled points. `tolcontact check` names the pairs of round faces; `points=` or `spacing=` overrule it.
+parallel hole (an inner cylinder), or along a plane. The points of contact are computed at every pose, including tilted ones: a
+pin jams in its hole at the correct angle whatever the tessellation. Where an edge of the wall, a gap in it or another curve
+may touch first, the pair has sampled points. `tolcontact check` names the pairs that are handled in this way; `points=` or
+`spacing=` overrides it.
 
 >>> stand = tc.Assembly("pin in a hole")
 >>> plate = stand.part("plate", tc.Mesh(trimesh.creation.annulus(5.05, 20, 10, sections=24)), fixed=True)
@@ -73,8 +76,8 @@ program of pin in a hole: ...
 
 Diameters of features vary exactly in these contacts: the radius of the ball, the shaft or the wall is the drawn one.
 
-The ends of the faces are those of the nominal assembly. A shaft that is pushed out of its hole, or a ball beyond the end of its
-wall, is not detected at that pose, but afterwards (see the checks of surfaces in `tolcontact.contact`).
+The ends of the faces are those of the nominal assembly. A shaft that is pushed out of its hole, or a ball beyond the end of
+its wall, is detected only afterwards (see the checks of surfaces in `tolcontact.contact`).
 """
 
 from tolcontact.discretization.discretizing import discretize

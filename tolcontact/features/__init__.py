@@ -6,10 +6,10 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 | feature | displacements |
 |---|---|
 | plane; middle of two planes | offset in its middle, two tilts at the edges of its smallest rectangle |
-| cylinder, cone | two shifts in the middle of its axis, two tilts at its ends; of a cone also a shift along the axis |
+| cylinder, cone | two shifts in the middle of its axis, two tilts at its ends; for a cone also a shift along the axis |
 | sphere | three shifts of its centre |
-| general surface | those of six displacements that move its vertices along their normals |
-| cylinder, sphere, two planes | its size: a diameter or a distance |
+| general surface | the rigid displacements, of six, that move its vertices along their normals |
+| cylinder, sphere, two planes | also its size: a diameter or a distance |
 
 >>> import tolcontact as tc
 >>> model = tc.Assembly("block")
@@ -23,7 +23,7 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 
 ## Tolerances
 
-| tolerance | of | what it controls |
+| tolerance | applies to | controls |
 |---|---|---|
 | `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
 | `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
@@ -35,18 +35,20 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 
 `zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum.
 `material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the
-process uses it), "accepts" (only a check does) or "none". `rule=`, `cp=` and `cpk=` are in `tolcontact.variation`. All this
-follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), while ASME's Rule #1 makes them do so.
+process uses the bonus), "accepts" (only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in
+`tolcontact.variation`. All this follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), unlike
+under ASME's Rule #1.
 
 ## Datums
 
 Datums are features of the same part; "A-B" is a common datum, "B(M)" one at maximum material, as in `tc.Position(0.2,
-"A|B(M)")`. A tolerance limits only what its datums lock: a hole's position to a plane across it is a tolerance of its tilt. If
-datums deviate, the features that refer to them follow. The frame of a part is that of its shape, where datums are nominal. A
-datum shift is not drawn: it follows from the contact of the datum feature with its mate.
+"A|B(M)")`. A tolerance limits only the freedoms that its datums lock: the position of a hole relative to a plane across its
+axis limits only its tilt. If a datum deviates, the features that refer to it follow. The frame of a part is the frame of its
+shape, in which datums are nominal. A datum shift is not drawn: it follows from the contact of the datum feature with its mate.
 
-Several tolerances of a feature are nested, form within orientation within location; a finer lower frame is a second position,
-to fewer datums. Each tolerance draws the freedoms that the narrower ones leave, as the top of the block shows.
+Several tolerances of a feature are nested, form within orientation within location; a finer lower segment of a frame is a
+second position tolerance, with fewer datums. Each tolerance draws the freedoms that narrower tolerances leave, as the top of
+the block shows.
 """
 
 from tolcontact.features.feature_geometry import AxisFeature, FeatureOfSize, PlaneFeature

@@ -1,7 +1,8 @@
-"""Geometry: shapes, their surfaces and faces, and the files they come from. Part's own frame, mm. A chapter of the guide.
+"""Geometry: shapes, their surfaces and faces, and the files they come from. A chapter of the guide.
 
 The shape of a part is a box, or triangles from a mesh or a STEP file. Its faces are smooth pieces of the triangles, or the
-faces that the STEP file names. `preview` lists the faces of a part before anything is computed.
+faces that the STEP file names. All coordinates are in the frame of the part, in mm. `preview` lists the faces of a part before
+anything is computed.
 
 >>> import trimesh
 >>> import tolcontact as tc
@@ -15,8 +16,8 @@ faces that the STEP file names. `preview` lists the faces of a part before anyth
 
 ## Meshes
 
-`tc.Mesh(source, units=...)` states the units of the source: "um", "mm", "cm", "m", "in" or "ft". Without it, a STEP file
-states its own units, a GLB file is in m, `mesh.units` of a Trimesh applies if it is set, and all others are in mm.
+`tc.Mesh(source, units=...)` states the units of the source: "um", "mm", "cm", "m", "in" or "ft". Without `units`, a STEP file
+states its own units, a GLB file is in m, a Trimesh is in its `mesh.units` if they are set, and all other sources are in mm.
 
 Meshes may be open, or hold several bodies. A surface with an undefined outside is rejected: neighbouring triangles oriented
 inconsistently, a body turned inside out, coincident triangles that point opposite ways. A part may have a million triangles
@@ -26,33 +27,35 @@ meet at more than 30 degrees form an edge.
 ## Round faces
 
 The surface of a face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. In other meshes a
-cylinder, cone or sphere is fitted to the vertices of each smooth piece. The fit counts if no vertex is farther than 1 um from
-it and the piece has at least five facets, none of which turns by more than 30 degrees. Contact points, their feet and normals
-then lie on that surface instead of its triangles. So a prism of many sides counts as a cylinder; `tolcontact check` states how
-far inside its triangles lie. Other curved faces are as round as their triangles.
+cylinder, cone or sphere is fitted to the vertices of each smooth piece. The fit is accepted if every vertex lies within 1 um
+of it and the piece has at least five facets, with no more than 30 degrees between neighbours. Contact points, their
+projections and normals then lie on the fitted surface instead of the triangles. A prism with many sides is therefore treated
+as a cylinder; `tolcontact check` states how far inside the cylinder its triangles lie. Other curved faces are only as round as
+their triangles.
 
 ## STEP files
 
 STEP files need the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um, or 5e-6 of the extent of
 a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks for 0.1 mm instead; contact on surfaces that the file
-states does not depend on it. If there would be more than a million triangles, or triangulation takes too long, faces are
-triangulated 30 times as coarsely and to 0.5 rad, with a warning.
+states does not depend on this chord. If there would be more than a million triangles, or triangulation takes too long, faces
+are triangulated 30 times as coarsely and to 0.5 rad, with a warning.
 
-The triangles keep the boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file
-states a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet in a vertex come to
-each other. Elsewhere they are rounded to the resolution of single precision: 1e-5 mm at 100 mm, 2e-4 mm at 1 m.
+The triangles keep the boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states
+a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet at a vertex agree. Elsewhere
+they are rounded to the resolution of single precision: 1e-5 mm at 100 mm, 2e-4 mm at 1 m.
 
 An assembly holds several bodies. `tolcontact bodies FILE.stp` and `tc.bodies_in` list them; `tc.Mesh(file, body=...)` is one
-of them in the frame of its product; `tc.parts_from(model, file)` declares all of them, or those named, as parts in their
-places. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
-directions, radii and areas, and with names if the file has any, by which `tc.Brep("...")` chooses them. If the faces of a body
-have several colours, they are not in the file's order and their names are unknown. Where a file states no simple surface, a
-plane, cylinder, cone or sphere is fitted to within 1 um, and its residual is listed. References to other files are rejected.
+of them in the frame of its product; `tc.parts_from(model, file)` declares all of them, or only the named ones, as parts in
+their positions. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
+directions, radii and areas, and with their names if the file has any; `tc.Brep("...")` chooses a face by its name. If the
+faces of a body have several colours, they are not in the file's order and their names are unknown. Where a file states no
+simple surface, a plane, cylinder, cone or sphere is fitted to within 1 um, and its residual is listed. STEP files that refer
+to other files are rejected.
 
-## Files from others
+## Untrusted files
 
 A separate process reads shape files, with a limit on time (30 s, and 20 s for each MB) and on memory (6 GiB). A damaged file
-therefore ends in one message, which names the file and what to do.
+therefore leads to a single message, which names the file and says what to do.
 """
 
 from tolcontact.geometry.analytic_surfaces import surface_arrays, surfaces_of

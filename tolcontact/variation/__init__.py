@@ -2,7 +2,7 @@
 
 ## From a tolerance to a distribution
 
-A tolerance range T is the full width of a zone around 0. `tc.Tolerance(range, distribution)` names what fills it:
+A tolerance range T is the full width of a zone around 0. `tc.Tolerance(range, distribution)` names the distribution within it:
 
 | distribution | deviations |
 |---|---|
@@ -12,7 +12,7 @@ A tolerance range T is the full width of a zone around 0. `tc.Tolerance(range, d
 | "truncated normal" | sigma = T / 6, cut at -T/2 and +T/2 |
 
 A number stands for a normal distribution of that range, and 0 for a locator that does not vary. Any frozen continuous
-distribution of `scipy.stats` may take the place of a name. It defines the spread by itself, so leave the range out.
+distribution of `scipy.stats` may be given instead of a name. It defines its own spread, so leave out the range.
 
 >>> import tolcontact as tc
 >>> from scipy import stats
@@ -23,28 +23,28 @@ normal, range 0.6 mm
 0.24
 
 `tc.Tolerance(0.6, shift=0.1)` shifts the distribution; `cp=1.33, cpk=1.0` state the capability of a normal process, and how
-near its mean comes to a limit.
+close its mean is to a limit.
 
 ## From a zone to the spread of a feature
 
-A feature has several freedoms: a plane an offset in its middle and two tilts, an axis two shifts in its middle and two tilts,
-a centre three shifts. All are displacements in mm at the feature's extremes, tilts at its edges or ends, so that they do not
-depend on the origin. `rule` says how they fill the zone of a tolerance:
+A feature has several freedoms: a plane has an offset in its middle and two tilts, an axis two shifts in its middle and two
+tilts, a centre three shifts. All are displacements in mm, with tilts given at the edges or ends of the feature, so they do not
+depend on the origin. `rule` states how they fill the zone of a tolerance:
 
 | rule | components |
 |---|---|
-| "99.73 % inside" (default) | normal, independent, with equal spreads with which 99.73 % of the *features* lie inside |
+| "99.73 % inside" (default) | normal, independent, with equal spreads for which 99.73 % of the *features* lie inside |
 | "6 sigma at the extremes" | the same, with six standard deviations at the worst point equal to the width; fewer lie inside |
 | "truncated" | as "6 sigma at the extremes", without the features that lie outside |
 | "uniform" | uniform in the zone |
 | "translation" | as "99.73 % inside", without tilts |
 | "polar" | of an axis: uniform angle, normal radius with 6 sigma equal to the width; no tilts |
 
-Only the default means the same for sizes, planes and axes. For a width t the spread of a component is t/6 for a size or an
-offset alone, t/9.07 for a plane's two tilts, t/11.8 for a rectangle's place and tilts, t/6.88 for an axis that only shifts, and
-t/7.28 at the ends of an axis that also tilts. Of nested tolerances the narrower one draws the freedoms that it controls, the
-wider one the remaining freedoms, so that 99.73 % of the sum lie inside. The share inside is integrated over directions, not
-drawn.
+Only the default has the same meaning for sizes, planes and axes. For a width t the spread of a component is t/6 for a size or
+an offset alone, t/9.07 for a plane's two tilts, t/11.8 for a rectangle's place and tilts, t/6.88 for an axis that only shifts,
+and t/7.28 at the ends of an axis that also tilts. Of nested tolerances, the narrower one draws the freedoms that it controls
+and the wider one draws the remaining freedoms, so that 99.73 % of the sums lie inside. The share inside is integrated over
+directions, not sampled.
 
 >>> block = tc.Assembly("block")
 >>> part = block.part("part", tc.Box(100, 50, 10), fixed=True)
@@ -54,10 +54,10 @@ drawn.
 >>> [(freedom.label, round(0.3 / freedom.spread, 2)) for freedom in tc.build(block).draws.contributors]
 [('part.top.offset', 11.76), ('part.top.tilt x', 11.76), ('part.top.tilt y', 11.76)]
 
-`tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them back, as a
-coordinate measuring machine would: it fits datum systems to displaced points, and finds the narrowest zones. It prints the
-share inside each zone, with its 95 % interval, beside the share that the rule states. With bonuses and nested tolerances the
-share may be larger.
+`tc.check_population(model)`, or `tolcontact check MODEL --population 10000`, draws features and measures them as a coordinate
+measuring machine would: it fits datum systems to displaced points, and finds the narrowest zones. It prints the share inside
+each zone, with its 95 % interval, beside the share that the rule states. With bonuses and nested tolerances the share may be
+larger.
 
 >>> population = tc.check_population(block, samples=2000)
 >>> _, lower, upper = population.share_inside.sel(zone=0).values
@@ -65,14 +65,14 @@ share may be larger.
 True
 
 Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a group
-(give all their features one `tc.Variable`), and datum shift, which contact does.
+(give all their features one `tc.Variable`), and datum shift, which follows from contact.
 
-## Draws depend on the seed and on the realization alone
+## Draws depend only on the seed and the realization
 
 The deviation of a contributor in realization k depends on the seed, on its label ("part.locator", "part.feature.freedom") and
-on k; of correlated contributors also on each other's labels. It does not depend on the number of realizations, on blocks,
-threads, other contributors, or the order of declarations. So a longer run begins with the realizations of a shorter one, and
-two solvers or two methods can be compared draw by draw.
+on k; for correlated contributors also on each other's labels. It does not depend on the number of realizations, on blocks,
+threads, other contributors, or the order of declarations. A longer run therefore begins with the realizations of a shorter
+one, and two solvers or methods can be compared draw by draw.
 
 >>> model = tc.Assembly("model")
 >>> part = model.part("part", tc.Box(50, 30, 10))
@@ -91,12 +91,12 @@ True
 
 ## Sampling plans
 
-`tc.run(..., plan=...)`, `tolcontact run --plan`, choose where the numbers come from: "monte-carlo" (default), "latin
-hypercube", or "sobol". The latter two draw 256 realizations together, a replicate, that fill the ranges of all contributors
+`tc.run(..., plan=...)` or `tolcontact run --plan` chooses how the random numbers are generated: "monte-carlo" (default),
+"latin hypercube", or "sobol". The latter two draw replicates of 256 realizations that fill the ranges of all contributors
 evenly. A measure that is nearly a sum of contributors then has a mean and a spread with less error for the same number of
 realizations. Replicates are independent of each other, so from 16 replicates on (4096 realizations) intervals follow from the
-differences between them. The intervals of Ppk by percentiles, of displacement fields and of contact statistics stay those of
-independent realizations, which are wider. No plan improves a tail much.
+differences between them. The intervals of Ppk by percentiles, of displacement fields and of contact statistics remain those of
+independent realizations, which are wider. No plan improves estimates of tails much.
 
 >>> plain, even = (tc.summarize(tc.run(model, samples=4096, plan=plan)) for plan in ("monte-carlo", "sobol"))
 >>> means = [run.statistic_value.sel(state="raw", statistic="mean", measure="height") for run in (plain, even)]
