@@ -133,20 +133,20 @@ def contact_program(
 def _inputs(nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None]) -> dict[str, ca.SX]:
     """Return the symbols of all inputs by name, for `p` parts, `k` rows and contributors (c).
 
-    Where few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have SLOTS rows each, for
-    points that change: `m` = v * SLOTS.
+    If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have SLOTS rows each,
+    for changing points: `m` = v * SLOTS.
 
     poses (12 p)         poses of the group's parts about which the gaps are linearized
     raw (12 p)           their raw poses, from which displacements count
     moments (10, sides)  moments of the points of each side that count in the objective
     deviations (c)       of all contributors of the model
-    firmness             1, or more to hold the freedoms that the objective leaves open more firmly than it will in the end
+    firmness             factor of the regularization: 1, or more in early steps
     newton               1 to count the curvature of objective and gaps, 0 for the linear step of the paper
-    stride               in an exact resolution: of the step no more is taken than turns a mover by this angle [rad]
-    caution              where points are projected anew: weight of the step itself, in all contact points, beside the objective
-    reactions (k)        if `newton`: the reaction that a row's point had before
-    bend (12 v)          if `newton`: the sum, over the points that slots held before, of reaction times the gap's gradient
-                         by the entries of X_RM
+    stride               in an exact resolution: the largest angle [rad] by which a step turns a mover
+    caution              if points are projected in each step: weight of the step, in all contact points, beside the objective
+    reactions (k)        if `newton`: the reaction of each row's point in the previous step
+    bend (12 v)          if `newton`: the sum, over the points in the slots of the previous step, of reaction times the gap's
+                         gradient by the entries of X_RM
     P_m, P_r, n_r (3, m) the contact points in the slots
     filled (m)           1 if a slot holds a point, 0 if it is empty
     """
