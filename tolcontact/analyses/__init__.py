@@ -1,31 +1,32 @@
-"""Ask: what matters, what is rare, and which tolerances and places suffice. A chapter of the guide.
+"""Analyse: what matters, what is rare, and which tolerances and positions suffice. A chapter of the guide.
 
-An analysis asks a model a question of its own, beside `tc.run`, with contact resolved in every realization. It returns an
-`xarray.Dataset` whose variables have units and 95 % intervals (dimension `interval`: estimate, lower, upper). Each analysis
-is also a command, which prints tables, JSON or CSV.
+An analysis answers a question that a plain `tc.run` does not, with contact resolved in every realization. It returns an
+`xarray.Dataset` whose variables have units and 95 % intervals (dimension `interval`: estimate, lower, upper). Each analysis is
+also a command, which prints tables, JSON or CSV.
 
 | `tc.` | command | question |
 |---|---|---|
-| `contributions` | `contributions` | Which contributors does the variance of a measure come from? |
-| `sensitivities` | `sensitivities` | How much does a measure follow each contributor, through contact? |
-| `worst_case` | `worst` | What are the least and the largest value of a measure, and which deviations give them? |
+| `contributions` | `contributions` | Which contributors cause the variance of a measure? |
+| `sensitivities` | `sensitivities` | How much does a measure change with each contributor, with contact? |
+| `worst_case` | `worst` | What are the smallest and largest values of a measure, and which deviations cause them? |
 | `tails` | `tails` | How often is a measure outside its limits, where this is rare? |
-| `allocate` | `allocate` | Which tolerance ranges suffice at least cost, and which one should be tightened first? |
-| `relocate` | `relocate` | At which place of a locator does a measure vary least? |
+| `allocate` | `allocate` | Which tolerance ranges suffice at the lowest cost, and which one should be tightened first? |
+| `relocate` | `relocate` | At which position of a locator does a measure vary least? |
 
 ## Arguments of all analyses
 
 | argument | meaning |
 |---|---|
 | `model` | an assembly, the function that declares it, the path of its script, or a `tc.Program` (not for `relocate`) |
-| `samples`, `seed` | number of realizations (each analysis states of what), at least 2; the same seed gives the same draws |
+| `samples`, `seed` | number of realizations, at least 2 (see each analysis); the same seed gives the same draws |
 | `solver`, `method` | as for `tc.build`; a `tc.Program` has its own, so leave them out with it |
-| `client` | of dask.distributed: its workers simulate (see `tolcontact.simulation`), with the same results to the last bit |
-| `into` | path of an archive of the same model, which gets the result as the group statistics/NAME; reports show it |
-| `progress` | a function that is called with the number of finished steps, and of all |
+| `client` | client of dask.distributed, whose workers simulate with the same results (see `tolcontact.simulation`) |
+| `into` | path of an archive of the same model, which stores the result in the group statistics/NAME; reports show it |
+| `progress` | function that is called with the number of finished steps and the total |
 
-All of them raise `ModelError` for a model with faults; `ArchiveError` if the archive is of another model, or has the analysis
-already; `OptionError` for other arguments that cannot be used, or if nothing varies. Nothing is simulated before.
+All of them raise `ModelError` for a model with faults; `ArchiveError` if the archive belongs to another model or already holds
+the analysis; `OptionError` for other invalid arguments, or if nothing varies. These errors are raised before anything is
+simulated.
 
 >>> import tolcontact as tc
 >>> def assembly():
@@ -40,8 +41,8 @@ already; `OptionError` for other arguments that cannot be used, or if nothing va
 
 ## What matters
 
-`tc.contributions` gives Sobol' indices, which hold with contact, beside the classical linear percentages, which do not. Here
-contact leaves nothing of the effect that the locators below have.
+`tc.contributions` gives Sobol' indices, which hold with contact, beside the classical linear percentages, which do not. In
+this example, contact removes the effect of the locators below the block.
 
 >>> shares = tc.contributions(assembly, samples=1024, solver="daqp").sel(measure="height")
 >>> bool(shares.total.sel(state="raw", interval="estimate").max() > 0.5)
@@ -49,8 +50,8 @@ True
 >>> bool(shares.missed.sel(state="corrected", interval="estimate") > 0.5)  # of the variance, by linear sensitivities
 True
 
-`tc.sensitivities` gives the derivatives of each measure by each contributor, realization by realization: their means, their
-spreads, and their means where contact moved parts and where it did not.
+`tc.sensitivities` gives the derivatives of each measure with respect to each contributor over the realizations: their means
+and spreads, and separate means for realizations in which contact did or did not move parts.
 
 >>> slopes = tc.sensitivities(assembly, samples=100, solver="daqp").sel(measure="height")
 >>> bool(abs(slopes.by_contact.sel(contact="touched", interval="estimate")).max() < 0.01)  # the block lies flat on the table
@@ -58,15 +59,15 @@ True
 
 ## What is extreme or rare
 
-`tc.worst_case` searches all that the drawings allow for the least and the largest value of each measure, with the combination
-of deviations that gives them. It also bounds them: no pose free of penetration lies beyond, to first order. Where contact alone
-does not hold a part, as on a table from above, there is no bound.
+`tc.worst_case` searches everything that the drawings allow for the smallest and largest values of each measure, and returns
+the deviations that cause them. It also returns bounds: to first order, no pose without penetration lies beyond them. Where
+contact alone does not hold a part, as with a block that can be lifted off a table, there is no bound.
 
 >>> worst = tc.worst_case(assembly, samples=256, solver="daqp").sel(measure="height")
 >>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
 (True, -0.0)
 
-`tc.tails` estimates probabilities that are too small to be counted, by subset simulation: some ten thousand realizations give
+`tc.tails` estimates probabilities that are too small to count, by subset simulation: some ten thousand realizations give
 probabilities of 1e-6 or less to within a few tenths of their value.
 
 >>> far = tc.Assembly("far")
@@ -79,14 +80,14 @@ True
 
 ## What to change
 
-`tc.allocate` widens and narrows ranges until a share outside of limits, or a Ppk, is kept at least cost. It also estimates the
-effect of each range, so that one sees which to tighten first.
+`tc.allocate` widens and narrows ranges until a required share outside limits, or a required Ppk, is met at the lowest cost. It
+also estimates the effect of each range, which shows the one to tighten first.
 
 >>> allocation = tc.allocate(far, "end: ppm 20000", by="part", samples=1024)
 >>> bool(allocation.cost.sum("group").sel(stage="after") < allocation.cost.sum("group").sel(stage="before"))
 True
 
-`tc.relocate` looks for the place of a locator, within a box, at which a measure varies least.
+`tc.relocate` finds the position of a locator, within a box, at which a measure varies least.
 
 >>> moved = tc.relocate(assembly, "block.A3", between=((0, 25, 0), (50, 25, 0)), least="height: 6 sigma", samples=256)
 >>> moved.point.sel(stage="before").values.tolist(), moved.sizes["trial"] > 9

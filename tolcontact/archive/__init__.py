@@ -1,4 +1,4 @@
-"""The archive: a netCDF file that holds a run, its statistics' raw material, and the model. A chapter of the guide.
+"""The archive: a netCDF file that holds a run, its realizations and the model. A chapter of the guide.
 
 The file is netCDF-4 with CF attributes. It can be read without tolcontact: with xarray, ncdump, or MATLAB.
 
@@ -30,7 +30,7 @@ Each realization is one row and carries its own certificate.
 | `carrying`, `reaction` | realization, pair | contact points under load, and the sum of their reactions |
 | `status` | realization | see `tolcontact.contact` |
 | `kkt_residual` | realization | residual of the optimality conditions [mm] |
-| `iterations`, `starts` | realization | linear steps, and from how many places they started |
+| `iterations`, `starts` | realization | number of linear steps, and number of starts |
 | `second_answers` | realization | QPs that another solver had to answer |
 | `searched` | realization | 1 if contact points were projected again |
 
@@ -66,22 +66,22 @@ Gaps can be recomputed from poses and contact points, except where `searched` is
 True
 >>> run.close()
 
-A `reference_part` of -1 is the ground, with R = I and t = 0. For a one-sided locator, subtract the `deviation` of locator
-`locator_of_point` if that is not -1 (a locator is the contributor of the same number).
+A `reference_part` of -1 is the ground, with R = I and t = 0. For a one-sided locator, subtract the `deviation` of the locator
+`locator_of_point`, unless it is -1 (a locator is the contributor with the same number).
 
 Where a side of a pair is a feature (`face_of_moving`, `face_of_reference` not -1), displace its points in the part first: with
 (tau, rho) = `face_twist` @ `deviation` a point p goes to centre + tau + exp([rho]x) (p - centre), `face_centre`, and normals
 turn by exp([rho]x). Then subtract `face_height` @ `deviation` of the reference side, and that of the moving side times
-`facing`. A locator that stands against a feature (`face_of_locator`) has its deviation larger by the height there, less its
+`facing`. For a locator that stands against a feature (`face_of_locator`), add to its deviation the height there, less its
 direction times the displacement. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
-`tc.open_archive(path)` opens the file after a check of everything but the rows, and `tc.model_of` rebuilds its model.
+`tc.open_archive(path)` checks everything but the rows and opens the file; `tc.model_of` rebuilds its model.
 
 >>> with tc.open_archive(path) as results:
 ...     print(tc.model_of(results).parts)
 (part table: box 100 x 50 x 10 mm, fixed, part block: box 50 x 25 x 10 mm at (50, 12.5, 10))
 
-Runs of one model with seeds of their own are one sample: xarray reads the rows of several archives as one dataset, lazily.
+Runs of one model with different seeds form one sample: xarray reads the rows of several archives lazily as one dataset.
 
 >>> other = path.with_name("other.nc")
 >>> tc.run(stand, samples=200, seed=2, out=other, surfaces=16).close()
@@ -93,19 +93,20 @@ Runs of one model with seeds of their own are one sample: xarray reads the rows 
 
 ## Size
 
-`keep` states what is archived of each realization: "measures" (with gaps, statuses and residuals; 75 bytes for RA1, or 75 MB a
-million), "poses" also those, "all" (default) also the deviations. A run that does not fit on the disk is refused before the
-first byte.
+`keep` states which variables of each realization are archived: "measures" (with gaps, statuses and residuals; 75 bytes for
+RA1, or 75 MB per million), "poses" (also the poses), or "all" (default: also the deviations). A run that does not fit on the
+disk is refused before the first byte.
 
 ## Stopping and resuming
 
-An archive is not overwritten unless you ask for it (`overwrite=True`, `--overwrite`). Its name is taken from the start: a
-second run that would write to it is refused.
+An archive is not overwritten unless you ask for it (`overwrite=True`, `--overwrite`). A run reserves its archive from the
+start: a second run that would write to it is refused.
 
-A run may be stopped or killed at any moment, from its first block on. The file then opens, finished rows are in it, the others
-have the status -1 (`unfinished`), the summary states how many are done, and fields cover a recent number of them. (This covers
-a killed process. Writes are not flushed to the physical disk, so a power failure may lose more.) `resume=True`, `--resume`
-continues to the same data as an undisturbed run, up to the original number of realizations or `samples`, whichever is larger.
+From its first block on, a run may be stopped or killed at any moment. The file can then be opened and holds the finished rows;
+other rows have the status -1 (`unfinished`). The summary states how many rows are finished, and the fields cover those up to a
+recent one. (This covers a killed process. Writes are not flushed to the physical disk, so a power failure may lose more.)
+`resume=True`, `--resume` continues the run and gives the same data as an uninterrupted run, up to the original number of
+realizations or `samples`, whichever is larger.
 
 >>> with tc.run(stand, samples=300, seed=1, out=path, surfaces=16, resume=True) as results:
 ...     print(results.sizes["realization"], results.attrs["history"])
@@ -115,11 +116,11 @@ continues to the same data as an undisturbed run, up to the original number of r
 A resumed run starts after the last checkpoint, here after none. The model, its contact points, the solver and the method must
 be the same as before; otherwise the run is refused. Archives of an earlier format can be read, not resumed.
 
-## Checksums, and archives from others
+## Checksums and untrusted archives
 
-CRC-32 checksums cover what is written once, each field, and every block of realizations. They are compared when an archive is
-read: `tc.open_archive` checks all but the rows, `tc.summarize` the rows. A damaged archive is refused in one line. Checksums
-detect damage, not forgery.
+CRC-32 checksums cover the variables that are written once, each field, and every block of realizations. They are verified when
+an archive is read: `tc.open_archive` checks all but the rows, `tc.summarize` the rows. A damaged archive is refused with a
+one-line message. Checksums detect damage, not forgery.
 
 Before anything in an archive is trusted, a separate process with a limit on time and memory inspects it. Its model is data:
 nothing in it is executed, and a distribution is rebuilt only if its name is that of a continuous one in `scipy.stats` and its

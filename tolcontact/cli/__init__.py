@@ -9,36 +9,37 @@
     tolcontact summary FILE.nc [--json | --csv]          print the summary of an archive
     tolcontact summary FILE.nc --limits                  only shares outside of limits, and capability
     tolcontact report FILE.nc [--out FILE.html]          write a page with the assembly in 3D, and charts
-    tolcontact compare MODEL.py --solvers daqp,qpoases   solvers on the same draws
+    tolcontact compare MODEL.py --solvers daqp,qpoases   compare solvers on the same draws
+
     tolcontact compare MODEL.py --resolution linearized,exact
     tolcontact contributions MODEL.py [--by part]        sources of the variance of each measure
     tolcontact sensitivities MODEL.py                    slope of each measure by each contributor
-    tolcontact worst MODEL.py                            extreme values of each measure, and their deviations
+    tolcontact worst MODEL.py                            extreme values of each measure, and the deviations
     tolcontact tails MODEL.py                            probabilities of rare violations of limits
-    tolcontact allocate MODEL.py --require "gap: ppm 1000"   tolerance ranges at least cost
-    tolcontact relocate MODEL.py --locator top.A3 ...   best place of a locator
+    tolcontact allocate MODEL.py --require "gap: ppm 1000"   tolerance ranges at the lowest cost
+    tolcontact relocate MODEL.py --locator top.A3 ...   best position of a locator
     tolcontact compare A.nc B.nc [--report FILE.html]    compare runs, from the same draws or not
-    tolcontact view MODEL.py | FILE.stp                  show it before a run: faces with their selectors
+    tolcontact view MODEL.py | FILE.stp                  show an assembly or a file before a run
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
     tolcontact --version
 
-`tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` makes the shell complete them. A
-script with `tc.main(assembly)` under its main guard takes the options of `run`. Results go to stdout; progress, warnings and
-errors go to stderr: a bar with rate and time left in a terminal, a line every ten seconds elsewhere, nothing with
-`--quiet`. Tables use the width of the terminal, and are never cut in files and pipes. `compare` prints JSON with `--json`, and
-writes netCDF with `--out`.
+`tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` enables completion in the
+shell. A script with `tc.main(assembly)` under its main guard takes the options of `run`. Results go to stdout; progress,
+warnings and errors go to stderr: progress is a bar with rate and remaining time in a terminal, a line every ten seconds
+elsewhere, and nothing with `--quiet`. Tables use the width of the terminal, and are never cut in files and pipes. `compare`
+prints JSON with `--json`, and writes netCDF with `--out`.
 
 | option of `run` | |
 |---|---|
 | `--samples`, `--seed` | number of realizations, 1000 by default; the same seed gives the same realizations |
 | `--solver` | QP solver, see `tolcontact.compilation` |
 | `--resolution`, `--objective` | replace the model's own choice, see `tolcontact.contact` and `tolcontact.mechanics` |
-| `--out FILE.nc`, `--overwrite`, `--resume` | the archive: written, replaced, or continued |
+| `--out FILE.nc`, `--overwrite`, `--resume` | write, replace, or continue an archive |
 | `--plan` | the plan of the draws: `monte-carlo`, `latin hypercube` or `sobol`, see `tolcontact.variation` |
 | `--until "gap: 6 sigma +-1 %"` | sample until this confidence interval is narrow enough; also `mean +-0.01`, `ppm +-20 %` |
 | `--keep measures`, `poses` or `all` | variables of each realization in the archive |
-| `--fields` | number of realizations behind magnitudes of displacement fields, or `some`, `all`, `none` |
+| `--fields` | number of realizations for the magnitudes of displacement fields, or `some`, `all`, `none` |
 | `--quiet` | no progress, no notices |
 | `--report FILE.html` | also write the page of `report` |
 | `--surfaces` | number of realizations checked between contact points, 64 by default |
@@ -47,7 +48,7 @@ writes netCDF with `--out`.
 |---|---|
 | 0 | done |
 | 1 | the run finished, but more than 0.1 % of its realizations are not converged, not assemblable, or doubtful |
-| 2 | bad input: one message, nothing written |
+| 2 | invalid input: one message, nothing written |
 | 130, 143 | stopped by Ctrl-C or SIGTERM; finished realizations are in the archive |
 
 >>> from typer.testing import CliRunner

@@ -15,7 +15,7 @@ model, so that a model is compiled once for many runs.
 
 ## Solvers
 
-`solver` is any conic plugin of CasADi that is installed and solves a small test problem correctly.
+`solver` names any installed conic plugin of CasADi that solves a small test problem correctly.
 
 | solver | choose it if |
 |---|---|
@@ -24,8 +24,8 @@ model, so that a model is compiled once for many runs.
 | `osqp` | you compare with a first-order method; a hundred times slower on hard problems |
 | `proxqp`, `highs`, `piqp` | you compare solvers |
 
-Plugins that are known to answer wrongly, or that cannot take these problems, are refused by name with the reason: ipqp,
-superscs, fatrop, hpipm, qrqp, clp, cbc, nlpsol. The study in `studies/solvers` compares accuracy and time.
+Plugins that are known to return wrong results, or that cannot handle these problems, are refused by name, with the reason:
+ipqp, superscs, fatrop, hpipm, qrqp, clp, cbc, nlpsol. The study in `studies/solvers` compares accuracy and time.
 
 >>> tc.run(stand, samples=10, solver="superscs")
 Traceback (most recent call last):
@@ -38,17 +38,17 @@ Each answer is judged by its own KKT residual in mm, computed from the QP that w
 mm is polished: the rows that carry are solved as one linear system. (For steps below 1e-3 mm the limit is 1e-10 mm.) If the
 residual then still exceeds 1e-8 mm, `qpoases` or `daqp` answers instead, and the archive counts it in `second_answers`.
 
-On 1000 realizations of RA1 the corrected poses of all these solvers agree with those of daqp to 2e-13 mm, of proxqp to 6e-11 mm
-and of piqp to 3e-8 mm; 8 answers of highs and 3 of piqp came from another solver.
+On 1000 realizations of RA1 the corrected poses of all these solvers agree with those of daqp to 2e-13 mm, except proxqp (6e-11
+mm) and piqp (3e-8 mm); 8 solutions for highs and 3 for piqp came from another solver.
 
 >>> float(first.kkt_residual.max()) < 1e-8
 True
 
-QPs are made for the parts that contact couples: parts that touch no common free part have QPs of their own. Rows are scaled
-to length 1 and increments to mm, so that residuals and tolerances have a meaning. Functions that are evaluated more than
-10 000 times are compiled to machine code, which gives the same results to the last bit as CasADi's interpreter. It is kept in
-the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so that the next process that simulates the same model
-has it from the beginning: with thirty coupled bodies that saves some twenty seconds.
+Each QP covers the parts that contact couples: parts that touch no common free part have separate QPs. Rows are scaled to
+length 1 and increments to mm, so that residuals and tolerances are lengths. Functions that are evaluated more than 10 000
+times are compiled to machine code, which gives the same results to the last bit as CasADi's interpreter. The machine code is
+kept in the user's cache folder (`~/.cache/tolcontact` on Linux, 268 MB at most), so the next process that simulates the same
+model need not compile it again. With thirty coupled bodies this saves about twenty seconds.
 """
 
 from tolcontact.compilation.contact_rows import SLOTS

@@ -10,13 +10,13 @@
 
 ## Linearized or exact
 
-`resolution="linearized"` (default) is the paper's single linear step. If one plane meets one plane it opens all gaps, with
-nearly the least motion. With several free bodies, or with curved or opposed faces, it leaves penetration, which the summary
-reports; above 1 % of the smallest tolerance range it recommends `exact`.
+`resolution="linearized"` (default) is the paper's single linear step. If one plane meets one plane, this step opens all gaps
+with nearly the smallest motion. With several free bodies, or with curved or opposed faces, it leaves penetration, which the
+summary reports; above 1 % of the smallest tolerance range the summary recommends `exact`.
 
 `resolution="exact"` repeats linear steps about the true pose, with proper rotations, until every true gap is open and the
-objective is least. It takes 3 to 8 steps as a rule, and two to four times as long (with thirty free bodies seven times). The
-single step fails for a U in a U without clearance; exact resolves all of 10 000 such draws (see `studies/exact`).
+objective is minimal. It usually takes 3 to 8 steps, and two to four times as long (seven times with thirty free bodies). The
+single step fails for a U in a U without clearance; `exact` resolves all of 10 000 draws of it (see `studies/exact`).
 
 >>> exact = tc.run(stand, samples=200, method=tc.Method(resolution="exact"))
 >>> sorted({tc.Status(int(status)).name for status in exact.status})
@@ -24,19 +24,20 @@ single step fails for a U in a U without clearance; exact resolves all of 10 000
 >>> float(exact.gap_min.sel(state="corrected").min()) > -1e-8
 True
 
-The exact resolution first takes steps like the paper's. What has not come to rest after eight goes on with Newton steps, which
-count the curvature of gaps and objective. If the answer is a conflict, missing, or far from the raw pose, it is tried again
-from other starts: from the nominal place, with small steps, or with contact points that are projected again. The better
-answer is kept; `starts` counts them.
+The exact resolution first takes steps like the paper's. Realizations that have not converged after eight steps continue with
+Newton steps, which take the curvature of the gaps and the objective into account. If there is a conflict, no solution, or a
+solution far from the raw pose, other starts are tried: from the nominal pose, with small steps, or with contact points that
+are projected again. The best solution is kept; `starts` counts the starts.
 
 ## Contact search
 
 Contact points are projected once, in the nominal state. `tc.Method(resolution="exact", search="iterated")` projects them again
 at the corrected pose until they no longer move. It matters if curved surfaces slide along each other: for two rollers of
 radius 10, one set down 3 mm beside the top of the other, the axes end 20 mm apart as they must (to 0.002 mm of the mesh), and
-up to 0.5 mm too far with fixed points. If fixed points let a round part sink into its counterpart (a roller that spins), the
-exact resolution notices and searches again for these realizations, which then take some 0.2 s each; the archive's `searched`
-marks them. Balls and shafts beside walls need none of this: what touches is found at every pose (`tolcontact.discretization`).
+up to 0.5 mm too far apart with fixed points. If fixed points let a round part sink into its counterpart (a roller that spins),
+the exact resolution notices and searches again for these realizations, which then take about 0.2 s each; the archive marks
+them in `searched`. Balls and shafts beside walls need no search: their contact is computed at every pose (see
+`tolcontact.discretization`).
 
 ## Statuses
 
@@ -46,7 +47,7 @@ marks them. Balls and shafts beside walls need none of this: what touches is fou
 | `resolved` | 1 | contact moved parts, and the optimality conditions hold |
 | `not_converged` | 2 | the conditions do not hold, or one linear step cannot open all gaps |
 | `not_assemblable` | 3 | no pose without penetration was found near the raw one; the pose of least penetration is kept |
-| `doubtful` | 4 | the conditions hold, but only far from the raw pose, so the answer is not certified |
+| `doubtful` | 4 | the conditions hold, but far from the raw pose, so the solution is not certified |
 | `unfinished` | -1 | not simulated yet (in the archive of a stopped run) |
 
 No realization is dropped: a failed one is a row with its status, and its last pose is included in the statistics.
@@ -54,45 +55,48 @@ No realization is dropped: a failed one is a row with its status, and its last p
 ## What a certificate covers
 
 `untouched` and `resolved` are certificates. They state that the optimality conditions hold to 1e-8 mm at a pose *near* the raw
-one and, in an exact resolution, that no contact point has a gap below 0 by more than that. What a linearized one leaves is in
-`gap_min`. Near means: no part turned by more than `near_turn` (1 rad), and no contact point moved by more than `near_travel`
-(half the size of the largest part). A longer travel is accepted if the faces themselves lie under the points that carry, and
-no deeper in each other than 1 % of the smallest tolerance range (or 1e-4 sizes, if that is less) and what their triangles
-leave open. Other answers far from the raw pose are tried from other starts, and `doubtful` if that does not help.
+one and, in an exact resolution, that no contact point has a gap below 0 by more than that. The penetration that a linearized
+resolution leaves is in `gap_min`. "Near" means that no part turned by more than `near_turn` (1 rad), and no contact point
+moved by more than `near_travel` (half the size of the largest part). A longer travel is accepted if the faces themselves lie
+under the points that carry load, and penetrate each other by no more than 1 % of the smallest tolerance range (or 1e-4 sizes,
+if that is less) plus the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these
+do not help, the realization is `doubtful`.
 
-A certificate does not cover what lies *between* contact points. After the run, 64 certified realizations (`surfaces=`,
-`--surfaces`) are checked against the surfaces, at points much denser, in both directions: a third penetrate most, a third have
-most points under load, and the rest are random. The summary states the largest penetration found; the group `surface` of the
-archive states which realizations and pairs it was. One-sided locators are points, and are not checked there. The study in
-`studies/certificates` looks for a counterexample in a million realizations.
+A certificate does not cover the surfaces *between* contact points. After the run, 64 certified realizations (`surfaces=`,
+`--surfaces`) are checked on the surfaces, at a much denser set of points and in both directions. One third are those that
+penetrate most, one third those with most points under load, and the rest are random. The summary states the largest
+penetration; the group `surface` of the archive states the realizations and pairs that were checked. One-sided locators are
+points, so they are not part of this check. The study in `studies/certificates` looks for a counterexample in a million
+realizations.
 
 >>> float(exact["surface"].surface_penetration.max()) < 1e-6
 True
 
 ## Limits
 
-- There is no friction, and features have no form error: they shift, tilt and grow. Between faces that tilt and touch beside
-  their nominal overlap, and for round faces that grow beside sampled points, gaps are right to first order. The pose is a
-  local optimum, found step by step from the raw pose. On 1000 realizations of five models ipopt, started there too, found none
-  lower. In a chain of bodies with degrees of freedom that barely anything holds, another optimum may lie a few mm away with an
-  objective that differs in the fifth digit; a round part of flat triangles has one on each triangle. Other starts are tried
-  only if the first answer is a conflict, missing, or far.
-- Contact points are those of the nominal state. If rims of faces shift against each other *and* tilt, their edges may lie
-  deeper than the points, by about shift times tilt; `surfaces` measures it.
-- A ball or shaft has the wall that it has nominally: where a hole or a groove ends is not looked for again as it moves along.
-  A hole whose rim is not square to its axis, a shaft across another one, and two shafts side by side have points. What touches
-  of balls and shafts is always constrained: `active_set="initial"` leaves none of it out.
+- There is no friction, and features have no form error: they shift, tilt and grow. Gaps are correct only to first order
+  between faces that tilt and touch outside their nominal overlap, and for round faces with sampled points that change in size.
+  The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models ipopt, also started
+  from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything holds, another
+  optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat triangles has one
+  optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no solution, or one far from
+  the raw pose.
+- Contact points are those of the nominal state. If rims of faces shift against each other *and* tilt, their edges may
+  penetrate deeper than the points, by about shift times tilt; the check of `surfaces` measures this.
+- A ball or shaft keeps its nominal wall: the ends of a hole or a groove are not searched for again as it moves along. A hole
+  whose rim is not square to its axis, a shaft across another one, and two shafts side by side have sampled points. The
+  contacts of balls and shafts are always constrained, also with `active_set="initial"`.
 - "linearized" neglects second-order rotation. Rows that contradict each other (a tab wider than its slot) end as
   `not_converged`, as does a step that fails; only "exact" tells the two apart.
 - `not_assemblable` means that no pose without penetration was found near the raw one, not that none exists.
-- A degree of freedom that no active point holds is decided by the regularization alone, and its motion may be large: with
+- A degree of freedom that no active point holds is determined by the regularization alone, and its motion may be large: with
   "active points", a part in a chain that barely penetrates can tilt or slide freely, and is then often `doubtful`. The other
   objectives hold it.
 - "locator stiffness": springs softer than about 1e-4 of the stiffest act as if they were stiffer, because the regularization
   is scaled with the sum.
-- "seating": reactions fall short by about 0.1 % times (travel / size of the contact). A part for which a force finds no rest
-  within ten sizes ends as `not_converged`.
-- The number of points under load is not unique if several points of a plane share a load; neither is the share of redundant
+- "seating": reactions fall short by about 0.1 % times (travel / size of the contact). A part that finds no equilibrium within
+  ten times its size ends as `not_converged`.
+- The number of points under load is not unique if several points of a plane share a load, nor is the load shared by redundant
   pairs."""
 
 from tolcontact.contact.resolver import ContactResolver

@@ -28,10 +28,10 @@ meet at more than 30 degrees form an edge.
 
 The surface of a face is known exactly where a STEP file states a plane, cylinder, cone, sphere or torus. In other meshes a
 cylinder, cone or sphere is fitted to the vertices of each smooth piece. The fit is accepted if every vertex lies within 1 um
-of it and the piece has at least five facets, with no more than 30 degrees between neighbours. Contact points, their
-projections and normals then lie on the fitted surface instead of the triangles. A prism with many sides is therefore treated
-as a cylinder; `tolcontact check` states how far inside the cylinder its triangles lie. Other curved faces are only as round as
-their triangles.
+of it and the piece has at least five facets, each of which turns by at most 30 degrees. Contact points, their projections and
+normals then lie on the fitted surface instead of the triangles. A prism with many sides is therefore treated as a cylinder;
+`tolcontact check` states how far inside the cylinder its triangles lie. Other curved faces are only as round as their
+triangles.
 
 ## STEP files
 

@@ -1,22 +1,22 @@
 """The equations: poses, gaps, the contact QP, and the objectives of the corrected pose. A chapter of the guide.
 
-Numbers in parentheses are those of the method paper (Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg, *Variation Simulation
-of Rigid Bodies with Contact Representation*). Each equation is written once, as a CasADi expression, in a file of this
-package; rows of the QP come from their derivatives.
+Numbers in parentheses are those of the method paper (Sadeghi Tabar, Lindkvist, Wärmefjord, Söderberg, *Variation Simulation of
+Rigid Bodies with Contact Representation*). Each equation is written once, as a CasADi expression, in a file of this package;
+the rows of the QP come from the derivatives of these expressions.
 
 ## Poses
 
 The pose X = (R, t) moves a point from its nominal place x0 in the assembly frame to x = R x0 + t (1). The nominal pose is the
-identity. The *raw* state is where locators put the parts, the *corrected* state is after contact.
+identity. In the *raw* state, parts are where their locators put them; in the *corrected* state, contact has been resolved.
 
 A locator is a point p, a unit direction n into the part, and a deviation d. With c the centroid of the locators, the rows
 [n', ((p - c) x n)'] form the locator matrix J, and
 
     (delta, theta) = J^-1 d        R = exp([theta]x)        t = c + delta - R c
 
-Of more than six locators the two-sided ones are met exactly, and the one-sided ones in the sense of least squares. A part that
-is located on another part follows its raw pose. The deviation d of a locator that stands against a feature is
-larger by the height to which the feature rises there. If a floating part has fewer than six locators, q is the least motion
+If there are more than six locators, the two-sided ones are satisfied exactly, and the one-sided ones in the least-squares
+sense. A part that is located on another part follows its raw pose. The deviation d of a locator that stands against a feature
+is larger by the height to which the feature rises there. If a floating part has fewer than six locators, q is the least motion
 (rotations times the part's size) that meets them.
 
 ## Gaps
@@ -40,8 +40,8 @@ The variables are the increments dq = (dt, w) of all parts that contact can move
 
 with a slack for each pair. Its price is so high that it stays zero unless rows contradict each other. The QP always has a
 solution, and no realization is dropped. The paper's step ends with R <- (I + [w]x) R (12), which keeps the linearized gap
-exactly, and stretches the part by the order of |w|^2; a part that others rest on turns by exp([w]x) instead. The exact
-resolution repeats steps with exp([w]x), until the true gaps are open and the objective is least.
+exactly, but stretches the part by the order of |w|^2. A part that carries other parts turns by exp([w]x) instead. The exact
+resolution repeats steps with exp([w]x) until the true gaps are open and the objective is minimal.
 
 >>> import numpy as np
 >>> import tolcontact as tc
@@ -60,7 +60,8 @@ exact True
 
 ## Objectives
 
-`tc.Method(objective=...)` names what the corrected pose minimizes. Points and springs count from the raw state.
+`tc.Method(objective=...)` names the quantity that the corrected pose minimizes. Displacements of points and springs are
+measured from the raw state.
 
 | objective | minimizes |
 |---|---|
@@ -72,18 +73,19 @@ exact True
 | objective | choose it if |
 |---|---|
 | "active points" | you compare with the paper |
-| "all points" | several bodies are free: parts that barely penetrate are held as well |
+| "all points" | several bodies are free: this also holds parts that barely penetrate |
 | "locator stiffness" | parts are clamped to their locators |
 | "seating" | parts are pressed onto supports and neighbours; reactions are in N |
 
-The objective decides the answer, so every archive states it. For "seating" a small multiple (1e-3) of the displacement of all
-contact points keeps the problem convex. It takes over part of the load: about 0.1 % times (travel / size of the contact).
+The objective determines the result, so every archive states it. For "seating" a small multiple (1e-3) of the displacement of
+all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
+contact).
 
 `regularization` holds the degrees of freedom that the objective leaves open. "points" (default) adds `eta` = 1e-6 times the
 squared displacements of all contact points, and does not depend on where the assembly lies in space. "identity" is the paper's
-eta I of (11): it mixes mm and rad, so it depends on the origin. With the origin 1 m away, RA1's 6 sigma is 6 % larger and a
-single realization differs by up to 29 mm. `active_set="closed"` (default) also constrains points that the correction itself
-drives into contact; `"initial"` is the paper's set, of the points that penetrated at first.
+eta I of (11), which mixes mm and rad and therefore depends on the origin. With the origin 1 m away, RA1's 6 sigma is 6 %
+larger and a single realization differs by up to 29 mm. `active_set="closed"` (default) also constrains points that the
+correction itself drives into contact; `"initial"` is the paper's choice: only the points that penetrate in the raw state.
 """
 
 from tolcontact.mechanics.displacement import MOMENTS

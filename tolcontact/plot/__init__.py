@@ -1,4 +1,4 @@
-"""Pictures by code, for papers and slides: `tc.plot`. A chapter of the guide. Needs `pip install '.[plot]'`.
+"""Plot: pictures for papers and slides, with `tc.plot`. A chapter of the guide. Needs `pip install '.[plot]'`.
 
 `tc.plot.histogram` draws with matplotlib into your `axes` or new ones. `tc.plot.assembly` and `tc.plot.field` draw with pyvista
 into your `plotter`, or into a new one that needs no display. You can add anything that these libraries offer, and save it:

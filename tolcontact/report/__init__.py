@@ -18,23 +18,24 @@ terminal; output to a file or a pipe is never cut.
 variation simulation of stand: 1000 realizations
 ...
 
-`write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. It needs no network, and is
-sent like any file: the assembly in 3D, with fields, single realizations and sections; histograms with limits, and the
-convergence of estimates; measures against contributors; contact, certificates, and the settings of the run.
-`write_view` (`tolcontact view`) writes the assembly before a run: faces with their selectors, locators, contact
-points, and nominal gaps. In a notebook a declared assembly and a program show this page; a summary shows its tables, and
-`results.tolcontact` the report. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes a comparison of runs.
+`write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. The page is a single file
+that needs no network. It shows the assembly in 3D, with fields, single realizations and sections; histograms with limits, and
+the convergence of estimates; measures against contributors; contact, certificates, and the settings of the run. `write_view`
+(`tolcontact view`) writes the assembly before a run: faces with their selectors, locators, contact points, and nominal gaps.
+In a notebook, a declared assembly or a program shows this page, a summary shows its tables, and `results.tolcontact` shows the
+report. `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes a comparison of runs.
 
 How to read the text:
 
 - Each figure is `estimate [lower, upper]`, with the decimals that its 95 % interval supports.
-- The columns are the raw state, the corrected state, and the change between them. Changes are from the same draws, so their
+- The columns are the raw state, the corrected state, and the change between them. Changes compare the same draws, so their
   intervals are narrower than a comparison of the two columns suggests.
 - The second table gives, for each part, the smallest and largest 6 sigma of the displacement over its surface.
 - The last lines describe contact: the share of realizations that it touched, their statuses, the pairs in conflict, the largest
   penetration at contact points and between surfaces, and advice if another method fits better.
 
-Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line states it.
+Realizations that did not converge, cannot be assembled, or are doubtful are included in the statistics; a line of the text
+says so.
 """
 
 from tolcontact.report.figures import grouped

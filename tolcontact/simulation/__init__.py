@@ -1,8 +1,8 @@
 """Simulate: realizations in blocks, on all processors, with the same results for any number of them. A chapter of the guide.
 
 Realizations are simulated in blocks of 4096. Blocks are smaller if a realization takes long: 512 with curved faces in an exact
-resolution, and fewer with more than 24 coupled bodies. Each block is drawn, placed, corrected and measured by one of as many
-threads as the process may use processors, and handed over in order.
+resolution, and fewer with more than 24 coupled bodies. One thread draws, places, corrects and measures a block; there are as
+many threads as processors that the process may use. Blocks are returned in order.
 
 >>> import numpy as np
 >>> import tolcontact as tc
@@ -24,49 +24,48 @@ pass. `tc.run` writes the same numbers into an archive.
 
 ## Reproducibility
 
-The results of a run are the same to the last bit for any number of processors, on the same machine with the same versions:
-a block depends on the seed and on its place alone.
+The results of a run are the same to the last bit for any number of processors, on the same machine with the same versions: a
+block depends only on the seed and on its position.
 
 >>> one = np.concatenate([block.measured for block in tc.simulate_blocks(program, samples=5000, seed=1, threads=1)])
 >>> bool((one == np.concatenate([block.measured for block in blocks])).all())
 True
 
-The solvers `qpoases`, `osqp` and `highs` start each QP from the one before, and forget it at the end of a block. So the last
-digits of their results depend on which realizations share a block, and thereby on the number of realizations.
+The solvers `qpoases`, `osqp` and `highs` start each QP from the previous one within a block. The last digits of their results
+therefore depend on which realizations share a block, and so on the number of realizations.
 
 ## Many processes, many machines
 
-`tolcontact run MODEL --workers 8` simulates in eight processes of this machine, `--scheduler tcp://HOST:8786` on the workers of
-a running dask scheduler, `tc.run(..., client=client)` on those of any client of `dask.distributed` (the extra `dask`). In two
-shells, and one for each further worker:
+`tolcontact run MODEL --workers 8` simulates in eight processes of this machine, `--scheduler tcp://HOST:8786` on the workers
+of a running dask scheduler, `tc.run(..., client=client)` on those of any client of `dask.distributed` (the extra `dask`).
+Start the scheduler and each worker in a shell of its own:
 
     dask scheduler
     dask worker tcp://HOST:8786 --nthreads 1
 
-A worker gets the discretized model, not its script or its files, compiles it once, and simulates shards of some blocks, about a
-second each; this process writes what they give, in order. Four shards for each worker are under way at most, so memory does
-not grow with the number of realizations. Results are those of one process to the last bit, if workers have the same versions
-(others are refused) and the same kind of processor. Shards of a worker that is lost are simulated by others, and a scheduler
-that comes back within a minute gets again what it forgot. Whatever ends this process, `--resume` goes on, with any number of
-workers. Give workers of your own `DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__MALLOC_TRIM_THRESHOLD_=100000000`: with dask's
-own value they take half as long again (those of `--workers` have it). What a cluster costs and what limits it is in
-`studies/scale`. Workers run Python code that clients send: a scheduler belongs in a network that one trusts.
+A worker receives the discretized model, not its script or its files. It compiles the model once, and simulates shards of
+several blocks that take about a second each; the main process writes their results in order. At most four shards per worker
+are in progress, so memory does not grow with the number of realizations. The results equal those of one process to the last
+bit, if the workers have the same versions (others are refused) and the same kind of processor. If a worker is lost, others
+simulate its shards; if the scheduler restarts within a minute, its shards are submitted again. If the main process ends early,
+`--resume` continues the run with any number of workers. For workers that you start yourself, set
+`DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__MALLOC_TRIM_THRESHOLD_=100000000`: with dask's default they take half as long
+again (`--workers` sets it for you). The study in `studies/scale` measures the overhead and the limits of a cluster. Workers
+run Python code that clients send, so run a scheduler only in a network that you trust.
 
-`tc.simulate` and `tc.study` (see `tolcontact.workflow`) make lazy datasets of realizations, for dask to compute: workers then
-write themselves what they simulate (`to_zarr`), and no single writer limits them.
+`tc.simulate` and `tc.study` (see `tolcontact.workflow`) return lazy datasets of realizations, which dask computes. Workers can
+then write their own results (`to_zarr`), so no single writer limits them.
 
-All analyses take a `client` as well, and `--workers` or `--scheduler` on the command line. What searches try at once
-(`worst_case`, `tails`, `allocate`, `relocate`) is some hundred realizations: workers gain where one of them takes a millisecond
-or more.
+All analyses also accept a `client`, and `--workers` or `--scheduler` on the command line. The searches (`worst_case`, `tails`,
+`allocate`, `relocate`) try some hundred realizations at once: workers pay off if one realization takes a millisecond or more.
 
 ## Time and memory
 
-From draws to measures, on one thread, RA1 takes 11 to 13 us for a realization with `daqp` and 25 to 30 us with `qpoases`;
-RA2, with 3000 contact points, 21 to 26 us and 56 us. That is 17 and 21 times (with `qpoases` 7 and 10 times) as fast as
-NumPy with a loop over a QP solver (see `studies/speed`). A million realizations of RA1 take 10 to 15 s on two processors
-and 500 MB. Memory does not grow with the number of realizations: at most two blocks for each thread are kept. A run of a
-million realizations or more, or of slow ones that will take more than a minute, announces its time, memory and disk space
-before it starts.
+From draws to measures, on one thread, RA1 takes 11 to 13 us per realization with `daqp` and 25 to 30 us with `qpoases`; RA2,
+with 3000 contact points, 21 to 26 us and 56 us. That is 17 and 21 times (with `qpoases` 7 and 10 times) as fast as NumPy with
+a loop over a QP solver (see `studies/speed`). A million realizations of RA1 take 10 to 15 s on two processors and 500 MB.
+Memory does not grow with the number of realizations: at most two blocks for each thread are kept. A run of a million
+realizations or more, or one that will take more than a minute, announces its time, memory and disk space before it starts.
 """
 
 from tolcontact.simulation.block import Block, outcomes

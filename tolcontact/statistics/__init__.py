@@ -1,6 +1,6 @@
 """Summarize: estimates of each measure with their intervals, of contact, and of displacement fields. A chapter of the guide.
 
-`tc.summarize(results)` reads what `tc.run` or `tc.open_archive` returned, or the archive of a path, and gives an
+`tc.summarize(results)` reads the result of `tc.run` or `tc.open_archive`, or the archive at a path, and returns an
 `xarray.Dataset`. `tolcontact summary FILE.nc` prints it.
 
 >>> import tolcontact as tc
@@ -19,36 +19,38 @@
 ## Estimates
 
 Every estimate has a 95 % confidence interval (dimension `interval`: estimate, lower, upper). No interval assumes a normal
-distribution, because contact cuts distributions off.
+distribution, because contact truncates distributions.
 
 | estimate | interval |
 |---|---|
 | mean | Student's t |
 | standard deviation, 6 sigma, variance | Bonett's, from the fourth moment |
-| percentiles 0.135, 5, 50, 95, 99.865 | order statistics; a bound is infinite if the sample is too small to have one |
+| percentiles 0.135, 5, 50, 95, 99.865 | order statistics; a bound is infinite if the sample is too small |
 | share below, above and outside the limits, touched by contact, not assemblable | Clopper-Pearson |
-| Pp, Ppk by percentiles (ISO 22514-2) | places of three percentiles together, from the multinomial distribution |
-| skewness, kurtosis, Pp and Ppk as of a normal distribution | influence functions (delta method) |
+| Pp, Ppk by percentiles (ISO 22514-2) | joint ranks of three percentiles, from the multinomial distribution |
+| skewness, kurtosis, Pp and Ppk for a normal distribution | influence functions (delta method) |
 | Sobol' indices, share that linear sensitivities miss | influence functions of ratios of means |
 | probabilities of rare events (`tc.tails`) | Student's t over 16 subset simulations |
 | change: shift of the mean | Student's t on the differences of the same draws |
 | change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
 
-Of a run by a sampling plan, with 16 replicates or more, intervals of the mean, the standard deviation, percentiles, shares
-outside, shape and changes are as wide as replicates differ (their design effect).
+For a run with a sampling plan and 16 replicates or more, the intervals of the mean, the standard deviation, percentiles,
+shares outside, shape and changes follow from the differences between replicates (their design effect).
 
-Shares outside and capability are given only for measures with limits. Skewness and kurtosis need many realizations: with
-10 000 of a skewed distribution their intervals cover some 90 of 100, not 95. A measure that evaluates to NaN does not stop the
-run; its statistics are NaN, and the table shows "-". Statistics always cover all finished realizations, whatever their status.
+Shares outside and capability are given only for measures with limits. Skewness and kurtosis need many realizations: with 10
+000 realizations of a skewed distribution, their intervals cover the true value in about 90 % of runs, not 95 %. A measure that
+evaluates to NaN does not stop the run; its statistics are NaN, and the table shows "-". Statistics always cover all finished
+realizations, whatever their status.
 
 >>> change = summary.change.sel(measure="height", change_of="ratio of 6 sigma")
 >>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence
 True
 
-Of contact it holds the share of realizations in which each pair carries, the mean and percentiles of its reaction (in the units
-of the objective: N only where it is the locators' stiffness or forces), and which pairs carry together. How points share a
-reaction is not unique where faces lie flat on each other; which points touch is. A run counts that in its first 2048
-realizations; the archive has it in the group `contact`, point by point, and `results.tolcontact.touching()` returns it.
+For contact, the summary holds the share of realizations in which each pair carries load, the mean and percentiles of its
+reaction (in the units of the objective: N only for "locator stiffness" and "seating"), and which pairs carry load together.
+Where faces lie flat on each other, the distribution of the reaction over points is not unique, but the set of touching points
+is. A run counts touching points in its first 2048 realizations; the group `contact` of the archive holds the shares for each
+point, and `results.tolcontact.touching()` returns them.
 
 >>> round(float(summary.carried.sel(pair="interface", interval="estimate")), 2)
 0.9
@@ -60,12 +62,12 @@ points and between surfaces, and the number of steps: see `tc.summarize`, or `pr
 
 ## Displacement fields
 
-The displacement u = (R - I) v + t (14) is taken at surface points v of every part, in both states. It is that of the part as a
-whole: what its features deviate by is not in it (points of features have measures for that). Kept are its mean and 6 sigma in
-x, y, z and magnitude. Components follow exactly from the mean and covariance of the poses of all realizations, also if poses
-are not kept. The magnitude is summed up realization by realization, over the first 16 384 of them, or fewer (1024 at least) for
-a part with more than 2048 vertices (`fields=`, `--fields`: "some", a number, "all" or "none"); its 6 sigma has an interval at
-each point.
+The displacement u = (R - I) v + t (14) is taken at surface points v of every part, in both states. It is the displacement of
+the part as a rigid body, without the deviations of its features (use measures at points of features for these). The field
+holds its mean and 6 sigma in x, y, z and magnitude. Components follow exactly from the mean and covariance of the poses of all
+realizations, even if poses are not kept. The magnitude is summed over the first 16 384 realizations, or fewer (at least 1024)
+for a part with more than 2048 vertices (`fields=`, `--fields`: "some", a number, "all" or "none"); its 6 sigma has an interval
+at each point.
 
 >>> field = results["field/block"]
 >>> int(field.realizations), int(field.magnitude_realizations)

@@ -1,6 +1,6 @@
-"""Asserts for tests of your own models: all realizations are resolved, archived gaps are true, two runs are the same.
+"""Assertions for tests of your own models: resolved realizations, correct archived gaps, identical runs.
 
-`results` is what `tc.run` or `tc.open_archive` returns, or the path of an archive.
+`results` is the tree that `tc.run` or `tc.open_archive` returns, or the path of an archive.
 
     import tolcontact as tc
     from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run

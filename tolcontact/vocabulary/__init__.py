@@ -1,4 +1,4 @@
-"""Every name of archives, summaries and comparisons, once, with its units."""
+"""Names and units of all variables in archives, summaries and comparisons, each defined once."""
 
 from tolcontact.vocabulary.analyses import *  # noqa: F403
 from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)

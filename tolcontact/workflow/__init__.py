@@ -1,6 +1,6 @@
-"""The whole flow from Python: run, build, check, compare, summarize, and verbs on results. A chapter of the guide.
+"""The whole flow from Python: run, build, check, compare, summarize, and methods of results. A chapter of the guide.
 
-All of them accept a model as an assembly, as the function that declares it, or as the path of its script.
+All these functions accept a model as an assembly, as the function that declares it, or as the path of its script.
 
 >>> import tolcontact as tc
 >>> def assembly():
@@ -13,21 +13,21 @@ All of them accept a model as an assembly, as the function that declares it, or 
 ...     stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
 ...     return stand
 
-`tc.check` returns every fault of a model, and nothing if it can be built.
+`tc.check` returns all faults of a model: an empty tuple if it can be built.
 
 >>> tc.check(assembly)
 ()
 
-`tc.run` simulates it, and checks some answers between contact points (`surfaces`, see `tolcontact.contact`). Without `out`
-the results stay in memory. With `out="stand.nc"` they are written to an archive, and the tree that is returned reads from it:
-close it, or use it in a `with` statement.
+`tc.run` simulates a model, and checks some realizations between contact points (`surfaces`, see `tolcontact.contact`). Without
+`out` the results stay in memory. With `out="stand.nc"` they are written to an archive, and the returned tree reads from this
+file: close the tree, or use it in a `with` statement.
 
 >>> results = tc.run(assembly, samples=500, seed=1, surfaces=16)
 >>> results.sizes["realization"], results.attrs["solver"], results.attrs["resolution"]
 (500, 'qpoases', 'linearized')
 
-A `tc.Method` replaces the method of the model; a mapping replaces single choices of it. An option that cannot act is refused:
-a `tc.Program` has its solver and method already, and `resume` needs the name of an archive.
+A `tc.Method` replaces the method of the model; a mapping replaces single choices. An option that would have no effect is
+refused: a `tc.Program` already has its solver and method, and `resume` needs the name of an archive.
 
 >>> exact = tc.run(assembly, samples=100, solver="daqp", method={"resolution": "exact"}, surfaces=0)
 >>> exact.attrs["method_from"]
@@ -35,9 +35,10 @@ a `tc.Program` has its solver and method already, and `resume` needs the name of
 
 `progress` is called with the number of finished realizations. Ctrl-C leaves an archive that can be read and resumed.
 
-`tc.simulate` gives the realizations of `tc.run` as a lazy dataset (it needs the extra `dask`): nothing is simulated before it
-is asked for, chunk by chunk, by threads here or on the workers of a client of `dask.distributed`. So `to_netcdf`, `to_zarr`
-and what xarray computes need no more memory than some chunks. Deviations may be one's own, such as measured ones.
+`tc.simulate` returns the realizations of `tc.run` as a lazy dataset (this needs the extra `dask`). Chunks are simulated only
+when they are needed, by local threads or on the workers of a client of `dask.distributed`. `to_netcdf`, `to_zarr` and
+computations of xarray therefore need memory for a few chunks only. You can also supply the deviations, for example measured
+ones.
 
 >>> lazy = tc.simulate(assembly, 100_000, solver="daqp")
 >>> lazy.measured.dims, lazy.measured.chunksizes["realization"][0]
@@ -48,7 +49,7 @@ and what xarray computes need no more memory than some chunks. Deviations may be
 >>> tc.simulate(assembly, raised).measured.sel(measure="height").round(6).values.tolist()
 [[0.5, 0.5]]
 
-`tc.study` puts designs side by side: models, seeds and methods, along the dimension `design`, as one such dataset.
+`tc.study` combines designs (models, seeds and methods) in one lazy dataset along the dimension `design`.
 
 >>> designs = tc.study({"stand": assembly}, 1000, seeds=[1, 2], methods=[{"resolution": "linearized"}, {"resolution": "exact"}])
 >>> designs.design.values.tolist()[:2]
@@ -58,7 +59,7 @@ and what xarray computes need no more memory than some chunks. Deviations may be
 True
 
 `tc.compare` runs several solvers or methods on the same draws, and reports agreement, failures, residuals and time.
-Differences are from the first one, in the corrected state, over the realizations that both certified.
+Differences are relative to the first solver or method, in the corrected state, over the realizations that both certified.
 
 >>> comparison = tc.compare(assembly, ["daqp", "qpoases"], samples=200)
 >>> float(comparison.pose_difference.sel(solver="qpoases", extent="largest")) < 1e-9  # [mm]
@@ -66,20 +67,20 @@ True
 
 `methods=[{"resolution": "linearized"}, {"resolution": "exact"}]` compares methods in the same way.
 
-`tc.compare_runs` compares runs that are there already, results by their names or archives: other designs, tolerances, methods.
-Every change stands with its 95 % interval. Runs of the same seed are compared realization by realization, which makes their
-intervals narrow; others as independent ones.
+`tc.compare_runs` compares existing runs, given as named results or archives, with different designs, tolerances or methods.
+Every change has a 95 % interval. Runs with the same seed are compared realization by realization, which makes the intervals
+narrow; other runs are compared as independent samples.
 
 >>> found = tc.compare_runs({"linearized": results, "exact": exact})
 >>> str(found.draws.sel(run="exact").values), found.change.sel(run="exact", change_of="shift of the mean").dims
 ('same', ('state', 'measure', 'interval'))
 
-`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: the share inside
-of every zone, with its interval, beside the share that is stated (see `tolcontact.variation`).
+`tc.check_population` draws the features of a model and measures them as a coordinate measuring machine would: it returns the
+share inside every zone, with its interval, beside the stated share (see `tolcontact.variation`).
 
-`tolcontact.analyses` has the analyses of a model beside its run.
+`tolcontact.analyses` has further analyses of a model.
 
-What results are asked by name is under `results.tolcontact`, also for archives that xarray itself opened:
+Methods of results are under `results.tolcontact`, also for archives that were opened with xarray itself:
 
 >>> results.tolcontact.summary().attrs["realizations"], results.tolcontact.field("block").sizes["component"]
 (500, 4)
@@ -90,10 +91,10 @@ What results are asked by name is under `results.tolcontact`, also for archives 
 
 `results.tolcontact.plot` has the pictures of `tolcontact.plot`.
 
-`tc.summarize` gives the statistics of results, or of the archive of that path (see `tolcontact.statistics`).
+`tc.summarize` returns the statistics of results, or of the archive at a path (see `tolcontact.statistics`).
 
-A wrong model, option or path raises a `tc.TolcontactError` before anything is simulated or written. The `faults` of a
-`tc.ModelError` are all that is wrong with a model.
+A wrong model, option or path raises a `tc.TolcontactError` before anything is simulated or written. The attribute `faults` of
+a `tc.ModelError` lists all faults of the model.
 
 >>> tc.run(assembly, samples=500, method={"resolution": "precise"})
 Traceback (most recent call last):
