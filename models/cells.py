@@ -2,9 +2,10 @@
 
 Each cell is set into a tray, off its place by the tolerance of its pocket, and tilted accordingly; two neighbours are
 nominally 0.2 mm apart. Without contact they pass through each other; with contact they push each other along, the plates hold
-the row, and there is always room, since the clearances add up. Expected: a terminal varies less along the row, but least so in
-the middle, where cells have most room to give way; a pitch varies much less. All cells move together, so the model asks for
-the exact resolution and all points. Dimensions are those of a prismatic cell of a car's battery; tolerances are guesses.
+the row, and there is always room, since the clearances add up. Expected: contact reduces the variation of a terminal along the
+row, but least in the middle, where cells have most room to move; a pitch varies much less. All cells move together, so the
+model asks for the exact resolution and all points. Dimensions are those of a prismatic cell of a car's battery; tolerances are
+guesses.
 
 x along the row, z up. Lengths in mm. A tolerance is the full width of its zone.
 """

@@ -1,7 +1,7 @@
 """A U-channel pushed into a U-channel without clearance: two opposed pairs of flanges and a web.
 
-One linear step cannot open all gaps here: it lets a part that turns grow, and a part that grows does not fit. So the
-model asks for the exact resolution. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
+One linear step cannot open all gaps here: it enlarges a part that turns, and an enlarged part does not fit. The model
+therefore asks for the exact resolution. Lengths in mm, angles in degrees. A tolerance is the full width of its zone.
 """
 
 import numpy as np

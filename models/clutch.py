@@ -1,8 +1,8 @@
 """A one-way clutch: by which angle does a roller jam between the hub's flat and the ring?
 
-The classic of root-sum-square analysis: cos(phi) = (a + c) / (e - c), with the hub's flat at a = 27.645 +- 0.05, the
-roller's radius c = 11.43 +- 0.01 and the ring's radius e = 50.8 +- 0.0125, each of three standard deviations. Here nobody
-writes the formula: hub, ring and roller vary as drawn, a spring presses the roller into the wedge, and the angle is where it
+The classic of root-sum-square analysis: cos(phi) = (a + c) / (e - c), with the hub's flat at a = 27.645 +- 0.05, the roller's
+radius c = 11.43 +- 0.01 and the ring's radius e = 50.8 +- 0.0125, where each +- is three standard deviations. This model does
+not use the formula: hub, ring and roller vary as drawn, a spring presses the roller into the wedge, and the angle is where it
 comes to rest. Expected: mean 7.0148 and standard deviation 0.2197 degrees.
 
 Lengths in mm. A tolerance is the full width of its zone.

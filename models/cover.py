@@ -2,7 +2,7 @@
 
 The pins are off their places by the tolerance of the holes that they are pressed into; the cover is set down by hand, up to
 half a millimetre off, and the pins move it to where its hole (clearance 0.1 on the diameter) and its slot fit over them.
-Expected: an edge is off as the nearest pin is, and by half the clearance more; without contact the cover passes through its
+Expected: an edge deviates as much as the nearest pin, plus half the clearance; without contact the cover passes through its
 pins. Pins and hole vary in size, too. They are round, so one linear step is not enough, and the model asks for the exact
 resolution. Dimensions were chosen for this model; cover_cad.py makes both STEP files from them.
 

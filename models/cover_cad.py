@@ -1,4 +1,4 @@
-"""Makes housing.step and cover.step, the shapes of cover.py. Needs build123d; the files it made are beside it."""
+"""Script that makes housing.step and cover.step, the shapes of cover.py. It needs build123d; the two files are beside it."""
 
 import math
 from pathlib import Path

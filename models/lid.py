@@ -1,9 +1,9 @@
 """A lid with four clearance holes on a base with four studs, position at maximum material: does every pair go together?
 
-Holes and studs are toleranced as drawings do it: their places to three planes of their part, at maximum material condition,
-so that a larger hole may be farther off. Expected: parts at their worst just fit (virtual condition: hole 8.2 - 0.15 and
-stud 7.9 + 0.15), so that next to none of 1000 does not; the lid, set down by hand up to half a millimetre off, moves to
-where it fits. Dimensions were chosen for this model.
+Holes and studs are toleranced as drawings do it: their places to three planes of their part, at maximum material condition, so
+that a larger hole may be farther off. Expected: parts at their worst just fit (virtual condition: hole 8.2 - 0.15 and stud 7.9
++ 0.15), so nearly all of 1000 assemblies fit; the lid, set down by hand up to half a millimetre off, moves to where it fits.
+Dimensions were chosen for this model.
 
 z up. Lengths in mm. A tolerance is the full width of its zone; sizes have limits.
 """

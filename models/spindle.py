@@ -1,9 +1,9 @@
 """A spindle on two bearing seats: how far does its nose run out, and how does it lie in the bearings' rings?
 
-The seats are one common datum A-B; the nose is toleranced to it with total run-out, its face with axial run-out, and the
-seats vary in size. The rings stand in a housing whose front bore is off its place; the spindle floats in them with its
-clearance, and its weight presses it down. Expected: the nose's axis is off its place as the bores are, and by half the
-clearance down; its run-out beyond that is its own. Dimensions were chosen for this model.
+The seats are one common datum A-B; the nose is toleranced to it with total run-out, its face with axial run-out, and the seats
+vary in size. The rings stand in a housing whose front bore is off its place; the spindle floats in them with its clearance,
+and its weight presses it down. Expected: the axis of the nose shifts with the bores, and down by half the clearance; any
+further run-out is that of the spindle itself. Dimensions were chosen for this model.
 
 y along the spindle, z up. Lengths in mm. A tolerance is the full width of its zone.
 """

@@ -1,12 +1,12 @@
 """A tower of blocks, each set down on the one below: how high and how far out of place is the top?
 
-Every block is placed by a fixture of its own, off its place and tilted, as its locators vary. If it would sink into the one
-below, contact pushes the two apart; where it hangs over a gap, it stays, since nothing presses it down. Expected: blocks do not
-sink into each other, so the top is hardly ever lower than nominal; it is higher on average, and varies much less than
-without contact. One free body per block: change BLOCKS to see what bodies cost.
+Each block is placed by its own fixture, shifted and tilted as its locators vary. If it would sink into the one below, contact
+pushes the two apart; where it hangs over a gap, it stays, since nothing presses it down. Expected: blocks do not sink into
+each other, so the top is hardly ever lower than nominal; it is higher on average, and varies much less than without contact.
+One free body per block: change BLOCKS to see how the time grows with the number of bodies.
 
 The model asks for the exact resolution and all points: with "active points" a block that its neighbours hardly touch may slide
-far away, and is then called doubtful.
+far away, and its realization is then doubtful.
 
 z up. Lengths in mm. A tolerance is the full width of its zone.
 """

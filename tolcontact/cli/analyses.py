@@ -142,7 +142,7 @@ def _corner(text: str, option: str) -> tuple[float, ...]:
 COMMANDS = (
     AnalysisCommand(
         "contributions",
-        "Print which contributors the variance of each measure comes from, without contact and with it.",
+        "Print the contributors that cause the variance of each measure, with and without contact.",
         contributions,
         terms.CONTRIBUTIONS,
         "Number of base realizations; each is simulated again for every group.",
@@ -152,7 +152,7 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "sensitivities",
-        "Print how much each measure follows each contributor, without contact and through it.",
+        "Print how much each measure changes with each contributor, with and without contact.",
         sensitivities,
         terms.SENSITIVITIES,
         "Number of realizations.",

@@ -39,7 +39,7 @@ def report(
     archive: Archive,
     out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: beside the archive.")] = None,
 ) -> None:
-    """Write an archive as one page for a browser, which needs no network."""
+    """Write a self-contained page for a browser from an archive."""
     path = out or Path(archive).with_suffix(".html")
     check_page(path)
     with open_archive(archive) as results:

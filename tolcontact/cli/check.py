@@ -25,12 +25,12 @@ def check(
     resolution: Resolution = None,
     objective: Objective = None,
     population: Annotated[
-        int | None, typer.Option(metavar="N", help="Also draw N of every feature, and print the share inside its zones.")
+        int | None, typer.Option(metavar="N", help="Also draw every feature N times, and print the share inside its zones.")
     ] = None,
     seed: Seed = 1,
     view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model and these options, and list every fault, without a run."""
+    """Check a model and its options without a run, and list all faults."""
     assembly = load_model(model)
     try:
         program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
