@@ -140,12 +140,12 @@ class ArchiveWriter:
 
     @property
     def is_between_blocks(self) -> bool:
-        """Whether the last block is complete: a run can be resumed only there."""
+        """True if the last block is complete: a run can be resumed only there."""
         return self.rows % self._block_rows == 0
 
     @property
     def is_checkpoint_due(self) -> bool:
-        """Whether it is time for a checkpoint: the last one is old, or no complete block will follow."""
+        """True if a checkpoint is due: the last one is old, or no complete block will follow."""
         is_old, is_last = (
             time.monotonic() >= self._since + self.checkpoint_interval,
             self.rows + self._block_rows > self.samples,
