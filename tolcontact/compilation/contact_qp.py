@@ -88,15 +88,9 @@ def contact_program(
     standing = tuple(standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs)
     inputs = _inputs(nominal, group, standing)
     setting = Setting(
-        nominal,
-        group,
-        method,
-        raw=poses_of(inputs["raw"]),
-        moments=inputs["moments"],
-        deviations=inputs["deviations"],
-        firmness=inputs["firmness"],
-        z=ca.SX.sym("z", FREEDOMS * len(group.free)),
-    )
+        nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
+        **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
+    )  # fmt: skip
     current = poses_of(inputs["poses"])
     centres = [current[k].apply(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
     motion = Motion(group.carried, current, increments(setting.z, group.length, centres))
