@@ -13,7 +13,7 @@ CORNER = (bd.Align.MIN, bd.Align.MIN, bd.Align.MIN)
 
 
 def housing() -> bd.BuildPart:
-    """A block with a cavity and two blind holes, into which the pins are pressed."""
+    """Return a block with a cavity and two blind holes, into which the pins are pressed."""
     with bd.BuildPart() as made:
         bd.Box(LENGTH, WIDTH, DEPTH, align=CORNER)
         bd.fillet(made.edges().filter_by(bd.Axis.Z), 6)
@@ -26,7 +26,7 @@ def housing() -> bd.BuildPart:
 
 
 def cover() -> bd.BuildPart:
-    """A plate with a round hole, and a slot along the line between the two pins."""
+    """Return a plate with a round hole, and a slot along the line between the two pins."""
     with bd.BuildPart() as made:
         bd.Box(LENGTH, WIDTH, COVER, align=CORNER)
         bd.fillet(made.edges().filter_by(bd.Axis.Z), 6)

@@ -28,7 +28,7 @@ HINGE_X, HINGE_Y, HINGE_Z, STRIKER_Y, STOP_Y = 1.2, 1.0, 1.0, 1.5, 0.6  # tolera
 
 
 def opening() -> trimesh.Trimesh:
-    """The body around the door: its skin, as far out as the door's, and the flange behind; eight bars."""
+    """Return the body around the door as eight bars: its skin, flush with the door's, and the flange behind."""
     low, high_x, high_z = -GAP, LENGTH + GAP, HEIGHT + GAP
     bars = []
     for y, inner, outer in ((THICKNESS, 0.0, 150.0), (-2.0, FLANGE, 150.0)):
@@ -45,7 +45,7 @@ def opening() -> trimesh.Trimesh:
 
 
 def over(x: float, z: float) -> tc.Inside:
-    """What of the door lies over the stop at (x, z)."""
+    """Choose the part of the door over the stop at (x, z)."""
     return tc.Inside((x - STOP / 2, -1, z - STOP / 2), (x + STOP / 2, 1, z + STOP / 2))
 
 

@@ -19,14 +19,14 @@ PLACE, BORE, SHAFT = 0.12, 0.06, 0.03  # tolerances: position of a bore, its siz
 
 
 def ring(x: float) -> trimesh.Trimesh:
-    """A lug or a knuckle, with its bore along x."""
+    """Return a lug or a knuckle, with its bore along x."""
     shape = trimesh.creation.annulus((PIN + CLEARANCE) / 2, PIN, WIDTH, sections=48)
     shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
     return shape.apply_translation((x, 0, 0))
 
 
 def bored(model: tc.Assembly, name: str, places: tuple[float, ...], plate: float, **fixed: bool) -> list[tc.Feature]:
-    """A part with a bore at each place, toleranced to its plate at a height, and to the plate's side and end."""
+    """Declare a part with a bore at each place, toleranced to its plate at a height, and to the plate's side and end."""
     slab = trimesh.creation.box(extents=(100, 60, 4)).apply_translation((0, 0, plate))
     part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, places)])), **fixed)
     for letter, direction, reach in (("A", "+z" if plate < 0 else "-z", 2), ("B", "-y", 30), ("C", "-x", 50)):

@@ -23,18 +23,18 @@ HOLES = [(30.0, 0.0), (70.0, 0.0)]  # x, y in the web
 
 
 def side(x: float, z: float, outside: float = 0.0) -> float:
-    """The y of the right flange's contact face, or of the plane `outside` mm outside of it."""
+    """Return the y of the right flange's contact face, or of the plane `outside` mm outside of it."""
     return WIDTH / 2 - NARROW * (x - LENGTH / 2) + LEAN * z + SLOPE * outside
 
 
 def trough(outside: float, top: float, over: float = 0.0) -> trimesh.Trimesh:
-    """What lies between planes `outside` mm outside of the contact faces; `over` mm longer than the channel at both ends."""
+    """Return the body between planes `outside` mm outside of the contact faces, `over` mm longer at both ends."""
     corners = [(x, z) for x in (-over, LENGTH + over) for z in (-outside, top)]
     return trimesh.convex.convex_hull([(x, sign * side(x, z, outside), z) for x, z in corners for sign in (-1, 1)])
 
 
 def plate(outside: float) -> trimesh.Trimesh:
-    """A plate whose outer faces lie `outside` mm outside of the contact faces, with its holes stamped through."""
+    """Return a plate whose outer faces lie `outside` mm outside of the contact faces, with its holes stamped through."""
     x, z = FLANGE_HOLE
     stamps = [trimesh.creation.cylinder(6, 20, transform=trimesh.transformations.translation_matrix((*xy, 0))) for xy in HOLES]
     for sign in (-1, 1):
@@ -49,7 +49,7 @@ def plate(outside: float) -> trimesh.Trimesh:
 
 
 def solid(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
-    """The solid within a mesh, in double precision: the booleans of trimesh pass through single, which tilts faces."""
+    """Return the solid within a mesh in double precision: booleans of trimesh use single precision, which tilts faces."""
     return manifold3d.Manifold(manifold3d.Mesh64(np.array(mesh.vertices), np.array(mesh.faces, dtype=np.uint64)))
 
 

@@ -19,7 +19,7 @@ WIDTH, LONG = 16.0, 30.0  # of a seat; of the nose, which ends at 0
 
 
 def turned(radius: float, low: float, high: float) -> trimesh.Trimesh:
-    """A cylinder along y."""
+    """Return a cylinder along y."""
     shape = trimesh.creation.cylinder(radius, high - low, sections=64)
     shape.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [1, 0, 0]))
     return shape.apply_translation((0, (low + high) / 2, 0))
