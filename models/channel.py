@@ -13,7 +13,7 @@ WIDTH, DEPTH, HEIGHT, SHEET = 100.0, 50.0, 30.0, 3.0
 
 
 def channel(half_width: float, floor: float, opening: float) -> trimesh.Trimesh:
-    """Return a U of sheet metal along y: outer faces at z = `floor` and, where z = 0, x = +-half_width; flanges open upwards."""
+    """Return a sheet-metal U along y: outer faces at z = `floor` and, where z = 0, x = +-half_width; flanges open upwards."""
     right = [(half_width + np.tan(np.radians(opening)) * z, z) for z in (floor, HEIGHT)]
     inside = [(half_width - SHEET + np.tan(np.radians(opening)) * z, z) for z in (HEIGHT, floor + SHEET)]
     half = right + inside
@@ -26,7 +26,7 @@ def channel(half_width: float, floor: float, opening: float) -> trimesh.Trimesh:
 
 
 def assembly(opening: float = 0.0) -> tc.Assembly:
-    """Declare the U in a U. `opening` is how much the flanges lean outwards: only leaning ones let a part escape upwards."""
+    """Declare the U in a U. `opening` is the angle [deg] by which the flanges lean outwards: only leaning ones let a part escape upwards."""
     model = tc.Assembly("channel", method=tc.Method(resolution="exact"))
     outer = model.part("outer", tc.Mesh(channel(WIDTH / 2 + SHEET, -SHEET, opening)), fixed=True)
     inner = model.part("inner", tc.Mesh(channel(WIDTH / 2, 0, opening)))
