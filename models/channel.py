@@ -26,7 +26,7 @@ def channel(half_width: float, floor: float, opening: float) -> trimesh.Trimesh:
 
 
 def assembly(opening: float = 0.0) -> tc.Assembly:
-    """Declare the U in a U. `opening` is the angle [deg] by which the flanges lean outwards: only leaning ones let a part escape upwards."""
+    """Declare the U in a U. The flanges lean outwards by the angle `opening` [deg]: only leaning ones let a part escape."""
     model = tc.Assembly("channel", method=tc.Method(resolution="exact"))
     outer = model.part("outer", tc.Mesh(channel(WIDTH / 2 + SHEET, -SHEET, opening)), fixed=True)
     inner = model.part("inner", tc.Mesh(channel(WIDTH / 2, 0, opening)))
