@@ -93,7 +93,7 @@ def test_without_a_place_to_write_it_compiles_anew(installed):
     assert count(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
 
 
-@pytest.mark.nightly
+@pytest.mark.slow
 def test_several_processes_may_begin_at_once(installed):
     shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
     begun = [started(installed) for _ in range(4)]
