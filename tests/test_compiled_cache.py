@@ -93,7 +93,6 @@ def test_without_a_place_to_write_it_compiles_anew(installed):
     assert count(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
 
 
-@pytest.mark.slow
 def test_several_processes_may_begin_at_once(installed):
     shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
     begun = [started(installed) for _ in range(4)]
@@ -115,7 +114,7 @@ def nobody():
     return AS_NOBODY
 
 
-@pytest.mark.parametrize("home", ["writable", *nightly("not writable", "missing")])
+@pytest.mark.parametrize("home", ["writable", "not writable", "missing"])
 def test_another_user_may_use_it(home, installed, nobody, tmp_path):
     """Who can read the package, but not write to it."""
     folder = tmp_path / "home"
