@@ -4,7 +4,7 @@ Each cell is set into a tray, off its place by the tolerance of its pocket, and 
 nominally 0.2 mm apart. Without contact they pass through each other; with contact they push each other along, the plates hold
 the row, and there is always room, since the clearances add up. Expected: contact reduces the variation of a terminal along the
 row, but least in the middle, where cells have most room to move; a pitch varies much less. All cells move together, so the
-model asks for the exact resolution and all points. Dimensions are those of a prismatic car battery cell; tolerances are guesses.
+model asks for the exact resolution and all points. Dimensions are those of a prismatic car battery cell; ranges are guesses.
 
 x along the row, z up. Lengths in mm. A tolerance is the full width of its zone.
 """
