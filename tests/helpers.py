@@ -6,7 +6,7 @@ import os
 import signal
 import subprocess
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -14,6 +14,9 @@ import xarray as xr
 
 import tolcontact as tc
 from tolcontact.cli import command_line
+from tolcontact.compilation import ContactGroup
+from tolcontact.compilation.contact_qp import contact_program
+from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.simulation import Block, simulate_blocks
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -36,6 +39,18 @@ def simulate(assembly, samples=200, seed=1, block=1000, **options):
     """The program, and its blocks joined to one: arrays by name."""
     program = tc.build(assembly, **options)
     return program, joined(simulate_blocks(program, samples=samples, seed=seed, block=block))
+
+
+def recompiled(program, *, plugin=None, standing=None):
+    """A program with another plugin, or with other points of each of its pairs that always have a row."""
+    plugin, groups = plugin or program.plugin, [group.group for group in program.groups]
+    rows = [() if standing is None else [standing[pair] for pair in group.pairs] for group in groups]
+    qps = [
+        contact_program(program.nominal, group, program.gaps, program.method, plugin, points)
+        for group, points in zip(groups, rows, strict=True)
+    ]
+    solved = tuple(ContactGroup(group, qp, ContactSolver(qp)) for group, qp in zip(groups, qps, strict=True))
+    return replace(program, plugin=plugin, groups=solved)
 
 
 def joined(blocks):

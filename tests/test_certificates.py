@@ -10,16 +10,17 @@ import tolcontact as tc
 from studies.certificates.judge import contradictions
 from studies.certificates.scenes import scene
 from tests import cases
-from tests.helpers import ALL_POINTS, EXACT, SEATED, R_t, nightly, simulate
+from tests.helpers import ALL_POINTS, EXACT, SEATED, R_t, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
-from tolcontact.compilation import plugins, usable_plugins
-from tolcontact.compilation.plugins import PLUGINS, Plugin
+from tolcontact.compilation import usable_plugins
+from tolcontact.compilation.plugins import Plugin
 from tolcontact.compilation.polishing import polished
 from tolcontact.discretization import discretize
 from tolcontact.errors import ContactWarning, OptionError
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.shapes import shape
+from tolcontact.simulation import simulate_blocks
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 SOLVERS = ("daqp", "qpoases")
@@ -81,18 +82,16 @@ def test_every_solver_certifies_what_the_others_do(solver):
     assert run["kkt_residual"].max() < 1e-8
 
 
-def test_what_a_solver_misses_another_one_answers(monkeypatch):
+def test_what_a_solver_misses_another_one_answers():
     """A solver that stops after one iteration: the poses are those of a good one, and the archive says who answered."""
-    _, good = simulate(cases.stack(), samples=100, solver="qpoases")
+    program, good = simulate(cases.stack(), samples=100, solver="qpoases")
     lazy = Plugin("daqp", {"daqp": {"iter_limit": 1}}, fallbacks=("qpoases",))
-    monkeypatch.setitem(PLUGINS, "daqp", lazy)
-    monkeypatch.setattr(plugins, "is_usable", lambda name: True)  # it fails the small problem, too
-    _, run = simulate(cases.stack(), samples=100, solver="daqp")
+    run = joined(simulate_blocks(recompiled(program, plugin=lazy), samples=100, seed=1))
     assert run["second_answers"].sum() > 30 and good["second_answers"].sum() == 0
     assert np.abs(run["poses"] - good["poses"]).max() < 1e-8
     assert (run["status"] == good["status"]).all()
-    monkeypatch.setitem(PLUGINS, "daqp", Plugin("daqp", lazy.options, fallbacks=()))
-    _, alone = simulate(cases.stack(), samples=100, solver="daqp")
+    unaided = recompiled(program, plugin=replace(lazy, fallbacks=()))
+    alone = joined(simulate_blocks(unaided, samples=100, seed=1))
     lost = alone["status"] == Status.NOT_CONVERGED
     assert lost.sum() > 30
     assert np.abs(alone["poses"][lost, CORRECTED] - alone["poses"][lost, RAW]).max() < 5  # and moves nothing far

@@ -2,6 +2,7 @@
 
 import inspect
 import itertools
+from dataclasses import replace
 from types import SimpleNamespace
 
 import casadi as ca
@@ -11,24 +12,26 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import nightly, recompiled
 from tolcontact.compilation import contact_qp
-from tolcontact.compilation.functions import InterpretedFunction, adaptive
+from tolcontact.compilation.functions import InterpretedFunction
+from tolcontact.compilation.functions.adaptive import MIN_COMPILED_CALLS
+from tolcontact.compilation.functions.code_cache import cache_folder
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
-from tolcontact.compilation.newton import _is_convex
+from tolcontact.compilation.newton import is_convex
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact import kernel
-from tolcontact.contact.scan import PairScan, _cluster, pair_scan
-from tolcontact.discretization import discretize
+from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
+from tolcontact.discretization import Offsets, discretize
 from tolcontact.mechanics.gap import gap_matrix
-from tolcontact.mechanics.gap_map import _corners, gap_map
+from tolcontact.mechanics.gap_map import gap_map
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.poses import AT_REST
-from tolcontact.simulation import simulate_blocks, threads
-from tolcontact.simulation.blocks import _observe, simulate_block
+from tolcontact.simulation import simulate_blocks
+from tolcontact.simulation.blocks import simulate_block
 from tolcontact.simulation.threads import MIN_ROWS, block_rows
 from tolcontact.variation.draws import draw
-from tolcontact.vocabulary import RAW, Status
+from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 RNG = np.random.default_rng(5)
 PLANAR = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "cover": lambda: cases.model("cover")}
@@ -94,12 +97,11 @@ EVERY = {"ra1": cases.ra1, "stack": cases.stack, "jaws": cases.jaws, "rollers": 
         *nightly(*((name, "linearized") for name in EVERY if name not in ("cover", "jaws"))),
     ],
 )
-def test_few_rows_give_what_all_rows_give(name, resolution, monkeypatch):
+def test_few_rows_give_what_all_rows_give(name, resolution):
     """Curved contact and several bodies included: the same QPs, once with the rows that are found, once with every row."""
     make = EVERY[name]
     few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
-    monkeypatch.setattr(contact_qp, "standing_points", lambda pair, gaps, method: np.arange(len(pair.P_m)))
-    every = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
+    every = recompiled(few, standing=[np.arange(len(pair.P_m)) for pair in few.nominal.pairs])
     assert any(len(g.program.standing[0]) > 4 for g in every.groups)
     blocks = [next(simulate_blocks(program, samples=24, seed=8)) for program in (few, every)]
     assert (blocks[0].status == blocks[1].status).all()
@@ -141,11 +143,15 @@ def test_what_is_no_number_is_a_row_that_did_not_converge(make):
     assert np.array_equal(found.poses[others], expected.poses[others])
 
 
-def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch):
-    monkeypatch.setattr(adaptive, "MIN_COMPILED_CALLS", 150)
+def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notices(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))  # without the code of earlier processes
     program = tc.build(cases.ra1(), solver="daqp")
-    first, *_, last = (next(simulate_blocks(program, samples=100, seed=1)) for _ in range(4))
-    assert program.place._evaluate._native is not None
+    first = next(simulate_blocks(program, samples=100, seed=1))
+    assert not cache_folder().exists()
+    for _ in simulate_blocks(program, samples=MIN_COMPILED_CALLS, seed=2):
+        pass
+    assert len(list(cache_folder().iterdir())) >= 2  # where parts are, and what is observed there
+    last = next(simulate_blocks(program, samples=100, seed=1))
     assert np.array_equal(first.poses, last.poses) and np.array_equal(first.kkt_residual, last.kkt_residual)
 
 
@@ -159,8 +165,10 @@ def test_functions_are_compiled_when_they_were_evaluated_often_and_nobody_notice
 def test_compiled_scans_equal_those_in_numpy(make, activity):
     program = tc.build(make(), solver="daqp")
     block = next(simulate_blocks(program, samples=50, seed=1))
-    _, relative = _observe(program, block.poses[:, RAW], block.deviations)
-    _, later = _observe(program, block.poses[:, 1], block.deviations)
+    relative, later = (
+        program.observe(poses=block.poses[:, state], deviations=block.deviations)["relative"].reshape(50, -1, 12)
+        for state in (RAW, CORRECTED)
+    )
     (group,) = program.groups
     for position, index in enumerate(group.group.pairs):
         tables = [side.table for side in group.group.sides if side.pair == position]
@@ -191,14 +199,17 @@ def test_no_gap_of_a_box_is_below_its_bound_in_spite_of_rounding(offset, tilt):
     lower, upper = np.sort(rng.normal(scale=50, size=(2, 1, 500)), axis=0)  # each box has points in both of its ends
     boxes, (middle, reach) = np.array([(upper + lower) / 2, (upper - lower) / 2]), np.empty((2, 500))
     for slope in tilt * rng.normal(size=20):
-        kernel._bounds(boxes, 0, 500, np.array([offset, slope]), middle, reach)
+        kernel.bounds(boxes, 0, 500, np.array([offset, slope]), middle, reach)
         gaps = offset + slope * np.concatenate([lower, upper])
         assert (gaps >= middle - reach).all() and (gaps <= middle + reach).all()
 
 
 @pytest.mark.parametrize(("coordinates", "corners"), [([[3.0, 1.0, 2.0, 5.0]], [1, 3]), ([], [0]), ([[2.0, 2.0]], [0])])
 def test_on_a_line_the_two_ends_can_be_the_deepest(coordinates, corners):
-    assert _corners(np.array(coordinates)).tolist() == corners
+    """Coordinates by which offsets raise the points, above a face on which all gaps are equal."""
+    points = len(coordinates[0]) if coordinates else 3
+    offsets = Offsets(np.arange(len(coordinates)), -np.array(coordinates).reshape(-1, points))
+    assert gap_map(np.ones((13, points)), offsets).corners.tolist() == corners
 
 
 @pytest.mark.slow
@@ -225,12 +236,17 @@ def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
     assert found * bodies**3 <= 4096 * 24**3 or found == MIN_ROWS
 
 
-def test_one_curved_group_is_enough_for_small_blocks(monkeypatch):
-    flat, curved = (SimpleNamespace(group=SimpleNamespace(free=range(1))) for _ in range(2))
-    monkeypatch.setattr(threads, "curved_pairs", lambda _, group: [0] if group is curved.group else [])
-    for is_exact, groups, rows in ((True, [flat, curved], 512), (True, [flat], 4096), (False, [flat, curved], 4096)):
-        program = SimpleNamespace(groups=groups, method=SimpleNamespace(is_exact=is_exact), nominal=None)
-        assert inspect.unwrap(block_rows)(program) == rows
+def test_one_curved_group_is_enough_for_small_blocks():
+    a = cases.rollers()
+    base = a.part("base", tc.Box(10, 10, 10), at=(50, 0, 0), fixed=True)
+    top = a.part("top", tc.Box(10, 10, 10), at=(50, 0, 10))
+    a.locate(top, tc.three_two_one(top.face("-z"), top.face("-y"), top.face("-x")), tolerance=0.1)
+    a.contact("flat", moving=top.face("-z"), reference=base.face("+z"))
+    exact, linearized = (tc.build(a, method=tc.Method(resolution=resolution)) for resolution in ("exact", "linearized"))
+    curved, flat = exact.groups
+    for groups, rows in ([curved, flat], 512), ([flat, curved], 512), ([flat], 4096):
+        assert block_rows(replace(exact, groups=tuple(groups))) == rows
+    assert block_rows(linearized) == 4096
 
 
 def test_clusters_are_neighbours():
@@ -238,19 +254,19 @@ def test_clusters_are_neighbours():
     rng = np.random.default_rng(1)
     heap = rng.integers(4, size=200)
     points = 100 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, -1, 1]])[heap] + rng.normal(size=(200, 3))
-    label = _cluster(points, 4)
+    label = cluster_labels(points, 4)
     assert sorted({(a, b) for a, b in zip(heap, label, strict=True)}) == sorted(dict(zip(heap, label, strict=True)).items())
     assert sorted(set(label)) == [0, 1, 2, 3]
 
 
 def test_curvature_counts_only_where_every_block_is_positive_definite():
     Q = ca.SX.sym("Q", 12, 12)
-    is_convex = ca.Function("is_convex", [Q], [_is_convex(Q)])
+    convex = ca.Function("convex", [Q], [is_convex(Q)])
     one = np.eye(12)
     for k, value in itertools.product(range(12), (-1.0, 0.0, np.nan)):
         other = one.copy()
         other[k, k] = value
-        assert not is_convex(other)
+        assert not convex(other)
     other = one + 0.1
     other[:6, 6:] = other[6:, :6] = 100.0  # freedoms of several together are not looked at
-    assert is_convex(one) and is_convex(other)
+    assert convex(one) and convex(other)

@@ -33,6 +33,7 @@ from tolcontact.mechanics.setting import Setting
 from tolcontact.mechanics.two_sided import misfit
 from tolcontact.method import Method
 
+Standing = Sequence[np.ndarray | None]  # see ContactProgram
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
 
 
@@ -54,7 +55,7 @@ class ContactProgram:
     relate: ca.Function
     slacks: int
     equations: int
-    standing: tuple[np.ndarray | None, ...]
+    standing: Standing
 
     def qp(self, plugin: Plugin) -> ca.Function:
         """Return a new solver of a plugin, without memory of any problem."""
@@ -68,10 +69,11 @@ class ContactProgram:
 
 
 def contact_program(
-    nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin
+    nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing = ()
 ) -> ContactProgram:
     """Return the Functions of a group.
 
+    `standing` holds the points of each pair of the group that always have a row, by default those of `standing_points`.
     `_inputs` describes the inputs. The outputs for `p` parts, `q` pairs and `k` rows are:
 
     corrected (12 p)     poses after the correction; in an exact resolution after the part of it that `stride` allows
@@ -85,7 +87,7 @@ def contact_program(
                          the whole correction
     astray               largest misfit [mm] of exact two-sided locators at `corrected`
     """
-    standing = tuple(standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs)
+    standing = standing or [standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs]
     inputs = _inputs(nominal, group, standing)
     setting = Setting(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
@@ -124,7 +126,7 @@ def contact_program(
     )
 
 
-def _inputs(nominal: Nominal, group: Group, standing: Sequence[np.ndarray | None]) -> dict[str, ca.SX]:
+def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.SX]:
     """Return the symbols of all inputs by name, for `p` parts, `k` rows and contributors (c).
 
     If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have SLOTS rows each,

@@ -23,7 +23,7 @@ def with_curvature(
     curvature = _lagrangian_hessian(setting, poses, rows.bends / goal.scale) + (rows.wrap - rows.bow) / goal.scale - Q
     hold = (1 + 2 * ca.sum1(reactions) / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
     curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
-    counts = ca.logic_and(inputs["newton"], _is_convex(Q + curvature))
+    counts = ca.logic_and(inputs["newton"], is_convex(Q + curvature))
     return Q + ca.if_else(counts, curvature, 0), pull + ca.if_else(counts, rows.slopes.T @ (hold * rows.gaps), 0)
 
 
@@ -33,7 +33,7 @@ def _lagrangian_hessian(setting: Setting, poses: Sequence[Pose], bends: ca.SX) -
     return setting.curvature(energy(setting, poses).value - work)
 
 
-def _is_convex(Q: ca.SX) -> ca.SX:
+def is_convex(Q: ca.SX) -> ca.SX:
     """Return 1 if the diagonal blocks of Q are positive definite, else 0, also for a NaN among the pivots."""
     blocks = (ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS]) for k in range(0, Q.size1(), FREEDOMS))
     pivots = ca.vertcat(*(ca.diag(ca.chol(block)) for block in blocks))

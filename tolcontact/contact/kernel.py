@@ -50,7 +50,7 @@ def _write_factors(basis, columns, X, deviations, factors):  # type: ignore[no-u
 
 
 @inlined
-def _bounds(boxes, start, count, factors, middle, spread):  # type: ignore[no-untyped-def]
+def bounds(boxes, start, count, factors, middle, spread):  # type: ignore[no-untyped-def]
     """Write the gap in the middle of some boxes, and how far other gaps can be from it: middle and spread (count,)."""
     rounding = ROUNDING * abs(factors[0])
     for box in range(count):
@@ -113,7 +113,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
     leaf_middle, leaf_spread = np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
-        _bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
+        bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
         number = 0
         for branch in range(middle.size):
             if middle[branch] - spread[branch] >= activity:
@@ -124,7 +124,7 @@ def survey(points, tables, leaf_sums, branch_sums, relative, deviations, activit
                 for moment in range(moments.shape[1]):
                     moments[k, moment] += branch_sums[branch, moment]
                 continue
-            _bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, leaf_middle, leaf_spread)
+            bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, leaf_middle, leaf_spread)
             for leaf in range(first_leaf, end_leaf):
                 place = leaf - first_leaf
                 if leaf_middle[place] - leaf_spread[place] >= activity:
@@ -152,7 +152,7 @@ def _deepest_of_leaves(points, first_leaf, end_leaf, factors, may_carry, lowest,
     """Return gap and number of the deepest point of some leaves, if it is below `lowest`, or as low and before `where`."""
     leaves = points.leaves
     gaps, middle, spread = scratch
-    _bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, middle, spread)
+    bounds(points.leaf_boxes, first_leaf, end_leaf - first_leaf, factors, middle, spread)
     promising = 0
     for place in range(1, end_leaf - first_leaf):
         if middle[place] - spread[place] < middle[promising] - spread[promising]:
@@ -187,7 +187,7 @@ def deepest(points, clusters, relative, deviations, may_carry, limit, numbers, g
     scratch = np.empty(LEAF), np.empty(BRANCH), np.empty(BRANCH)
     for k in range(relative.shape[0]):
         _write_factors(points.basis, points.columns, relative[k], deviations[k], factors)
-        _bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
+        bounds(points.branch_boxes, 0, middle.size, factors, middle, spread)
         for cluster in range(clusters.size - 1):
             begin, end = clusters[cluster], clusters[cluster + 1]
             lowest, where = limit, leaves[branches[begin]]

@@ -31,9 +31,10 @@ class Step(NamedTuple):
 
 
 class LinearStep:
-    """The QP of one group, ready to be solved for many realizations."""
+    """The QP of one group, ready to be solved for many realizations, in at most `max_rounds` rounds."""
 
-    def __init__(self, program: Program, group: ContactGroup) -> None:
+    def __init__(self, program: Program, group: ContactGroup, max_rounds: int = MAX_ROUNDS) -> None:
+        self._max_rounds = max_rounds
         self._solve = group.solve
         self._remembers = program.plugin.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
@@ -81,7 +82,7 @@ class LinearStep:
         size = np.zeros((2, len(task)))
         rows, part, part_inputs = np.arange(len(task)), (task, state), inputs
         slots, deepest = start_slots, self._deepest(task, state.relative)
-        for number in range(MAX_ROUNDS):
+        for number in range(self._max_rounds):
             extended = [old.with_deepest(*points, PENETRATION) for old, points in zip(slots, deepest, strict=True)]
             slots = [new for new, _ in extended]
             enters = np.logical_or.reduce([np.full(len(rows), number == 0), *(grows for _, grows in extended)])

@@ -17,7 +17,7 @@ from tolcontact.compilation import ACCURACY, ContactGroup, Program
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.iterated_search import search
-from tolcontact.contact.linear_step import PENETRATION, LinearStep
+from tolcontact.contact.linear_step import MAX_ROUNDS, PENETRATION, LinearStep
 from tolcontact.contact.record import accumulate_starts
 from tolcontact.contact.repeated_steps import repeat
 from tolcontact.contact.scan import min_gaps, undone
@@ -47,12 +47,12 @@ OTHER_STARTS_CURVED = (Start(projected=True), Start(projected=True, at_nominal=T
 class ContactResolver:
     """One group of coupled parts, ready to be resolved for blocks of realizations."""
 
-    def __init__(self, program: Program, group: ContactGroup) -> None:
+    def __init__(self, program: Program, group: ContactGroup, max_rounds: int = MAX_ROUNDS) -> None:
         self.parts = np.array(group.group.parts)
         self.pairs = np.array(group.group.pairs)
         self._group = group.group
         self._energy, self._relate = group.solve.energy, group.solve.relative
-        self._step = LinearStep(program, group)
+        self._step = LinearStep(program, group, max_rounds)
         self._method = program.method
         self._candidates = Candidates(program, group)
         size = max(float(program.nominal.parts[part].mesh.scale) for part in group.group.parts)

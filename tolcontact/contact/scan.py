@@ -214,7 +214,7 @@ def pair_scan(
     points   numbers of the points (point,) that the scan has; all if it is None
     """
     points = np.arange(len(pair.P_m)) if points is None else points
-    label = _cluster(pair.P_m[points], len(points) if pair.is_supports else clusters)
+    label = cluster_labels(pair.P_m[points], len(points) if pair.is_supports else clusters)
     along = np.roll(gaps.coordinates, -1, axis=0)  # largest extents first, the constant last
     leaves_of_clusters = [_leaves(points[label == number], along) for number in range(label.max() + 1)]
     leaves = [leaf for cluster in leaves_of_clusters for leaf in cluster]
@@ -254,7 +254,7 @@ def _leaves(points: np.ndarray, coordinates: np.ndarray) -> list[np.ndarray]:
     return [points[leaf[leaf < count]] for leaf in parts[(parts < count).any(axis=1)]]
 
 
-def _cluster(points: np.ndarray, clusters: int) -> np.ndarray:
+def cluster_labels(points: np.ndarray, clusters: int) -> np.ndarray:
     """Return the cluster of each point: the nearest of `clusters` points that lie as far apart as possible."""
     if len(points) <= clusters:
         return np.arange(len(points))

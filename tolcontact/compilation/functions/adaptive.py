@@ -21,25 +21,27 @@ class AdaptiveFunction:
     """A Function of scalar expressions that is interpreted, and compiled once it was evaluated often. Threads may share it.
 
     Both ways give the same results to the last bit.
+
+    native   the machine code, or None while CasADi interprets
     """
 
     def __init__(self, function: ca.Function) -> None:
         self._function = function
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._interpreted = InterpretedFunction(function)
-        self._native: NativeFunction | None = None
+        self.native: NativeFunction | None = None
         self._remaining = MIN_COMPILED_CALLS if function.n_instructions() <= MAX_INSTRUCTIONS else math.inf
         self._is_new = True
         self._lock = threading.Lock()
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if self._native is None and (compiler := self._due_compiler(len(inputs[0]))):
+        if self.native is None and (compiler := self._due_compiler(len(inputs[0]))):
             # CasADi interprets what LLVM cannot compile on this machine.
             with contextlib.suppress(UnknownInstructionError, RuntimeError):
-                self._native = compiler(self._function)  # other threads interpret meanwhile
-        if self._native is not None:
-            return self._native(inputs)
+                self.native = compiler(self._function)  # other threads interpret meanwhile
+        if self.native is not None:
+            return self.native(inputs)
         with self._lock:
             return self._interpreted(inputs)[0]
 

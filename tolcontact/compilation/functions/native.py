@@ -179,13 +179,13 @@ OPERATIONS: dict[int, Callable[..., ir.Value]] = {
 }
 
 
-def key_of(function: ca.Function) -> str:
-    """Return the key of a Function's machine code."""
-    return hashlib.blake2b(function.serialize().encode() + _surroundings(), digest_size=20).hexdigest()
+def key_of(function: ca.Function, host: bytes | None = None) -> str:
+    """Return the key of a Function's machine code for a host: that of this process by default."""
+    return hashlib.blake2b(function.serialize().encode() + (host or host_description()), digest_size=20).hexdigest()
 
 
 @functools.cache
-def _surroundings() -> bytes:
+def host_description() -> bytes:
     """Return a description of the processor, the libraries and the translation, on which machine code depends, too."""
     translation = Path(__file__).read_bytes()
     features = binding.get_host_cpu_features().flatten()
