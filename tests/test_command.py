@@ -1,8 +1,12 @@
 """The command line: what it prints and returns, which options it refuses, and which files it leaves alone."""
 
+import contextlib
 import io
+import os
+import pty
 import re
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -12,11 +16,11 @@ from rich.console import Console
 
 import tolcontact as tc
 from tests.cases import MODELS
-from tests.helpers import SCRIPTS, call, run
+from tests.helpers import COMMAND, SCRIPTS, call, finish, run, start
 from tests.model_scripts import GOOD, HEADER, write_model
 from tests.test_report import data_of
-from tolcontact.cli import progress
 from tolcontact.cli.app import app
+from tolcontact.cli.progress import shown_progress
 from tolcontact.report import summary_text
 
 OPTIONS = {
@@ -145,15 +149,31 @@ def test_tables_are_as_wide_as_the_terminal(archive):
     assert heights[1] < heights[0]
 
 
+@pytest.mark.parametrize(("interval", "quiet", "lines"), [(0.0, False, 2), (0.0, True, 0), (1e9, False, 0)])
+def test_without_a_terminal_a_line_says_at_intervals_how_far_a_run_is(interval, quiet, lines, capsys):
+    with shown_progress("ra1", 20_000, quiet=quiet, interval=interval) as show:
+        for done in (4096, 8192):
+            show(done, 20_000)
+            time.sleep(0.01)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == lines
+    assert not lines or said[0] == "ra1: 4 096 of 20 000"
+    assert not lines or re.fullmatch(r"ra1: 8 192 of 20 000, [\d ]+ a second, \d+ s left", said[1])
+
+
 @pytest.mark.slow
-def test_a_run_without_a_terminal_says_how_far_it_is(monkeypatch, tmp_path):
-    monkeypatch.setattr(progress, "LINE_INTERVAL", 0.0)
-    model, size = MODELS / "ra1.py", ("--samples", "20000", "--solver", "daqp", "--surfaces", "0")
-    done = call(tmp_path, "run", model, *size)
-    lines = [line for line in done.stderr.splitlines() if line.startswith("ra1: ")]
-    assert re.fullmatch(r"ra1: \d+ \d{3} of 20 000, [\d ]+ a second, \d+ s left", lines[-1]), done.stderr
-    again = call(tmp_path, "run", model, *size, "--quiet")
-    assert again.stderr == "" and again.stdout == done.stdout
+def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
+    command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "20000", "--solver", "daqp", "--surfaces", "0"]
+    screen, terminal = pty.openpty()
+    process, shown = start(command, cwd=tmp_path, stderr=terminal), b""
+    os.close(terminal)
+    with contextlib.suppress(OSError):  # the other end is closed
+        while text := os.read(screen, 1 << 16):
+            shown += text
+    os.close(screen)
+    done, quiet = finish(process), call(tmp_path, *command[len(COMMAND) :], "--quiet")
+    assert re.search(r"ra1 ━+ 20000/20000 [\d ]+ a second, 0 s left", re.sub("\x1b.*?[a-zA-Z]", "", shown.decode()))
+    assert quiet.stderr == "" and quiet.stdout == done.stdout
 
 
 def test_every_command_has_examples_that_name_it():

@@ -8,9 +8,13 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import EXACT, contents, nightly
 from tolcontact import vocabulary
-from tolcontact.archive import ArchiveWriter
+from tolcontact.archive import Run
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
+from tolcontact.vocabulary import UNFINISHED
+from tolcontact.workflow.run import write_archive
+
+SETTINGS = Run(seed=3, samples=9000, keep="measures", surfaces=0, fields="some")
 
 
 @pytest.mark.slow
@@ -63,20 +67,19 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("every", "written"), [(0.0, [4096, 8192]), (1e9, [8192])])
-def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_last(every, written, tmp_path, monkeypatch):
-    found = []
-    monkeypatch.setattr(ArchiveWriter, "checkpoint_interval", every)
-    monkeypatch.setattr(ArchiveWriter, "write_checkpoint", lambda writer, sums: found.append(writer.rows))
-    tc.run(cases.stack(), samples=9000, seed=3, solver="daqp", out=tmp_path / "run.nc", keep="measures", surfaces=0).close()
-    assert found == written
+@pytest.mark.parametrize(("interval", "written"), [(0.0, [4096, 8192]), (1e9, [UNFINISHED, 8192])])
+def test_checkpoints_come_after_whole_blocks_when_they_are_due_and_after_the_last(interval, written, tmp_path):
+    path = tmp_path / "run.nc"
+    write_archive(path, tc.build(cases.stack(), solver="daqp"), SETTINGS._replace(checkpoint_interval=interval))
+    with netCDF4.Dataset(path) as file:
+        assert sorted(file["summed_rows"][:]) == written
 
 
 @pytest.mark.slow
-def test_a_resumed_run_goes_on_after_the_newest_checkpoint(tmp_path, monkeypatch):
-    monkeypatch.setattr(ArchiveWriter, "checkpoint_interval", 0.0)
-    path, settings = tmp_path / "run.nc", {"seed": 3, "solver": "daqp", "keep": "measures", "surfaces": 0}
+def test_a_resumed_run_goes_on_after_the_newest_checkpoint(tmp_path):
+    path, program = tmp_path / "run.nc", tc.build(cases.stack(), solver="daqp")
     for samples, after in ((9000, None), (9001, 8192), (13_000, 8192), (13_001, 12_288)):
-        tc.run(cases.stack(), samples=samples, out=path, resume=True, **settings).close()
+        settings = SETTINGS._replace(samples=samples, checkpoint_interval=0.0)
+        write_archive(path, program, settings, is_resumed=after is not None)
         with netCDF4.Dataset(path) as file:
             assert after is None or file.history.splitlines()[-1].endswith(f"resumed after {after} realizations")

@@ -25,6 +25,7 @@ class Run(NamedTuple):
     surfaces   number of realizations that will be checked against the surfaces
     plan       the sampling plan: one of `PLANS`
     fields     number of realizations in the magnitude of displacement fields: a number, "some", "all" or "none"
+    checkpoint_interval   time [s] between two checkpoints, at least
     """
 
     seed: int
@@ -33,6 +34,7 @@ class Run(NamedTuple):
     surfaces: int
     fields: str
     plan: str = terms.MONTE_CARLO
+    checkpoint_interval: float = 2.0  # checkpoint and fields take some 50 ms for a part with 100 000 vertices
 
 
 def run_settings(program: Program, run: Run) -> dict[str, Any]:

@@ -45,8 +45,6 @@ class ArchiveWriter:
     kept      variables of each realization that it keeps
     """
 
-    checkpoint_interval = 2.0  # s, at least: checkpoint and fields take some 50 ms for a part with 100 000 vertices
-
     def __init__(self, path: Path, program: Program, run: Run, sums: Sequence[int]) -> None:
         """Create the file with everything but its rows; `sums` is the length of the sums of each part's field.
 
@@ -56,7 +54,7 @@ class ArchiveWriter:
         with replacing(path) as part, opened_locked(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
-        self._go_on(path, program.nominal)
+        self._go_on(path, program.nominal, run.checkpoint_interval)
 
     @classmethod
     def resume(cls, path: Path, program: Program, run: Run) -> "ArchiveWriter":
@@ -87,11 +85,12 @@ class ArchiveWriter:
                 if values.has("contact", terms.TOUCHING_SHARE):  # not in archives that were begun before
                     initial["contact"] = empty_touching(sum(len(pair.P_m) for pair in program.nominal.pairs))
                 values.overwrite_together(initial)
-        writer._go_on(path, program.nominal)
+        writer._go_on(path, program.nominal, run.checkpoint_interval)
         return writer
 
-    def _go_on(self, path: Path, nominal: Nominal) -> None:
+    def _go_on(self, path: Path, nominal: Nominal, checkpoint_interval: float) -> None:
         self._path, self._parts, self._pairs = path, [part.name for part in nominal.parts], len(nominal.pairs)
+        self._checkpoint_interval = checkpoint_interval
         with _as_archive_error(path):
             self._values = LaidOut(path)
             with opened_locked(path, "r") as file:
@@ -146,10 +145,8 @@ class ArchiveWriter:
     @property
     def is_checkpoint_due(self) -> bool:
         """True if a checkpoint is due: the last one is old, or no complete block will follow."""
-        is_old, is_last = (
-            time.monotonic() >= self._since + self.checkpoint_interval,
-            self.rows + self._block_rows > self.samples,
-        )
+        is_old = time.monotonic() >= self._since + self._checkpoint_interval
+        is_last = self.rows + self._block_rows > self.samples
         return self.is_between_blocks and (is_old or is_last)
 
     def write_checkpoint(self, sums: Sequence[np.ndarray]) -> None:

@@ -37,10 +37,12 @@ class Pace:
 
 
 @contextlib.contextmanager
-def shown_progress(name: str, total: int, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+def shown_progress(
+    name: str, total: int, *, quiet: bool, interval: float = LINE_INTERVAL
+) -> Iterator[Callable[[int, int], None]]:
     """Yield a function of the finished and the total number of realizations that shows progress; also show announcements.
 
-    Progress is a bar on a terminal, and elsewhere a line every LINE_INTERVAL seconds. With `quiet` nothing is shown.
+    Progress is a bar on a terminal, and elsewhere a line after each `interval` [s]. With `quiet` nothing is shown.
     """
     console = Console(stderr=True)
     columns = (
@@ -57,7 +59,7 @@ def shown_progress(name: str, total: int, *, quiet: bool) -> Iterator[Callable[[
         nonlocal last
         speed = pace.text(done, total)
         bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
-        if bar.disable and not quiet and time.monotonic() - last > LINE_INTERVAL:
+        if bar.disable and not quiet and time.monotonic() - last > interval:
             last = time.monotonic()
             typer.echo(f"{shown(name)}: {grouped(done)} of {grouped(total)}{', ' if speed else ''}{speed}", err=True)
 

@@ -127,11 +127,13 @@ class Workers:
 
     Raises ClusterError if there are no workers, if one has other versions than this process, or if none comes through a shard;
     and whatever a shard raises.
+
+    timeout   how long [s] a lost connection, and the first worker, are waited for
     """
 
-    def __init__(self, client: Any) -> None:
-        check_workers(client)
-        self._client = client
+    def __init__(self, client: Any, timeout: float = WORKER_TIMEOUT) -> None:
+        check_workers(client, timeout=timeout)
+        self._client, self._timeout = client, timeout
         self._model: _Model | None = None
 
     def __call__(
@@ -146,7 +148,7 @@ class Workers:
     ) -> Iterator[T]:
         """Yield what `function` makes of each block of `simulate_blocks` where it is simulated; in order."""
         job = Packed.of((draws or program.draws, function), program.nominal)
-        shards = _Shards(self._client, self._sent(program), job, seed, samples, block_rows(program))
+        shards = _Shards(self._client, self._sent(program), job, seed, samples, block_rows(program), self._timeout)
         try:
             begin = start
             while begin < samples or shards:
@@ -180,26 +182,42 @@ class _Model:
         self.sent = self._client.submit(bytes, self.packed.data, pure=False)
 
 
-def check_workers(client: Any) -> None:
-    """Raise ClusterError unless there are workers, all of them with the versions of this process."""
+def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
+    """Raise ClusterError unless a worker comes within `timeout` [s], and all have the versions of this process."""
     try:
-        client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
+        client.wait_for_workers(1, timeout=timeout)
     except TimeoutError as error:
         raise ClusterError(
-            f"no worker came within {WORKER_TIMEOUT:.0f} s; start some with: dask worker {client.scheduler.address} "
-            "--nthreads 1"
+            f"no worker came within {timeout:.0f} s; start some with: dask worker {client.scheduler.address} --nthreads 1"
         ) from error
     for library, expected in versions().items():
         for worker, actual in client.run(version, library, on_error="return").items():
             check_version(worker, library, actual if isinstance(actual, str) else MISSING_VERSION, expected)
 
 
+def shard_result(client: Any, future: Any, timeout: float = WORKER_TIMEOUT) -> Any:
+    """Return the result of a shard; wait for it as long as there are workers, and `timeout` [s] without any."""
+    last_contact = time.monotonic()
+    while True:
+        try:
+            return future.result(timeout=SCHEDULER_TIMEOUT)
+        except TimeoutError:
+            if future.status == "error":
+                return future.result()  # which raises what the shard raised
+            if client.nthreads():
+                last_contact = time.monotonic()
+            elif time.monotonic() > last_contact + timeout:
+                raise ClusterError(
+                    f"all workers are gone, and none came within {timeout:.0f} s; resume the run later"
+                ) from None
+
+
 class _Shards:
     """Shards that are under way, in their order."""
 
-    def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int) -> None:
+    def __init__(self, client: Any, model: _Model, job: Packed, seed: int, samples: int, block: int, timeout: float) -> None:
         self._client, self._model, self._job = client, model, job
-        self._seed, self._samples, self._block = seed, samples, block
+        self._seed, self._samples, self._block, self._timeout = seed, samples, block, timeout
         self._blocks = 1  # of the next shard
         self._begun: deque[tuple[int, int, Any]] = deque()
         self._send_job()
@@ -223,7 +241,7 @@ class _Shards:
         while True:
             start, stop, future = self._begun[0]
             try:
-                seconds, results = self._result(future)
+                seconds, results = shard_result(self._client, future, self._timeout)
             except distributed.KilledWorker as error:
                 raise ClusterError(
                     f"realizations {start} to {stop - 1} ended the workers that simulated them: {error}"
@@ -235,22 +253,6 @@ class _Shards:
                 limit = MAX_SHARD_ROWS // self._block
                 self._blocks = max(1, min(int(SHARD_SECONDS * len(results) / max(seconds, 1e-3)), limit, 2 * self._blocks))
                 return list(results)
-
-    def _result(self, future: Any) -> Any:
-        """Return the result of a shard; wait for it as long as there are workers."""
-        last_contact = time.monotonic()
-        while True:
-            try:
-                return future.result(timeout=SCHEDULER_TIMEOUT)
-            except TimeoutError:
-                if future.status == "error":
-                    return future.result()  # which raises what the shard raised
-                if self._client.nthreads():
-                    last_contact = time.monotonic()
-                elif time.monotonic() > last_contact + WORKER_TIMEOUT:
-                    raise ClusterError(
-                        f"all workers are gone, and none came within {WORKER_TIMEOUT:.0f} s; resume the run later"
-                    ) from None
 
     def cancel(self) -> None:
         """Cancel all shards."""
@@ -277,11 +279,11 @@ class _Shards:
     def _begin_again(self) -> None:
         """Wait for a scheduler that has forgotten the shards under way, and send them again."""
         log.warning("the scheduler was lost; waiting for it")
-        until = time.monotonic() + WORKER_TIMEOUT
+        until = time.monotonic() + self._timeout
         while self._client.status != "running" or not self._client.nthreads():
             if time.monotonic() > until:
                 raise ClusterError(
-                    f"the scheduler was lost, and did not come back within {WORKER_TIMEOUT:.0f} s; resume the run later"
+                    f"the scheduler was lost, and did not come back within {self._timeout:.0f} s; resume the run later"
                 )
             time.sleep(0.2)
         self._model.send()

@@ -40,11 +40,16 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
         return intervals.proportion(score(rng.standard_normal((remaining, dimensions))) > 0)
     count = max(remaining // REPLICATES // (1 + levels), MIN_LEVEL_SAMPLES)
     estimates = np.array([_descent(score, dimensions, count, rng)[0] for _ in range(REPLICATES)])
-    if not estimates.any():
-        return intervals.proportion_of(0, REPLICATES * count)
-    # Estimates are skewed to the right: the interval of their mean is that of its logarithm.
-    mean, error = estimates.mean(), estimates.std(ddof=1) / np.sqrt(REPLICATES)
-    reach = np.exp(intervals.student(REPLICATES - 1) * error / mean)
+    return mean_probability(estimates) if estimates.any() else intervals.proportion_of(0, REPLICATES * count)
+
+
+def mean_probability(estimates: np.ndarray) -> Estimate:
+    """Return the mean of independent estimates of a probability, which are not all zero, with its 95 % interval.
+
+    Estimates are skewed to the right: the interval of their mean is that of its logarithm.
+    """
+    mean, error = estimates.mean(), estimates.std(ddof=1) / np.sqrt(len(estimates))
+    reach = np.exp(intervals.student(len(estimates) - 1) * error / mean)
     return Estimate(float(mean), float(mean / reach), float(min(mean * reach, 1.0)))
 
 

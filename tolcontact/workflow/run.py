@@ -75,7 +75,7 @@ def run(
         program = replace(program, draws=program.draws.planned(plan))
         if target:
             target.check(program)
-        _write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
+        write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
 
     if out is None:
         return _results_in_memory(write, overwrite=overwrite, resume=resume)
@@ -106,15 +106,15 @@ def _check_choices(keep: str, fields: int | str, plan: str) -> None:
         raise OptionError(f"plan is {plan!r}; expected one of: {', '.join(PLANS)}")
 
 
-def _write_archive(
+def write_archive(
     path: Path,
     program: Program,
     settings: Run,
-    target: Target | None,
-    client: Any,
-    progress: Progress | None,
+    target: Target | None = None,
+    client: Any = None,
+    progress: Progress | None = None,
     *,
-    is_resumed: bool,
+    is_resumed: bool = False,
 ) -> None:
     """Simulate into the archive at `path`, and add realizations until the target is met, if there is one."""
     blocks = mapping(client)
