@@ -1,43 +1,46 @@
-"""Kill a run before each of its writes, or each nth, and resume what it left: kill_at_each_write.py FOLDER [n]."""
+"""Kill a run before each of its writes, or each nth, and resume what it left: kill_at_each_write.py FOLDER [n].
+
+The writes counted are those of the interpreter to an open archive, whoever makes them: a profile function sees every call.
+"""
 
 import itertools
 import os
+import signal
 import sys
 from pathlib import Path
 
 import tolcontact as tc
 from tests import cases
 from tests.helpers import contents
-from tolcontact.archive import raw_file, writer
+from tolcontact.archive import Run
+from tolcontact.workflow.run import write_archive
 
-writer.ArchiveWriter.checkpoint_interval = 0.0
 folder, step = Path(sys.argv[1]), int((*sys.argv, 1)[2])
 whole = folder / "whole.nc"
 program = tc.build(cases.stack(), solver="daqp")
 
 
-def run(path, **options):
-    tc.run(program, samples=9000, seed=3, out=path, keep="measures", surfaces=4, **options).close()
+settings = Run(seed=3, samples=9000, keep="measures", surfaces=4, fields="some", checkpoint_interval=0.0)
 
 
-class Dying(raw_file.LaidOut):
-    """A file whose process dies at one of its writes."""
+def die_at(path, write):
+    """Let this process die at a write to a file, counted from 1."""
+    left = itertools.count(write - 1, -1)
 
-    left = 0
+    def profile(_, event, function):
+        is_write = event == "c_call" and getattr(function, "__name__", "") == "write"
+        if is_write and str(getattr(function.__self__, "name", "")) == str(path) and next(left) == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
 
-    def _write(self, offset, data):
-        Dying.left -= 1
-        if Dying.left == 0:
-            os._exit(9)
-        super()._write(offset, data)
+    sys.setprofile(profile)
 
 
 def is_killed(path, write):
     """Whether a run that would die at a write, counted from 1, came so far."""
     child = os.fork()
     if child == 0:
-        Dying.left, writer.LaidOut = write, Dying
-        run(path)
+        die_at(path, write)
+        write_archive(path, program, settings)
         os._exit(0)
     return os.waitpid(child, 0)[1] != 0
 
@@ -54,7 +57,7 @@ def check_resumed(path, write):
     with tc.open_archive(path) as left:
         summed = max(0, left["summed_rows"].values.max())
     begun = []
-    run(path, resume=True, progress=begun.append)
+    write_archive(path, program, settings, progress=begun.append, is_resumed=True)
     assert begun[0] == min(summed + 4096, 9000), f"kill {write}: began at {begun[0]}"
     reached.append(summed)
     for group in (None, "field/middle", "field/upper"):
@@ -62,7 +65,7 @@ def check_resumed(path, write):
 
 
 reached = []
-run(whole)
+write_archive(whole, program, settings)
 for write in itertools.count(1, step):
     path = folder / f"{write}.nc"
     if not is_killed(path, write):
