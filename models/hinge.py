@@ -25,10 +25,10 @@ def ring(x: float) -> trimesh.Trimesh:
     return shape.apply_translation((x, 0, 0))
 
 
-def bored(model: tc.Assembly, name: str, places: tuple[float, ...], plate: float, **fixed: bool) -> list[tc.Feature]:
-    """Declare a part with a bore at each place, toleranced to its plate at a height, and to the plate's side and end."""
+def bored(model: tc.Assembly, name: str, xs: tuple[float, ...], plate: float, place: float, **fixed: bool) -> list[tc.Feature]:
+    """Declare a part with a bore at each of `xs`, toleranced to its plate at a height, and to the plate's side and end."""
     slab = trimesh.creation.box(extents=(100, 60, 4)).apply_translation((0, 0, plate))
-    part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, places)])), **fixed)
+    part = model.part(name, tc.Mesh(trimesh.util.concatenate([slab, *map(ring, xs)])), **fixed)
     for letter, direction, reach in (("A", "+z" if plate < 0 else "-z", 2), ("B", "-y", 30), ("C", "-x", 50)):
         k, sign = "xyz".index(direction[1]), -1 if direction[0] == "-" else 1
         level = sign * reach + (plate if k == 2 else 0)
@@ -38,16 +38,16 @@ def bored(model: tc.Assembly, name: str, places: tuple[float, ...], plate: float
             f"bore {number + 1}",
             part.face(tc.Cylinder(inner=True), tc.Inside((x - WIDTH, -PIN, -PIN), (x + WIDTH, PIN, PIN))),
             tc.Size(PIN + CLEARANCE, BORE / 2),
-            tc.Position(PLACE, "A|B|C"),
+            tc.Position(place, "A|B|C"),
         )
-        for number, x in enumerate(places)
+        for number, x in enumerate(xs)
     ]
 
 
-def assembly() -> tc.Assembly:
+def assembly(place: float = PLACE) -> tc.Assembly:
     model = tc.Assembly("hinge", method=tc.Method(resolution="exact", objective="seating"))
-    lugs = bored(model, "base", LUGS, -20.0, fixed=True)
-    knuckles = bored(model, "leaf", KNUCKLES, 20.0)
+    lugs = bored(model, "base", LUGS, -20.0, place, fixed=True)
+    knuckles = bored(model, "leaf", KNUCKLES, 20.0, place)
     leaf = knuckles[0].part
     rod = trimesh.creation.cylinder(PIN / 2, 90, sections=48)
     rod.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))

@@ -1,6 +1,6 @@
 """Archives that were damaged, or made to mislead: one message, and nothing else happens."""
 
-import functools
+import subprocess
 from pathlib import Path
 
 import netCDF4
@@ -14,7 +14,6 @@ from models import ra1
 from tests.helpers import COMMAND, call, model_in, nightly, run, script
 from tests.hostile import HOSTILE, make
 from tolcontact import vocabulary
-from tolcontact.archive import inspection
 from tolcontact.errors import ArchiveError
 
 CRASHES = ("measured is text",)  # the netCDF library, so only where it is another process's
@@ -43,11 +42,15 @@ def program():
 @pytest.fixture
 def once(monkeypatch):
     """A file that has not changed is inspected once: each inspection is a process of its own."""
-    inspected = inspection.run_child
-    answer = functools.cache(lambda script, path, _content, seconds: inspected(script, path, seconds=seconds))
-    monkeypatch.setattr(
-        inspection, "run_child", lambda script, path, seconds: answer(script, path, Path(path).read_bytes(), seconds)
-    )
+    process, answers = subprocess.run, {}
+
+    def answer(command, **options):
+        question = (*command, Path(command[-1]).read_bytes())
+        if question not in answers:
+            answers[question] = process(command, **options)
+        return answers[question]
+
+    monkeypatch.setattr(subprocess, "run", answer)
 
 
 @pytest.mark.slow

@@ -47,9 +47,7 @@ def lowest(places, floors):
 
 @pytest.fixture(scope="module")
 def program():
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(hinge, "PLACE", 1e-9)
-        return tc.build(hinge.assembly, solver="daqp")
+    return tc.build(hinge.assembly(place=1e-9), solver="daqp")
 
 
 @pytest.mark.slow

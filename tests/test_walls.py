@@ -137,3 +137,63 @@ def test_no_import_is_hidden_in_a_function():
             if isinstance(function, ast.FunctionDef):
                 hidden = [n for n in ast.walk(function) if isinstance(n, ast.Import | ast.ImportFrom)]
                 assert not hidden, f"{file}: {function.name}"
+
+
+# Names with an underscore that are public all the same: of named tuples, of notebooks, and of the system.
+PUBLIC = ("_replace", "_repr_html_", "_exit")
+SETTERS = ("setattr", "delattr", "setitem", "delitem", "__setattr__", "patch")
+
+
+def is_private(name: str) -> bool:
+    return name.startswith("_") and not name.startswith("__") and name not in PUBLIC
+
+
+def intrusions(tree: ast.AST) -> Iterator[str]:
+    """Names of the package that begin with an underscore, and changes of what was imported from it, with their lines."""
+    nodes = list(ast.walk(tree))
+    imported = [
+        (alias.asname or alias.name.split(".")[0], f"{getattr(node, 'module', '')}.{alias.name}", node.lineno)
+        for node in nodes
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for alias in node.names
+    ]
+    yield from (f"line {line}: {name}" for _, name, line in imported if any(map(is_private, name.split("."))))
+    theirs = {bound for bound, name, _ in imported if name.lstrip(".").split(".")[0] in ("tolcontact", "models")}
+    defined = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)}
+    defined |= {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
+    for node in nodes:
+        if isinstance(node, ast.Attribute | ast.Subscript):
+            base, name = ast.unparse(node.value), getattr(node, "attr", "")
+            is_own = base == "self" and name in defined
+            is_changed = not isinstance(node.ctx, ast.Load) and base.split(".")[0] in theirs
+            if (is_private(name) and not is_own) or is_changed:
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+        elif isinstance(node, ast.Call) and node.args and ast.unparse(node.func).split(".")[-1] in SETTERS:
+            target = ast.unparse(node.args[0]).strip("'").split(".")[0]
+            if target in {*theirs, "tolcontact"} and ast.unparse(node.func) not in theirs:
+                yield f"line {node.lineno}: {ast.unparse(node)}"
+
+
+def test_tests_reach_no_private_name_and_change_no_module():
+    files = sorted(Path(__file__).parent.rglob("*.py"))
+    found = [f"{file.name} {text}" for file in files for text in intrusions(ast.parse(file.read_text(encoding="utf-8")))]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "from tolcontact.contact.scan import _leaves",
+        "import tolcontact._version",
+        "program.place._evaluate",
+        "class A(B):\n    def f(self): self._write(0)",
+        "from tolcontact.archive import writer\nwriter.LaidOut = None",
+        "from tolcontact.archive import ArchiveWriter\nArchiveWriter.checkpoint_interval = 0.0",
+        "from tolcontact.compilation.plugins import PLUGINS\nPLUGINS['daqp'] = 1",
+        "from models import hinge\npatched.setattr(hinge, 'PLACE', 0)",
+        "from tolcontact.compilation.plugins import PLUGINS\nmonkeypatch.setitem(PLUGINS, 'daqp', 1)",
+        "monkeypatch.setattr('tolcontact.statistics.rare_events.REPLICATES', 3)",
+    ],
+)
+def test_a_test_that_reaches_inside_is_found(source):
+    assert len(list(intrusions(ast.parse(source)))) == 1
