@@ -45,7 +45,7 @@ def assembly() -> tc.Assembly:
         pin = model.part(f"{name} pin", tc.Mesh(stub), at=(x, y, TOP + COVER / 2), fixed=True)
         model.locate(pin, six(0, 0, PIN, PIN), tolerance=INSERTED)
         barrel = pin.feature("barrel", pin.face(tc.Cylinder(radius=PIN / 2)), tc.Size(PIN, 0.0, -0.015))
-        wall = cover.face(tc.Near(pin, 0.2))
+        wall: tc.Face | tc.Feature = cover.face(tc.Near(pin, 0.2))
         if name == "round":
             wall = cover.feature("hole", cover.face(tc.Brep((x + HOLE / 2, y, 1))), tc.Size(HOLE, 0.03))
         model.contact(f"{name} hole", moving=wall, reference=barrel)

@@ -16,7 +16,7 @@ import tolcontact as tc
 LENGTH, THICKNESS, HEIGHT = 1000.0, 40.0, 700.0
 GAP, FLANGE = 4.0, 30.0  # around the door; width of the flange behind it
 STOP = 20.0  # a bump stop is a pad of this side
-STOPS = {"front top": (60, 640), "front bottom": (60, 60), "rear top": (940, 640), "rear bottom": (940, 60)}
+STOPS = {"front top": (60.0, 640.0), "front bottom": (60, 60), "rear top": (940, 640), "rear bottom": (940, 60)}
 HINGES, STRIKER = {"upper": (0, 550), "lower": (0, 150)}, (1000, 350)
 SEAMS = {
     "rear top": (LENGTH, 600, "x"),

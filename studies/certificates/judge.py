@@ -68,7 +68,7 @@ def contradictions(nominal: Nominal, method: tc.Method, run: dict[str, np.ndarra
         rows = np.flatnonzero(certified & (run["carrying"].sum(axis=1) > 0))
         for row in rng.permutation(rows)[:LOOKED_AT]:
             for pair in nominal.pairs:
-                if pair.moving_face is not None and pair.reference is not None:
+                if pair.moving_face is not None and pair.reference_face is not None:
                     sides = faces(pair, R[[row], CORRECTED], t[[row], CORRECTED], run["deviations"][[row]])
                     inside = depth(nominal, pair, sides)
                     limit = (
@@ -126,12 +126,13 @@ def shifted(sides: Sides, pair: ContactPoints) -> float:
 
 def depth(nominal: Nominal, pair: ContactPoints, sides: Sides) -> float:
     """How deep points of the moving face, as it has grown, lie in the reference body, below its face [mm]."""
-    r = pair.reference
+    face, r = pair.moving_face, pair.reference
+    assert face is not None and r is not None
     (R_m, t_m, h_m), (R_r, t_r, h_r) = sides
-    points = trimesh.sample.sample_surface(pair.moving_face.mesh, 2000, seed=1)[0]
-    points = np.vstack([points, pair.moving_face.mesh.vertices])
-    triangle, nearest = pair.moving_face.nearest(points)
-    points = points + (h_m[0] + h_r[0]) * pair.moving_face.normals(triangle, nearest)
+    points = trimesh.sample.sample_surface(face.mesh, 2000, seed=1)[0]
+    points = np.vstack([points, face.mesh.vertices])
+    triangle, nearest = face.nearest(points)
+    points = points + (h_m[0] + h_r[0]) * face.normals(triangle, nearest)
     places = (points @ R_m[0].T + t_m[0] - t_r[0]) @ R_r[0]
     body = nominal.parts[r].body
     V, F = np.array(body.vertices), np.array(body.faces, dtype=np.int64)

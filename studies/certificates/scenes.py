@@ -21,7 +21,8 @@ def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
     objective = str(rng.choice(tuple(OBJECTIVES)))
     a = tc.Assembly(f"scene {seed}")
     count = int(rng.integers(2, 5))
-    below, top, parts = None, 0.0, []
+    below, top = None, 0.0
+    parts: list[tc.Part] = []
     for k in range(count):
         scale = size * rng.uniform(0.5, 1.0) * (1.0 if k else 1.3)
         kind = (
@@ -42,8 +43,7 @@ def scene(seed: int) -> tuple[tc.Assembly, tc.Method]:
         a.locate(part, six, on=on)
         tolerance(part, kind, mesh, max(float(ranges.max()), 1e-4 * size), np.random.default_rng([seed, k]))
         if below is not None:
-            sides = {"moving": part.face(lambda c, n: n[:, 2] < -0.3), "reference": below.face("+z")}
-            a.contact(f"joint {k}", **sides)
+            a.contact(f"joint {k}", moving=part.face(lambda c, n: n[:, 2] < -0.3), reference=below.face("+z"))
             a.force(f"weight {k}", at=part.point(*((low + high) / 2)), vector=turn.apply((0.1, -0.05, -1.0)))
         if rng.random() < 0.3 and below is not None and kind == "box":
             wall = tc.Box(*([0.3 * size, 1.5 * size, 1.5 * size]))

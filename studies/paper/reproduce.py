@@ -8,7 +8,9 @@ import runpy
 from pathlib import Path
 
 import figures
+import numpy as np
 import table
+import xarray as xr
 
 import tolcontact as tc
 
@@ -30,7 +32,8 @@ def main() -> None:
     options.add_argument("--to", type=Path, default=HERE, help="folder of the pictures")
     chosen = options.parse_args()
 
-    runs, large = {}, {}
+    runs: dict[str, list[xr.DataTree]] = {}
+    large: dict[str, dict[str, np.ndarray]] = {}
     for name in ("RA1", "RA2"):
         program = tc.build(model(name))
         runs[name] = [tc.run(program, samples=1000, seed=seed) for seed in table.SEEDS]

@@ -1,6 +1,7 @@
 """Table 1 of the paper and the claims of its section 3.2, beside ours; as Markdown."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -117,7 +118,7 @@ def first_order(run: xr.DataTree) -> Iterator[str]:
         yield f"| {NAMES[state]} | {' | '.join(interval(e, 4) for e in estimates)} |"
 
 
-def simulate(model: tc.Assembly, samples: int, seed: int, solver: str, **method: str) -> xr.DataTree:
+def simulate(model: tc.Assembly, samples: int, seed: int, solver: str, **method: Any) -> xr.DataTree:
     return tc.run(model, samples=samples, seed=seed, solver=solver, method=tc.Method(**method))
 
 

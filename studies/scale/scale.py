@@ -86,15 +86,18 @@ def throughput(program, samples, path, **kept):
 
 def memory(samples, path):
     """Of client and workers [MB], from a tenth of a long run on."""
-    program, own, seen = tc.build(ra1.assembly, solver="daqp"), psutil.Process(), []
+    program, own = tc.build(ra1.assembly, solver="daqp"), psutil.Process()
+    seen: list[list[int]] = []
 
     def look(rows):
         if rows >= samples // 10 * (len(seen) + 1):
             seen.append([each.memory_info().rss for each in (own, *sorted(own.children(recursive=True), key=lambda p: p.pid))])
 
     with local_cluster(2) as client:
-        options = {"keep": "measures", "surfaces": 0, "fields": "none", "overwrite": True}
-        tc.run(program, samples=samples, out=path, client=client, progress=look, **options).close()
+        tc.run(
+            program, samples=samples, out=path, client=client, progress=look,
+            keep="measures", surfaces=0, fields="none", overwrite=True,
+        ).close()  # fmt: skip
     low, high = np.min(seen, axis=0) / 1e6, np.max(seen, axis=0) / 1e6
     print(f"\nmemory over {samples:.0e} realizations of RA1, of the client and its processes [MB]:")
     print("  " + ", ".join(f"{one:.0f} to {other:.0f}" for one, other in zip(low, high, strict=True)))
@@ -124,7 +127,8 @@ def simulated(workers, writers, samples, of_worker, of_writer, size):
     """Hours of one of the archives, which each have workers and a writer of their own, and share scheduler and network."""
     count, own = samples // MAX_SHARD_ROWS // writers, workers // writers
     lot, free = np.random.default_rng(1), [0.0] * own
-    ready, written = [], []
+    ready: list[float] = []
+    written: list[float] = []
     scheduler = wire = 0.0
     for shard in range(count):
         while len(ready) < min(count, shard + SHARDS_AHEAD * own):
@@ -152,7 +156,8 @@ def kills(of_workers, of_writers, folder):
     lot, equal = random.Random(1), 0
     with local_cluster(2) as client:
         for _ in range(of_workers):
-            at, killed = lot.randrange(1, 100_000), []
+            at = lot.randrange(1, 100_000)
+            killed: list[int] = []
 
             def kill(rows, at=at, killed=killed):
                 if rows >= at and not killed:
@@ -188,12 +193,13 @@ def kills(of_workers, of_writers, folder):
 
 def same(path, whole):
     with xr.open_datatree(path) as one, xr.open_datatree(whole) as other:
-        return all(
-            np.array_equal(one[group][name].values, other[group][name].values, equal_nan=other[group][name].dtype.kind == "f")
+        pairs = [
+            (one[group].dataset[name], values)
             for group in other.groups
-            for name in other[group].data_vars
+            for name, values in other[group].data_vars.items()
             if name not in VARYING
-        )
+        ]
+        return all(np.array_equal(a.values, b.values, equal_nan=b.dtype.kind == "f") for a, b in pairs)
 
 
 if __name__ == "__main__":

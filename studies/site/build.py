@@ -86,7 +86,7 @@ def build(folder: Path, samples: int, scripts: Sequence[Path], problems: Sequenc
         f"What each model asks, and what {samples} realizations answer, without contact (raw) and with it (corrected).",
         models=[shown(path, folder, samples) for path in scripts],
     )  # fmt: skip
-    _write(folder / "index.html", "tolcontact", inspect.getdoc(tc).partition("\n\n")[0])
+    _write(folder / "index.html", "tolcontact", (inspect.getdoc(tc) or "").partition("\n\n")[0])
 
 
 def _write(path: Path, title: str, said: str, **things: Any) -> None:

@@ -18,7 +18,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 
-sys.modules["highspy"] = None  # its HiGHS and CasADi's crash each other in one process
+sys.modules["highspy"] = None  # type: ignore[assignment]  # its HiGHS and CasADi's crash each other in one process
 
 import casadi as ca
 import matplotlib as mpl
@@ -74,23 +74,23 @@ def models() -> dict[str, tc.Assembly]:
 
 def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     """Return the QPs of the first linear step, with a row for every contact point of the first group."""
-    kept = contact_qp.standing_points  # type: ignore[attr-defined]
-    contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined]
+    kept = contact_qp.standing_points  # type: ignore[attr-defined, method-assign]
+    contact_qp.standing_points = lambda pair, *_: np.arange(len(pair.P_m))  # type: ignore[attr-defined, method-assign]
     found: list[Problem] = []
-    solve = contact_solver.InterpretedFunction.__call__  # type: ignore[attr-defined]
+    solve = contact_solver.InterpretedFunction.__call__  # type: ignore[attr-defined, method-assign]
 
     def record(self, inputs):
         if self._solvers and not found:
             found.extend(dict(zip("hgabc", (array[k].copy() for array in inputs), strict=True)) for k in range(len(inputs[0])))
         return solve(self, inputs)
 
-    contact_solver.InterpretedFunction.__call__ = record  # type: ignore[attr-defined]
+    contact_solver.InterpretedFunction.__call__ = record  # type: ignore[attr-defined, method-assign]
     try:
         program = tc.build(assembly, solver="daqp", method=tc.Method())
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
-        contact_qp.standing_points = kept  # type: ignore[attr-defined]
-        contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined]
+        contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]
+        contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined, method-assign]
     functions = program.groups[0].program
     h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
     for one in found:
@@ -188,6 +188,7 @@ def main() -> None:
     options.add_argument("--realizations", type=int, default=12)
     options.add_argument("--figure", type=Path, default=HERE / "accuracy.png")
     chosen = options.parse_args()
+    solvers: dict[str, tuple[Callable[[str, Problem], Solve], str]]
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*plugins.usable_plugins(), *REFUSED)}
     solvers |= {f"{name} outside": (outside, name) for name in OUTSIDE}
     print("| problem | solver | ms | median error [mm] | largest | wrong, unsaid | given up | order matters [mm] |")

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -28,6 +29,7 @@ from tolcontact.contact.scan import CompiledScan
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation import threads as running
 from tolcontact.statistics import DisplacementFields
+from tolcontact.variation import Draws
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import BLOCK_ROWS
 
@@ -40,6 +42,7 @@ adaptive.MIN_COMPILED_CALLS = 0  # compile Functions at once: what counts here i
 EXACT = tc.Method(resolution="exact")
 CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
+Name = TypeVar("Name")
 
 
 def model(name: str, *choices) -> tc.Assembly:
@@ -85,8 +88,8 @@ def loop(assembly, samples: int, solve: peers.Solve, form: str = "first") -> Con
     return turn
 
 
-def medians(contenders: dict[str, Contender]) -> dict[str, float]:
-    taken = {name: [] for name in contenders}
+def medians(contenders: dict[Name, Contender]) -> dict[Name, float]:
+    taken: dict[Name, list[float]] = {name: [] for name in contenders}
     for _ in range(TURNS):
         for name, turn in contenders.items():
             taken[name].append(turn())
@@ -157,7 +160,7 @@ def against_threads(samples: int) -> None:
     for name, (a, many) in cases.items():
         for solver in ("daqp", "qpoases"):
             contenders[f"{name}, {solver}"] = [ours(a, many, solver=solver, threads=each) for each in (1, threads)]
-    ratios = {contender: [] for contender in contenders}
+    ratios: dict[str, list[float]] = {contender: [] for contender in contenders}
     for _ in range(PAIRS):
         for contender, (one, every) in contenders.items():
             ratios[contender].append(one() / every())
@@ -274,9 +277,9 @@ def clocked(where: dict[str, list[tuple[object, str]]]) -> Iterator[dict[str, fl
 
 
 def breakdown(samples: int) -> None:
-    where = {
-        "sampling": [(running, "draw")],
-        "scan": [(CompiledScan, name) for name in ("survey", "least", "deepest")],
+    where: dict[str, list[tuple[object, str]]] = {
+        "sampling": [(Draws, "__call__")],
+        "scan": [(CompiledScan, name) for name in ("survey", "min_gap", "deepest")],
         "QP": [(InterpretedFunction, "__call__")],
         "rows, update, measures": [(adaptive.AdaptiveFunction, "__call__")],
         "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
@@ -305,7 +308,7 @@ def breakdown(samples: int) -> None:
                     with ArchiveWriter(path, program, run, fields.sizes) as writer:
                         for block in blocks:
                             fields.merge(fields.sums(block.poses, block.start))
-                            writer.append(stored(block, writer.kept))
+                            writer.append(stored(block, [variable.name for variable in writer.kept]))
             inside = {word: seconds for word, seconds in spent.items() if word not in ("fields", "archive")}
             turns.append([*spent.values(), whole - sum(inside.values())])
         cells = 1e6 * np.median(turns, axis=0) / (samples // 4)
