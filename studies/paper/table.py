@@ -97,7 +97,7 @@ def field_range(run: xr.DataTree, name: str) -> np.ndarray:
 
 def first_order(run: xr.DataTree) -> Iterator[str]:
     """RA1 linear in the deviations: the base's plane where both faces cut each other in the contact area, else the top."""
-    d = run["sample"].deviation.sel(locator=[f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]).values
+    d = run["sample"].deviation.sel(contributor=[f"{part}.A{k}" for part in ("base", "top") for k in (1, 2, 3)]).values
 
     def height(deviations, triangle, x):
         return deviations @ np.linalg.solve(np.vstack([np.transpose(triangle), np.ones(3)]), [*x, 1.0])
