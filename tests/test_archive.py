@@ -11,7 +11,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import SCRIPTS, run, script
-from tolcontact.archive import bytes_of_rows, surface_rows
+from tolcontact.archive import bytes_of_rows, stored_rows
 from tolcontact.archive.writer import opened_locked
 from tolcontact.errors import ArchiveError
 from tolcontact.testing import assert_gaps_recompute, assert_same_run
@@ -136,4 +136,4 @@ def test_values_are_not_masked(archive):
 
 def test_rows_are_not_read_where_none_are_to_be_checked():
     no_file = None
-    assert len(surface_rows.choose(no_file, 0, seed=1)) == 0
+    assert len(stored_rows.choose(no_file, 0, seed=1)) == 0

@@ -13,8 +13,8 @@ from tests import cases
 from tests.helpers import ALL_POINTS, EXACT, SEATED, R_t, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
 from tolcontact.compilation import usable_plugins
+from tolcontact.compilation.contact_solver import polished
 from tolcontact.compilation.plugins import Plugin
-from tolcontact.compilation.polishing import polished
 from tolcontact.discretization import discretize
 from tolcontact.errors import ContactWarning, OptionError
 from tolcontact.geometry.faces import patch

@@ -8,7 +8,7 @@ from tests import cases, referee
 from tests.helpers import R_t, simulate
 from tolcontact.contact.resolver import ContactResolver, checked_residual
 from tolcontact.contact.state import State
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import simulate_block
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 

@@ -10,7 +10,7 @@ import pytest
 from llvmlite import binding
 
 from tolcontact.compilation.functions import code_cache, native
-from tolcontact.compilation.functions.adaptive import MIN_COMPILED_CALLS, AdaptiveFunction
+from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS, AdaptiveFunction
 from tolcontact.compilation.functions.native import NativeFunction, host_description, key_of
 
 

@@ -9,7 +9,7 @@ import xarray as xr
 import tolcontact as tc
 from tests import cases
 from tests.helpers import call
-from tolcontact.workflow.solver_comparison import compare
+from tolcontact.workflow.comparison import compare
 
 
 def test_solvers_that_agree_are_said_to_agree():

@@ -7,8 +7,8 @@ import tolcontact as tc
 from tests import cases
 from tests.test_report import browser, data_of, needs_browser, open_page  # noqa: F401 (fixtures)
 from tolcontact.report import write_page
-from tolcontact.simulation.touching import MAX_REALIZATIONS, TOUCHING_GAP
 from tolcontact.statistics import touching
+from tolcontact.workflow.run_sums import MAX_REALIZATIONS, TOUCHING_GAP
 
 
 def test_a_block_touches_in_half_of_the_realizations_at_all_its_points():

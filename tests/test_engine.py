@@ -14,21 +14,19 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly, recompiled
 from tolcontact.compilation import contact_qp
+from tolcontact.compilation.contact_qp import is_convex
 from tolcontact.compilation.functions import InterpretedFunction
-from tolcontact.compilation.functions.adaptive import MIN_COMPILED_CALLS
-from tolcontact.compilation.functions.code_cache import cache_folder
-from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
-from tolcontact.compilation.newton import is_convex
+from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
+from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError, cache_folder
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
 from tolcontact.discretization import Offsets, discretize
-from tolcontact.mechanics.gap import gap_matrix
-from tolcontact.mechanics.gap_map import gap_map
+from tolcontact.mechanics.gap import gap_map, gap_matrix
 from tolcontact.mechanics.groups import contact_groups
 from tolcontact.poses import AT_REST
 from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import simulate_block
 from tolcontact.simulation.threads import MIN_ROWS, block_rows
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status

@@ -7,7 +7,7 @@ import tolcontact as tc
 from tests import cases, referee
 from tests.helpers import EXACT, SEATED, R_t, moved_at_locators, nightly, simulate
 from tests.nonlinear import TrueProblem
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import simulate_block
 from tolcontact.variation.draws import draw
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 

@@ -14,11 +14,11 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tolcontact.archive.settings import declaration
-from tolcontact.declaration import tape
 from tolcontact.declaration.document import from_document
+from tolcontact.declaration.measure import BINARY, UNARY, tape_of
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.errors import ArchiveError, ModelError
-from tolcontact.mechanics import tape as symbolic_tape
+from tolcontact.mechanics import measures as recording
 
 DAMAGED = "^the declared model in the archive is damaged: "
 
@@ -160,15 +160,15 @@ def test_a_damaged_tape_is_refused(rows, document):
 def test_a_tape_may_not_be_endless():
     rows = [["input", 0], *(["twice", k] for k in range(1000))]
     with pytest.raises(EntryError, match="more than 1000 steps"):
-        tape.tape_of(rows, Place(Sources({}, inputs=1)), max_steps=1000)
+        tape_of(rows, Place(Sources({}, inputs=1)), max_steps=1000)
     entries = ca.SX.sym("entries", 2)
     with pytest.raises(ValueError, match="cannot be archived"):
-        symbolic_tape.record(ca.sin(entries[0]) + ca.cos(entries[1]), entries, max_steps=3)
+        recording.record(ca.sin(entries[0]) + ca.cos(entries[1]), entries, max_steps=3)
 
 
 def test_every_operation_of_a_tape_can_be_replayed():
-    assert set(symbolic_tape.UNARY_FUNCTIONS) == set(tape.UNARY)
-    assert set(symbolic_tape.BINARY_FUNCTIONS) == set(tape.BINARY)
+    assert set(recording.UNARY_FUNCTIONS) == set(UNARY)
+    assert set(recording.BINARY_FUNCTIONS) == set(BINARY)
 
 
 class Own(stats.rv_continuous):

@@ -11,8 +11,8 @@ from tolcontact.discretization import discretize
 from tolcontact.mechanics.correction import Carried, increments, linear, published, rigid
 from tolcontact.mechanics.displacement import displacement_energy, moment_table
 from tolcontact.mechanics.gap import gap_matrix
+from tolcontact.mechanics.measures import record, replay
 from tolcontact.mechanics.pose import Pose, rotation
-from tolcontact.mechanics.tape import record, replay
 
 RNG = np.random.default_rng(7)
 

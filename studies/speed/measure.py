@@ -24,7 +24,7 @@ import shapes
 
 import tolcontact as tc
 from tolcontact.archive import ArchiveWriter, Run, stored
-from tolcontact.compilation.functions import InterpretedFunction, adaptive
+from tolcontact.compilation.functions import InterpretedFunction, named
 from tolcontact.contact.scan import CompiledScan
 from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation import threads as running
@@ -38,7 +38,7 @@ import matplotlib.pyplot as plt
 
 HERE = Path(__file__).resolve().parent
 TURNS, PAIRS = 5, 11
-adaptive.MIN_COMPILED_CALLS = 0  # compile Functions at once: what counts here is the cost of many realizations
+named.MIN_COMPILED_CALLS = 0  # compile Functions at once: what counts here is the cost of many realizations
 EXACT = tc.Method(resolution="exact")
 CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
@@ -281,7 +281,7 @@ def breakdown(samples: int) -> None:
         "sampling": [(Draws, "__call__")],
         "scan": [(CompiledScan, name) for name in ("survey", "min_gap", "deepest")],
         "QP": [(InterpretedFunction, "__call__")],
-        "rows, update, measures": [(adaptive.AdaptiveFunction, "__call__")],
+        "rows, update, measures": [(named.AdaptiveFunction, "__call__")],
         "fields": [(DisplacementFields, "sums"), (DisplacementFields, "merge")],
         "archive": [(ArchiveWriter, "append")],
     }

@@ -9,9 +9,8 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.labels import sizes_of_rows
 from tolcontact.archive.settings import kept_rows
-from tolcontact.archive.variables import rows_together
+from tolcontact.archive.variables import rows_together, sizes_of_rows
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
 from tolcontact.vocabulary import ArchiveVariable

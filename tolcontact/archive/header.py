@@ -7,10 +7,9 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
-from tolcontact.archive.labels import labels_of_rows, units_of_rows
 from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
-from tolcontact.archive.surface_rows import empty_checks
-from tolcontact.archive.variables import define, lay_out, write
+from tolcontact.archive.stored_rows import empty_checks
+from tolcontact.archive.variables import define, labels_of_rows, lay_out, units_of_rows, write
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart

@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, surfaces, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -41,7 +41,7 @@ OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
 CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field")
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, surfaces, variation)
+    for module in (archive, variation)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)

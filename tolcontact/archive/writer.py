@@ -12,7 +12,7 @@ import shutil
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import netCDF4
 import numpy as np
@@ -20,7 +20,6 @@ from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
 from tolcontact import poses
 from tolcontact import vocabulary as terms
-from tolcontact.archive.checkpoints import Checkpoint, last_checkpoint, write_checkpoint
 from tolcontact.archive.disk_space import check_room, lay_out_rows
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect
@@ -28,8 +27,8 @@ from tolcontact.archive.raw_file import LaidOut
 from tolcontact.archive.reader import opened
 from tolcontact.archive.resuming import check_same_run
 from tolcontact.archive.settings import Run, kept_rows, now, run_settings, versions
-from tolcontact.archive.stored_rows import StoredBlock, check_rows
-from tolcontact.archive.surface_rows import archived_poses, choose, empty_checks
+from tolcontact.archive.stored_rows import StoredBlock, archived_poses, check_rows, choose, empty_checks
+from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
@@ -234,3 +233,42 @@ def opened_locked(path: Path, mode: Literal["w", "r+", "r"]) -> Iterator[netCDF4
     with _XARRAYS_LOCK, netCDF4.Dataset(path, mode, format="NETCDF4") as file:
         file.set_auto_maskandscale(False)  # values are what they are; looking for masks takes longer than writing them
         yield file
+
+
+class Checkpoint(NamedTuple):
+    """Sums (state, number) for each part over the first `rows` realizations, none if nothing is summed up; and their place."""
+
+    rows: int
+    place: int
+    sums: list[np.ndarray]
+
+
+def last_checkpoint(file: netCDF4.Dataset, path: Path, parts: Sequence[str]) -> Checkpoint:
+    """Return the last checkpoint of an archive. Raises ArchiveError if it is not what was written."""
+    summed = np.ma.getdata(file[terms.SUMMED_ROWS.name][:])
+    place = int(summed.argmax())
+    rows, sums = max(0, int(summed[place])), []
+    for part in parts if rows else ():
+        group = file[terms.field_of(part)]
+        sums.append(np.ma.getdata(group[terms.FIELD_SUMS.name][place]))
+        if _checksum(rows, sums[-1]) != int(group[terms.SUMS_CHECKSUM.name][place]):
+            raise ArchiveError(
+                f'archive "{path}" is damaged: the sums of the field of part "{part}" are not what was written; write to '
+                "a new file"
+            )
+    return Checkpoint(rows, place, sums)
+
+
+def write_checkpoint(archive: LaidOut, checkpoint: Checkpoint, parts: Sequence[str]) -> None:
+    """Write a checkpoint to its place."""
+    archive.overwrite("", terms.SUMMED_ROWS, [terms.UNFINISHED], checkpoint.place)
+    for part, of_part in zip(parts, checkpoint.sums, strict=True):
+        archive.overwrite(terms.field_of(part), terms.FIELD_SUMS, of_part[None], checkpoint.place)
+        checksum = _checksum(checkpoint.rows, of_part)
+        archive.overwrite(terms.field_of(part), terms.SUMS_CHECKSUM, [checksum], checkpoint.place)
+    archive.overwrite("", terms.SUMMED_ROWS, [checkpoint.rows], checkpoint.place)
+
+
+def _checksum(rows: int, sums: np.ndarray) -> int:
+    """Return the checksum of the sums together with their number of realizations, so that neither matches alone."""
+    return crc32(terms.FIELD_SUMS, sums, crc32(terms.SUMMED_ROWS, rows))

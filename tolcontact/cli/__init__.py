@@ -58,7 +58,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 (True, 0)
 """
 
-from tolcontact.cli import analyses, archives, check, compare, new, run, step_files, view
+from tolcontact.cli import analyses, archives, compare, models, run, step_files
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["analyses", "archives", "check", "command_line", "compare", "main", "new", "run", "step_files", "view"]
+__all__ = ["analyses", "archives", "command_line", "compare", "main", "models", "run", "step_files"]

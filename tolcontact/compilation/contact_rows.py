@@ -8,8 +8,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.discretization import ContactPoints
-from tolcontact.mechanics.gap import gap
-from tolcontact.mechanics.gap_map import GapMap
+from tolcontact.mechanics.gap import GapMap, gap
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.setting import Setting

@@ -8,9 +8,9 @@ from tolcontact.compilation.conditioning import SLACK, whitening
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.objective import Energy
+from tolcontact.mechanics.placement import misfit
 from tolcontact.mechanics.pose import Pose
 from tolcontact.mechanics.setting import Setting
-from tolcontact.mechanics.two_sided import misfit
 
 QP_ENTRIES = ("h", "g", "a", "lba", "u", "length")  # the QP as it was solved, whose residuals are computed
 SOLUTION = ("x", "lam_a", "lam_x")

@@ -10,19 +10,17 @@ from tolcontact.compilation.contact_qp import ContactProgram, contact_program
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
-from tolcontact.declaration.tape import Tape
+from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
-from tolcontact.mechanics.face_pose import face_poses, facing_pose
-from tolcontact.mechanics.gap import gap_matrix
-from tolcontact.mechanics.gap_map import GapMap, gap_map
+from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
-from tolcontact.mechanics.measures import measured
+from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 from tolcontact.mechanics.round_gap import heights, round_gaps
-from tolcontact.mechanics.tape import record
+from tolcontact.mechanics.setting import face_poses, facing_pose
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured

@@ -206,11 +206,10 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Feature, Part, Point
+from tolcontact.declaration.part import Face, Feature, Force, Part, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 

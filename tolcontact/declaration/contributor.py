@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration.names import is_line
 from tolcontact.declaration.tolerance import Tolerance
-from tolcontact.declaration.vectors import is_length
+from tolcontact.declaration.values import is_length, is_line
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 

@@ -30,13 +30,11 @@ from tolcontact.declaration.face_entry import (
     text_type,
 )
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
-from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
-from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Feature, Part, Point
+from tolcontact.declaration.measure import Measure, Tape, tape_of
+from tolcontact.declaration.part import Face, Feature, Force, Part, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
-from tolcontact.declaration.tape import Tape, tape_of
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method

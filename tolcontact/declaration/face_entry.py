@@ -11,12 +11,12 @@ import numpy as np
 from msgspec import UNSET, Meta, UnsetType
 
 from tolcontact.declaration.codec import CODECS, Choice, Codec, Named, Optional, Plain, Record
+from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face, Feature, Part
 from tolcontact.declaration.place import Place
 from tolcontact.declaration.selection import KINDS as SURFACES
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
-from tolcontact.declaration.tape import Tape
-from tolcontact.declaration.vectors import DIRECTIONS, Vector, direction
+from tolcontact.declaration.values import DIRECTIONS, Vector, direction
 
 Document = dict[str, Any]
 UNIT_TOLERANCE = 1e-12  # of the length of a direction

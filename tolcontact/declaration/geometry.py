@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from tolcontact.declaration.vectors import is_length
+from tolcontact.declaration.values import is_length
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 

@@ -11,9 +11,9 @@ from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.codec import definitions
 from tolcontact.declaration.document import DOCUMENT, assembly_of, to_document
 from tolcontact.declaration.geometry import Mesh
+from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.declaration.place import EntryError, Sources
-from tolcontact.declaration.tape import Tape
 from tolcontact.errors import ScriptError
 
 SCHEMA_NAME = "model.schema.json"

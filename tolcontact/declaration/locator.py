@@ -6,13 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from tolcontact.declaration.names import repetitions, text_faults
 from tolcontact.declaration.part import Face, Feature, Part, face_of
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.vectors import Vector, is_finite, is_length
-from tolcontact.declaration.vectors import direction as _direction
-from tolcontact.declaration.vectors import vector as _vector
+from tolcontact.declaration.values import Vector, is_finite, is_length, repetitions, text_faults
+from tolcontact.declaration.values import direction as _direction
+from tolcontact.declaration.values import vector as _vector
 from tolcontact.readable import Readable
 
 

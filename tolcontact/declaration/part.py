@@ -1,4 +1,4 @@
-"""Parts, and their faces, features and points, to which other declarations refer."""
+"""Parts, their points and faces, and the forces that press them onto their supports: gravity, clamps and others."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.vectors import Vector, is_finite, is_length, script_line, vector
+from tolcontact.declaration.values import Vector, is_finite, is_length, script_line, vector
 from tolcontact.readable import Readable
 
 LETTER = re.compile(r"[A-Z]{1,2}")
@@ -213,3 +213,21 @@ def face_of(face: Face | Feature) -> Face:
             raise TypeError(f'feature "{face.name}" has {len(face.faces)} faces; choose one of them: .faces[0]')
         return face.faces[0]
     return face
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Force(Readable):
+    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
+
+    name: str
+    at: Point
+    vector: Vector
+    declared_at: str = ""
+
+    def faults(self) -> Iterator[str]:
+        yield from self.at.faults()
+        if not (is_finite(self.vector) and any(self.vector)):
+            yield "vector is not a nonzero vector of three finite numbers [N]"
+
+    def __str__(self) -> str:
+        return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from tolcontact.declaration.vectors import is_length
+from tolcontact.declaration.values import is_length
 from tolcontact.readable import Readable
 
 SHAPES = ("normal", "uniform", "triangular", "truncated normal")

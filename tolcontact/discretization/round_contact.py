@@ -6,8 +6,7 @@ import math
 import numpy as np
 import trimesh
 
-from tolcontact.discretization.round_points import RoundPoint
-from tolcontact.discretization.round_walls import NotRoundError, arc, tangent_directions
+from tolcontact.discretization.round_points import NotRoundError, RoundPoint, arc, tangent_directions
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, RoundSurface, Sphere
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.edges import CREASE, rim

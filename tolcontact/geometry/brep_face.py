@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import trimesh
 
-from tolcontact.declaration.vectors import Vector
+from tolcontact.declaration.values import Vector
 from tolcontact.errors import shown
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere
 from tolcontact.geometry.edges import smooth_pieces

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest, Near, Part, Picked, Triangles
 from tolcontact.declaration.selection import FACE_ANGLE
-from tolcontact.declaration.vectors import Vector
+from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown
 from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
-from tolcontact.declaration.vectors import Vector
+from tolcontact.declaration.values import Vector
 from tolcontact.errors import STEERING, GeometryFault, ModelError, OptionError, shown
 from tolcontact.geometry.brep_face import FaceInFile, describe_faces, plain_vector
 from tolcontact.geometry.files import key_of, read_files

@@ -89,7 +89,7 @@ correction itself drives into contact; `"initial"` is the paper's choice: only t
 """
 
 from tolcontact.mechanics.displacement import MOMENTS
-from tolcontact.mechanics.gap_map import GapMap
+from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.groups import Group, curved_pairs
 from tolcontact.mechanics.pose import ENTRIES
 

@@ -1,13 +1,19 @@
-"""The gap of a contact point, paper (2) to (5), written once as an expression.
+"""Gaps of contact points, paper (2) to (5): the expression, and all gaps of a pair as affine functions of few coordinates.
 
-In the frame of the reference part it is affine in the relative pose X_RM, so all gaps of a pair are one product of
-13 numbers (the pose's 12 entries, and 1) with a constant matrix: the Jacobian of the expression.
+In the frame of the reference part the gap is affine in the relative pose X_RM, so all gaps of a pair are one product of 13
+numbers (the entries of the pose, and 1) with a constant matrix G, the Jacobian of the expression. Where both faces are planes,
+gaps are affine in two coordinates of the points: G = basis @ coordinates, with three rows of coordinates instead of thirteen.
+An affine function has its least value at a corner of the points' convex hull, so that only the corners can be the deepest, at
+any pose.
 """
+
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
+from scipy.spatial import ConvexHull, QhullError
 
-from tolcontact.discretization import ContactPoints
+from tolcontact.discretization import ContactPoints, Offsets
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
 
 
@@ -31,3 +37,53 @@ def gap_matrix(pair: ContactPoints) -> np.ndarray:
     """Return the constant matrix (13, point): gaps (point,) [mm] = [entries of X_RM, 1] @ matrix."""
     gradient, constant = gap_gradient().map(len(pair.P_m))(pair.P_m.T, pair.P_r.T, pair.n_r.T)
     return np.vstack([gradient.full(), constant.full()])
+
+
+FLATNESS = 1e-13  # of the largest entry: normals of flat faces differ by that much
+
+
+@dataclass(frozen=True, eq=False)
+class GapMap:
+    """All gaps of a pair: [[X_RM, 1] @ basis, deviations[columns]] @ coordinates [mm].
+
+    basis         (13, r)
+    columns       (k,) of the deviations that raise points above their faces
+    coordinates   (r + k, point): the first row is 1, the last k rows are the derivatives of the gaps by these deviations
+    corners       numbers of the points that can be the deepest: corners of the hull in up to two coordinates, else all points
+    """
+
+    basis: np.ndarray
+    columns: np.ndarray
+    coordinates: np.ndarray
+    corners: np.ndarray
+
+
+def gap_map(G: np.ndarray, offsets: Offsets) -> GapMap:
+    """Factor the matrix G (13, point), up to rounding."""
+    centre = G.mean(axis=1)
+    U, S, V = np.linalg.svd(G - centre[:, None], full_matrices=False)
+    tolerance = FLATNESS * np.abs(G).max()
+    rank = 0
+    while rank < len(S) and np.abs(U[:, rank:] * S[rank:] @ V[rank:]).max() > tolerance:
+        rank += 1
+    basis = np.column_stack([centre, U[:, :rank]])
+    coordinates = np.vstack([np.ones(G.shape[1]), S[:rank, None] * V[:rank], -offsets.matrix])
+    return GapMap(basis, offsets.columns, coordinates, _corners(coordinates[1:]))
+
+
+def _corners(coordinates: np.ndarray) -> np.ndarray:
+    """Return the corners of the convex hull of points (coordinate, point), in order; all points beyond two coordinates.
+
+    Coordinates that are equal for all points are left out.
+    """
+    coordinates = coordinates[[np.ptp(row) > 0 for row in coordinates]] if len(coordinates) else coordinates
+    if len(coordinates) == 0:
+        return np.array([0])
+    if len(coordinates) == 1:
+        return np.unique([coordinates[0].argmin(), coordinates[0].argmax()])
+    if len(coordinates) == 2 and coordinates.shape[1] > 3:
+        try:
+            return np.sort(ConvexHull(coordinates.T).vertices)
+        except QhullError:  # the points lie almost on one line
+            pass
+    return np.arange(coordinates.shape[1])

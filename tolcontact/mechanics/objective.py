@@ -12,9 +12,9 @@ import numpy as np
 
 from tolcontact.mechanics.displacement import displacement_energy
 from tolcontact.mechanics.groups import Side
+from tolcontact.mechanics.placement import elongation
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.setting import Setting
-from tolcontact.mechanics.two_sided import elongation
 
 # Seating: the share of the forces that the quadratic term carries when all points have moved by the group's length. It is small
 # enough for the contacts to carry nearly the whole load, and large enough for the solvers.

@@ -12,8 +12,8 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints, RoundPoint, RoundPoints
 from tolcontact.geometry.analytic_surfaces import Cone, Sphere, Torus
-from tolcontact.mechanics.face_pose import face_height
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
+from tolcontact.mechanics.setting import face_height
 
 NEWTON_STEPS = 6  # from the tangent that is nearest to an upright shaft
 MAX_TURN = 0.5  # rad: largest Newton step

@@ -68,8 +68,7 @@ Memory does not grow with the number of realizations: at most two blocks for eac
 realizations or more, or one that will take more than a minute, announces its time, memory and disk space before it starts.
 """
 
-from tolcontact.simulation.block import Block, outcomes
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import Block, outcomes, simulate_block
 from tolcontact.simulation.threads import block_rows, map_blocks, processors, simulate_blocks
 
 __all__ = ["Block", "block_rows", "map_blocks", "outcomes", "processors", "simulate_block", "simulate_blocks"]

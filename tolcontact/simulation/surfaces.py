@@ -7,7 +7,7 @@ import numpy as np
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import simulate_block
 from tolcontact.vocabulary import CORRECTED
 
 TOUCHING_GAP = 1e-6  # mm: a contact point with a smaller gap stands on its plane

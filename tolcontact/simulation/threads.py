@@ -15,8 +15,7 @@ import numpy as np
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver
 from tolcontact.mechanics import curved_pairs
-from tolcontact.simulation.block import Block
-from tolcontact.simulation.blocks import simulate_block
+from tolcontact.simulation.block import Block, simulate_block
 from tolcontact.vocabulary import BLOCK_ROWS
 
 CURVED_ROWS, MIN_ROWS = 512, 16

@@ -1,9 +1,8 @@
 """Names and units of all variables in archives, summaries and comparisons, each defined once."""
 
 from tolcontact.vocabulary.analyses import *  # noqa: F403
-from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)
+from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of which each file holds a part)  # noqa: F403
 from tolcontact.vocabulary.labels import *  # noqa: F403
+from tolcontact.vocabulary.labels import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.summary import *  # noqa: F403
-from tolcontact.vocabulary.surfaces import *  # noqa: F403
-from tolcontact.vocabulary.variable import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.variation import *  # noqa: F403

@@ -13,9 +13,9 @@ from tolcontact.vocabulary.labels import (
     STATES,
     STATUS_MEANING,
     STATUS_MEANINGS,
+    ArchiveVariable,
 )
 from tolcontact.vocabulary.summary import ESTIMATE, INTERVAL, OUTSIDE
-from tolcontact.vocabulary.variable import ArchiveVariable
 
 ANALYSES_GROUP = "statistics"  # the group of an archive that holds a group for each analysis
 GROUP, GROUPED_BY, UNIT = "group", ("contributor", "feature", "part"), "unit"

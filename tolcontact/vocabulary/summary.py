@@ -12,8 +12,9 @@ from tolcontact.vocabulary.labels import (
     SOLVER,
     STATE,
     STATUS_MEANING,
+    ArchiveVariable,
+    label,
 )
-from tolcontact.vocabulary.variable import ArchiveVariable, label
 
 INTERVAL, STATISTIC, CHANGE_OF, EXTREME, OF_ITERATIONS = "interval", "statistic", "change_of", "extreme", "of_iterations"
 ESTIMATE = ("estimate", "lower", "upper")  # labels of `interval`: 95 %

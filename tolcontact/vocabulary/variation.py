@@ -1,7 +1,17 @@
 """Variables of an archive that describe what varies: contributors, locators, and the faces of features."""
 
-from tolcontact.vocabulary.labels import AXIS, CONTRIBUTOR, FEATURE_FACE, FREEDOM, LOCATOR, PAIR, POINT, REALIZATION
-from tolcontact.vocabulary.variable import ArchiveVariable, label
+from tolcontact.vocabulary.labels import (
+    AXIS,
+    CONTRIBUTOR,
+    FEATURE_FACE,
+    FREEDOM,
+    LOCATOR,
+    PAIR,
+    POINT,
+    REALIZATION,
+    ArchiveVariable,
+    label,
+)
 
 FREEDOMS = ("tau x", "tau y", "tau z", "rho x", "rho y", "rho z")
 

@@ -104,13 +104,10 @@ tolcontact.errors.OptionError: resolution is 'precise'; expected one of: lineari
 
 from tolcontact.archive import open_archive
 from tolcontact.workflow import accessor
-from tolcontact.workflow.models import build, check, write_model
-from tolcontact.workflow.population_check import check_population
+from tolcontact.workflow.comparison import compare, compare_runs, study
+from tolcontact.workflow.models import build, check, check_population, write_model
 from tolcontact.workflow.run import run, summarize
-from tolcontact.workflow.run_comparison import compare_runs
 from tolcontact.workflow.simulate import simulate
-from tolcontact.workflow.solver_comparison import compare
-from tolcontact.workflow.study import study
 
 __all__ = [
     "accessor", "build", "check", "check_population", "compare", "compare_runs", "open_archive", "run", "simulate", "study",

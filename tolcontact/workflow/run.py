@@ -16,10 +16,9 @@ from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
 from tolcontact.statistics import Summary
 from tolcontact.statistics import summarize as summary_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
-from tolcontact.workflow.forecast import announce
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
 from tolcontact.workflow.run_sums import RunSums
-from tolcontact.workflow.until import Target
+from tolcontact.workflow.until import Target, announce
 
 SURFACES = 64
 Progress = Callable[[int], None]

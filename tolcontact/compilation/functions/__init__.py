@@ -1,6 +1,5 @@
 """Ways to call a CasADi Function for many realizations at once: by name, interpreted, compiled, or whichever is faster."""
 
-from tolcontact.compilation.functions.interpreted import InterpretedFunction
-from tolcontact.compilation.functions.named import NamedFunction, flat
+from tolcontact.compilation.functions.named import InterpretedFunction, NamedFunction, flat
 
 __all__ = ["InterpretedFunction", "NamedFunction", "flat"]

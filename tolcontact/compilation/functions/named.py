@@ -1,12 +1,160 @@
-"""Functions whose inputs and outputs go by name."""
+"""Functions for many realizations at once: interpreted by CasADi, compiled when that pays, and called by names."""
 
+import contextlib
 import math
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.arrays import Array, Float, Real
-from tolcontact.compilation.functions.adaptive import AdaptiveFunction
+from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
+from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
+
+WIDTHS = (256, 16)  # realizations in a call of CasADi
+
+
+class InterpretedFunction:
+    """A Function that CasADi evaluates; inputs and outputs go by position.
+
+    Threads must not share it, since each evaluation uses its buffers. `fixed_inputs` are inputs, by position, that are the same
+    in all realizations.
+    """
+
+    def __init__(self, function: ca.Function, fixed_inputs: Mapping[int, np.ndarray] | None = None) -> None:
+        # A buffer keeps the memory of the Function that it calls. Inside another Function a solver takes a free one each time.
+        inputs = [ca.MX.sym(f"i{k}", function.sparsity_in(k)) for k in range(function.n_in())]
+        caller = ca.Function("caller", inputs, function.call(inputs))
+        self._calls = [
+            _Buffers(caller.map(width) if width > 1 else caller, width, fixed_inputs or {}) for width in (*WIDTHS, 1)
+        ]
+        self._solvers = [function] if function.is_a("Conic") else []
+
+    def __call__(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+        """Return the outputs (realization, stored entry), and `failed` (realization,), for the inputs that are not fixed.
+
+        Outputs are NaN if the evaluation failed.
+        """
+        count = len(inputs[0])
+        results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
+        failed = np.zeros(count, dtype=bool)
+        for call, start, stop in self._turns(count):
+            rows = slice(start, stop)
+            if not call([array[rows] for array in inputs], [result[rows] for result in results]):
+                # A plugin that gives up on one realization ends the whole call (qpOASES does), so each is evaluated alone.
+                self._forget()
+                for k in range(start, stop):
+                    entry = slice(k, k + 1)
+                    if not self._calls[-1]([array[entry] for array in inputs], [result[entry] for result in results]):
+                        failed[k] = True
+                        self._forget()
+                        for result in results:
+                            result[k] = np.nan
+        return results, failed
+
+    def _turns(self, count: int) -> Iterator[tuple["_Buffers", int, int]]:
+        """Yield buffers and the range of realizations they evaluate; the narrower of WIDTHS may have idle places at the end."""
+        start = 0
+        while start < count:
+            remaining = count - start
+            call = (
+                self._calls[0] if remaining >= WIDTHS[0] else self._calls[1] if remaining >= WIDTHS[1] // 2 else self._calls[2]
+            )
+            stop = min(start + call.width, count)
+            yield call, start, stop
+            start = stop
+
+    def _forget(self) -> None:
+        """Give the solvers a new memory. qpOASES starts from its last problem, and after one failure it always fails."""
+        for solver in self._solvers:
+            solver.checkout()  # the spoiled memory, never released: the next evaluation gets another
+        for call in self._calls:
+            call.is_new = True
+
+
+class _Buffers:
+    """A Function of `width` realizations at once, with arrays at fixed addresses."""
+
+    def __init__(self, function: ca.Function, width: int, fixed_inputs: Mapping[int, np.ndarray]) -> None:
+        self._buffer, self._evaluate = function.buffer()
+        inputs = [np.zeros((width, function.nnz_in(i) // width)) for i in range(function.n_in())]
+        self._outputs = [np.zeros((width, function.nnz_out(i) // width)) for i in range(function.n_out())]
+        self.width = width
+        self.sizes_out = [output.shape[1] for output in self._outputs]
+        for i, array in enumerate(inputs):
+            if i in fixed_inputs:
+                array[:] = fixed_inputs[i]
+            self._buffer.set_arg(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        for i, array in enumerate(self._outputs):
+            self._buffer.set_res(i, memoryview(array.ravel()))  # type: ignore[call-arg, arg-type]
+        self._all = inputs  # the buffer does not keep them alive
+        self._inputs = [array for i, array in enumerate(inputs) if i not in fixed_inputs]
+        self.is_new = True
+
+    def __call__(self, inputs: Sequence[np.ndarray], outputs: Sequence[np.ndarray]) -> bool:
+        """Evaluate for up to `width` realizations; idle places repeat the last one. Return whether it succeeded."""
+        count = len(inputs[0])
+        for buffer, array in zip(self._inputs, inputs, strict=True):
+            buffer[:count] = array
+            buffer[count:] = array[-1:]
+        try:
+            # The first evaluation constructs objects of CasADi. Plugins may print in every one.
+            with CONSTRUCTION_LOCK if self.is_new else contextlib.nullcontext(), quiet():
+                self._evaluate()
+        except RuntimeError:  # CasADi's only exception: bounds that are not numbers
+            return False
+        self.is_new = False
+        for buffer, array in zip(self._outputs, outputs, strict=True):
+            array[:] = buffer[:count]
+        return bool(self._buffer.ret() == 0)
+
+
+MIN_COMPILED_CALLS = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
+MAX_INSTRUCTIONS = (
+    300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
+)
+
+
+class AdaptiveFunction:
+    """A Function of scalar expressions that is interpreted, and compiled once it was evaluated often. Threads may share it.
+
+    Both ways give the same results to the last bit.
+
+    native   the machine code, or None while CasADi interprets
+    """
+
+    def __init__(self, function: ca.Function) -> None:
+        self._function = function
+        self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
+        self._interpreted = InterpretedFunction(function)
+        self.native: NativeFunction | None = None
+        self._remaining = MIN_COMPILED_CALLS if function.n_instructions() <= MAX_INSTRUCTIONS else math.inf
+        self._is_new = True
+        self._lock = threading.Lock()
+
+    def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return outputs (realization, stored entry) for inputs (realization, stored entry)."""
+        if self.native is None and (compiler := self._due_compiler(len(inputs[0]))):
+            # CasADi interprets what LLVM cannot compile on this machine.
+            with contextlib.suppress(UnknownInstructionError, RuntimeError):
+                self.native = compiler(self._function)  # other threads interpret meanwhile
+        if self.native is not None:
+            return self.native(inputs)
+        with self._lock:
+            return self._interpreted(inputs)[0]
+
+    def _due_compiler(self, count: int) -> Callable[[ca.Function], NativeFunction | None] | None:
+        """Return the way to get machine code before `count` evaluations, or None; each way is returned to one caller only."""
+        with self._lock:
+            self._remaining -= count
+            if self._is_new and self._remaining < math.inf:
+                self._is_new = False
+                return NativeFunction.from_cache
+            if self._remaining >= 0:
+                return None
+            self._remaining = math.inf
+            return NativeFunction
 
 
 class NamedFunction:

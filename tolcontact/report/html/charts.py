@@ -8,7 +8,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
-from tolcontact.report.html.packed_array import packed
+from tolcontact.report.html.scene import packed
 from tolcontact.statistics import intervals
 
 BINS = 60

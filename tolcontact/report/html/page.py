@@ -15,8 +15,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
-from tolcontact.report.html.scene import scene_of
-from tolcontact.report.html.view import gap_rows, view_of
+from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells, pair_columns, pair_rows
 from tolcontact.vocabulary import STATES

@@ -1,17 +1,30 @@
-"""The data of a page's 3D scene: bodies, fields, locators, contact points, and single realizations."""
+"""The 3D scenes of pages: of an archive with fields, contact points and single realizations, and of a declared assembly."""
 
+import base64
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.declaration import Assembly
+from tolcontact.discretization import Nominal
+from tolcontact.geometry import preview
 from tolcontact.report.analysis_tables import archived_analysis
-from tolcontact.report.annotations import Marks, marks_of
+from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.html.decimation import coarser, triangle_budgets
-from tolcontact.report.html.packed_array import Packed, packed
 from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
 from tolcontact.statistics import touching
+
+Packed = dict[str, Any]
+
+
+def packed(values: Any, kind: str = "f4") -> Packed:
+    """Return an array packed as floats of single precision, "f4", or whole numbers, "i4"."""
+    array = np.ascontiguousarray(values, dtype=f"<{kind}")
+    return {"shape": list(array.shape), "kind": kind, "data": base64.b64encode(array.tobytes()).decode()}
+
 
 Scene = dict[str, Any]
 
@@ -94,3 +107,45 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
 
 def _motions(R: np.ndarray, t: np.ndarray) -> Packed:
     return packed(np.concatenate([R.reshape(*R.shape[:-2], 9), t], axis=-1))
+
+
+def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Scene:
+    """Return the scene. Without a `nominal` assembly, for a model with faults, it has only parts with sound shapes."""
+    marks = Marks([], [], [], [], []) if nominal is None else marks_of_nominal(nominal)
+    return {"parts": list(_drawn_parts(assembly, _faulty(assembly, faults))), **packed_marks(marks)}
+
+
+def gap_rows(nominal: Nominal | None) -> list[dict[str, Any]]:
+    """Return the smallest and the largest gap of each pair of faces in the nominal assembly."""
+    rows = []
+    for pair in () if nominal is None else nominal.pairs:
+        _, gaps = fixed_points(pair)
+        smallest, largest = (f"{gap + 0.0:.4g}" for gap in (gaps.min(), gaps.max()))
+        rows.append({"name": pair.name, "count": len(gaps), "smallest": smallest, "largest": largest})
+    return rows
+
+
+def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
+    """Return the parts that faults name, and the parts of contact pairs that faults name."""
+    text = "\n".join(faults)
+    pairs = [pair for pair in assembly.pairs if f'"{pair.name}" (' in text]
+    of_pairs = {face.part.name for pair in pairs for face in (pair.moving, pair.reference)}
+    return of_pairs | {part.name for part in assembly.parts if f'part "{part.name}"' in text}
+
+
+def _drawn_parts(assembly: Assembly, faulty: set[str]) -> Iterator[Scene]:
+    for part in assembly.parts:
+        own = preview(part)
+        if own is None:
+            continue
+        yield {
+            "name": part.name,
+            "faulty": part.name in faulty,
+            "placement": [*own.rotation.ravel().tolist(), *part.at],
+            "vertices": packed(own.vertices),
+            "faces": packed(own.faces, "i4"),
+            "faceOfTriangle": packed(own.face_of, "i4"),
+            "described": [
+                {"said": str(face), "words": words} for face, words in zip(own.descriptions, own.snippets, strict=True)
+            ],
+        }

@@ -1,0 +1,127 @@
+"""tolcontact new, tolcontact check, tolcontact view."""
+
+import json
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolcontact.archive import open_archive
+from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples
+from tolcontact.cli.output import check_page, console
+from tolcontact.declaration import Assembly
+from tolcontact.declaration.geometry import STEP
+from tolcontact.declaration.script import load_model
+from tolcontact.declaration.values import key_faults
+from tolcontact.discretization import Nominal, discretize
+from tolcontact.errors import ModelError, OptionError, shown
+from tolcontact.geometry import parts_from
+from tolcontact.report import population_text, write_page, write_view
+from tolcontact.workflow.models import DEFAULT_SOLVER, build, check_population
+from tolcontact.workflow.run import summarize
+
+STARTER = Path(__file__).with_name("starter.py")
+
+
+@app.command(epilog=examples("new bracket"))
+def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the model; its script is NAME.py.")]) -> None:
+    """Write a small model with comments as a starting point."""
+    path = Path(name if name.endswith(".py") else f"{name}.py")
+    if faults := list(key_faults("model", [path.stem])):
+        raise OptionError(faults[0])
+    text = STARTER.read_text(encoding="utf-8")
+    text = text.replace('tc.Assembly("starter")', f"tc.Assembly({json.dumps(path.stem)})").replace("NAME.", f"{path.stem}.")
+    text = text.replace(" (NAME is this file without its ending)", "")
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError as error:
+        raise OptionError(f'"{path}" exists already, and was not changed; choose another name') from error
+    except OSError as error:
+        raise OptionError(f'"{path}" cannot be written: {error.strerror}') from error
+    typer.echo(f"model: {shown(str(path))}\nnext: tolcontact check {shown(str(path))}")
+
+
+@app.command(epilog=examples("check model.py", "check model.py --view", "check model.py --population 1000"))
+def check(
+    model: Model,
+    solver: Solver = DEFAULT_SOLVER,
+    resolution: Resolution = None,
+    objective: Objective = None,
+    population: Annotated[
+        int | None, typer.Option(metavar="N", help="Also draw every feature N times, and print the share inside its zones.")
+    ] = None,
+    seed: Seed = 1,
+    view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with marked faults.")] = False,
+) -> None:
+    """Check a model and its options without a run, and list all faults."""
+    assembly = load_model(model)
+    try:
+        program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
+    except ModelError as error:
+        if view:
+            _open_view(assembly, None, error.faults, temporary_page(model))
+        raise
+    if view:
+        _open_view(assembly, program.nominal, (), temporary_page(model))
+    typer.echo(program.nominal.assembly)
+    for part in program.nominal.parts:
+        size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
+        typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
+    for pair in program.nominal.pairs:
+        typer.echo(f"  contact {pair.name}: {pair.in_words}")
+    typer.echo("no faults found")
+    if population is not None:
+        console().print(population_text(check_population(assembly, samples=population, seed=seed)))
+
+
+def _open_view(model: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
+    """Write the view of a model, and open it in the browser."""
+    write_view(model, nominal, faults, path)
+    typer.echo(f"page: {shown(str(path))}")
+    typer.launch(str(path))
+
+
+@app.command(epilog=examples("view model.py", "view parts.stp", "view model.py --out page.html"))
+def view(
+    source: Annotated[Path, typer.Argument(metavar="MODEL|FILE.nc|FILE.stp", help="A model, an archive, or a STEP file.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
+    ] = None,
+) -> None:
+    """Show an assembly before a run: faces with their selectors, locators, contact points and nominal gaps.
+
+    The page lists the faults of a model. For an archive it is the report.
+    """
+    if out is not None:
+        check_page(out)
+    path = out or temporary_page(source)
+    if source.suffix.lower() == ".nc":
+        with open_archive(source) as results:
+            write_page(results, summarize(results), path)
+    elif source.suffix.lower() in STEP:
+        model = Assembly(source.stem)
+        parts_from(model, source)
+        write_view(model, None, [], path)
+    else:
+        _write_model(load_model(source), path)
+    typer.echo(f"page: {shown(str(path))}")
+    if out is None:
+        typer.launch(str(path))
+
+
+def _write_model(model: Assembly, path: Path) -> None:
+    try:
+        nominal = discretize(model)
+    except ModelError as error:
+        write_view(model, None, error.faults, path)
+    else:
+        write_view(model, nominal, (), path)
+
+
+def temporary_page(source: Path) -> Path:
+    """Return the path of a new page in a temporary folder."""
+    return Path(tempfile.mkdtemp(prefix="tolcontact-")) / f"{source.stem}.html"
