@@ -5,7 +5,7 @@ import pytest
 import tolcontact as tc
 from tolcontact.errors import ArchiveError, ModelError, TolcontactError
 
-STEERING = [
+CONTROL_CHARACTERS = [
     "\x00", "\x07", "\t", "\n", "\x1b[31m", "\x7f", "\x85", "\x9b", "\u2028", "\u2029", "\u202a", "\u202e", "\u2066",
     "\u2069", "\ud800", "\udce9",
 ]  # fmt: skip
@@ -51,7 +51,7 @@ KINDS = {
 
 @pytest.mark.parametrize("word", [*KINDS, "units"])
 def test_what_steers_a_terminal_is_refused(word):
-    for bad in STEERING:
+    for bad in CONTROL_CHARACTERS:
         with pytest.raises(ModelError) as refused:
             tc.build(model(**{word: f"a{bad}b"}))
         message = str(refused.value)

@@ -6,8 +6,7 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from tests import cases
-from tolcontact import poses as pose
-from tolcontact import vocabulary as terms
+from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.declaration import movers
 from tolcontact.discretization import discretize
 from tolcontact.statistics import DisplacementFields, intervals

@@ -1,83 +1,72 @@
-from . import plot
-from .analyses.allocate import allocate
-from .analyses.contributions import contributions
-from .analyses.relocate import relocate
-from .analyses.sensitivities import sensitivities
-from .analyses.tails import tails
-from .analyses.worst_case import worst_case
-from .archive import model_of
-from .cli import command_line, main
-from .compilation import Program
+from . import plot as plot
+from .analyses.allocate import allocate as allocate
+from .analyses.contributions import contributions as contributions
+from .analyses.relocate import relocate as relocate
+from .analyses.sensitivities import sensitivities as sensitivities
+from .analyses.tails import tails as tails
+from .analyses.worst_case import worst_case as worst_case
+from .archive import model_of as model_of
+from .cli import command_line as command_line, main as main
+from .compilation import Program as Program
 from .declaration import (
-    Angularity,
-    Assembly,
-    Box,
-    Brep,
-    CircularRunout,
-    Coaxiality,
-    ContactPair,
-    Cylinder,
-    Face,
-    Facing,
-    Feature,
-    Flatness,
-    Force,
-    Inside,
-    Largest,
-    LineProfile,
-    Locator,
-    Measure,
-    Mesh,
-    Near,
-    Parallelism,
-    Part,
-    Perpendicularity,
-    Point,
-    Position,
-    Profile,
-    Size,
-    Symmetry,
-    Tolerance,
-    TotalRunout,
-    Variable,
-    three_two_one,
+    Angularity as Angularity,
+    Assembly as Assembly,
+    Box as Box,
+    Brep as Brep,
+    CircularRunout as CircularRunout,
+    Coaxiality as Coaxiality,
+    ContactPair as ContactPair,
+    Cylinder as Cylinder,
+    Face as Face,
+    Facing as Facing,
+    Feature as Feature,
+    Flatness as Flatness,
+    Force as Force,
+    Inside as Inside,
+    Largest as Largest,
+    LineProfile as LineProfile,
+    Locator as Locator,
+    Measure as Measure,
+    Mesh as Mesh,
+    Near as Near,
+    Parallelism as Parallelism,
+    Part as Part,
+    Perpendicularity as Perpendicularity,
+    Point as Point,
+    Position as Position,
+    Profile as Profile,
+    Size as Size,
+    Symmetry as Symmetry,
+    Tolerance as Tolerance,
+    TotalRunout as TotalRunout,
+    Variable as Variable,
+    three_two_one as three_two_one,
 )
 from .errors import (
-    ArchiveError,
-    ClusterError,
-    ContactWarning,
-    ModelError,
-    OptionError,
-    ScriptError,
-    TolcontactError,
-    UnitsWarning,
+    ArchiveError as ArchiveError,
+    ClusterError as ClusterError,
+    ContactWarning as ContactWarning,
+    ModelError as ModelError,
+    OptionError as OptionError,
+    ScriptError as ScriptError,
+    TolcontactError as TolcontactError,
+    UnitsWarning as UnitsWarning,
 )
-from .geometry import bodies_in, faces_in, parts_from
-from .method import Method
-from .simulation import simulate_blocks
-from .version import __version__
-from .vocabulary import Status
+from .geometry import bodies_in as bodies_in, faces_in as faces_in, parts_from as parts_from
+from .method import Method as Method
+from .simulation import simulate_blocks as simulate_blocks
+from .version import __version__ as __version__
+from .vocabulary import Status as Status
 from .workflow import (
-    build,
-    check,
-    check_population,
-    compare,
-    compare_runs,
-    open_archive,
-    run,
-    simulate,
-    study,
-    summarize,
-    write_model,
+    build as build,
+    check as check,
+    check_population as check_population,
+    compare as compare,
+    compare_runs as compare_runs,
+    open_archive as open_archive,
+    run as run,
+    simulate as simulate,
+    study as study,
+    summarize as summarize,
+    write_model as write_model,
 )
-
-__all__ = [
-    "Angularity", "ArchiveError", "Assembly", "Box", "Brep", "CircularRunout", "ClusterError", "Coaxiality", "ContactPair",
-    "ContactWarning", "Cylinder", "Face", "Facing", "Feature", "Flatness", "Force", "Inside", "Largest", "LineProfile",
-    "Locator", "Measure", "Mesh", "Method", "ModelError", "Near", "OptionError", "Parallelism", "Part", "Perpendicularity",
-    "Point", "Position", "Profile", "Program", "ScriptError", "Size", "Status", "Symmetry", "TolcontactError", "Tolerance",
-    "TotalRunout", "UnitsWarning", "Variable", "__version__", "allocate", "bodies_in", "build", "check", "check_population",
-    "command_line", "compare", "compare_runs", "contributions", "faces_in", "main", "model_of", "open_archive", "parts_from",
-    "plot", "relocate", "run", "sensitivities", "simulate", "simulate_blocks", "study", "summarize", "tails", "three_two_one",
-    "worst_case", "write_model",
-]  # fmt: skip

@@ -9,12 +9,12 @@ from typing import Protocol
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
 # surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
-STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def shown(text: str) -> str:
     """Return a text as it may be printed: characters that would steer a terminal become escapes."""
-    return STEERING.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+    return CONTROL_CHARACTERS.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def clipped(text: str, max_length: int = 400) -> str:

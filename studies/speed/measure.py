@@ -26,8 +26,7 @@ import tolcontact as tc
 from tolcontact.archive import ArchiveWriter, Run, stored
 from tolcontact.compilation.functions import InterpretedFunction, named
 from tolcontact.contact.scan import CompiledScan
-from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation import threads as running
+from tolcontact.simulation import simulate_blocks, threads as running
 from tolcontact.statistics import DisplacementFields
 from tolcontact.variation import Draws
 from tolcontact.variation.draws import draw

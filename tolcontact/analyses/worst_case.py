@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import poses
-from tolcontact import vocabulary as terms
+from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Progress

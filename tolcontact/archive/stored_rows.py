@@ -7,8 +7,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from tolcontact import poses as pose
-from tolcontact import vocabulary as terms
+from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
 from tolcontact.realizations import finished

@@ -18,8 +18,7 @@ import netCDF4
 import numpy as np
 from xarray.backends.locks import HDF5_LOCK, NETCDFC_LOCK, combine_locks
 
-from tolcontact import poses
-from tolcontact import vocabulary as terms
+from tolcontact import poses, vocabulary as terms
 from tolcontact.archive.disk_space import check_room, lay_out_rows
 from tolcontact.archive.header import empty_field, empty_touching, write_header
 from tolcontact.archive.inspection import inspect

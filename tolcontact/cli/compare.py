@@ -16,8 +16,7 @@ from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.report import comparison_text, runs_text, write_comparison
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.comparison import compare as compare_solvers
-from tolcontact.workflow.comparison import compare_runs, named_archives
+from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
 
 SEVERAL = "One or more of {}. Default: the model's."

@@ -29,8 +29,7 @@ from tolcontact.report import write_page
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.models import DEFAULT_SOLVER
-from tolcontact.workflow.run import SURFACES, summarize
-from tolcontact.workflow.run import run as run_model
+from tolcontact.workflow.run import SURFACES, run as run_model, summarize
 
 Until = Annotated[
     str | None,

@@ -5,17 +5,20 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, Generic, TypeVar
 
 from tolcontact.declaration.contact_pair import ContactPair
-from tolcontact.declaration.contributor import Correlation, Population, Variable
-from tolcontact.declaration.contributor import correlation as _correlation
-from tolcontact.declaration.contributor import population as _population
+from tolcontact.declaration.contributor import (
+    Correlation,
+    Population,
+    Variable,
+    correlation as _correlation,
+    population as _population,
+)
 from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Force, Part, Point, face_of
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults
-from tolcontact.declaration.values import vector as _vector
+from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 

@@ -14,8 +14,7 @@ from tolcontact.declaration.codec import CODECS, Choice, Codec, Named, Optional,
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face, Feature, Part
 from tolcontact.declaration.place import Place
-from tolcontact.declaration.selection import KINDS as SURFACES
-from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.selection import KINDS as SURFACES, Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.values import DIRECTIONS, Vector, direction
 
 Document = dict[str, Any]

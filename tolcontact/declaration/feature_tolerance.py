@@ -6,8 +6,7 @@ from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
 from tolcontact.declaration.tolerance import Tolerance
-from tolcontact.declaration.values import Vector, is_finite, is_length
-from tolcontact.declaration.values import direction as _direction
+from tolcontact.declaration.values import Vector, direction as _direction, is_finite, is_length
 from tolcontact.readable import Readable
 
 INSIDE = "99.73 % inside"

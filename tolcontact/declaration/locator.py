@@ -7,11 +7,16 @@ from typing import Any
 import numpy as np
 
 from tolcontact.declaration.part import Face, Feature, Part, face_of
-from tolcontact.declaration.tolerance import Tolerance
-from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import Vector, is_finite, is_length, repetitions, text_faults
-from tolcontact.declaration.values import direction as _direction
-from tolcontact.declaration.values import vector as _vector
+from tolcontact.declaration.tolerance import Tolerance, tolerance as _tolerance
+from tolcontact.declaration.values import (
+    Vector,
+    direction as _direction,
+    is_finite,
+    is_length,
+    repetitions,
+    text_faults,
+    vector as _vector,
+)
 from tolcontact.readable import Readable
 
 

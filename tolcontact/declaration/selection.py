@@ -7,8 +7,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from tolcontact.declaration.values import DIRECTIONS, Vector, is_finite, is_length, vector
-from tolcontact.declaration.values import direction as _direction
+from tolcontact.declaration.values import DIRECTIONS, Vector, direction as _direction, is_finite, is_length, vector
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 from tolcontact.vocabulary import SURFACE_KINDS

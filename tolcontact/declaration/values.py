@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from tolcontact.errors import STEERING, shown
+from tolcontact.errors import CONTROL_CHARACTERS, shown
 
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
@@ -43,7 +43,7 @@ def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:
 
 def is_line(text: Any) -> bool:
     """Return True for a text of one line without characters that control a terminal."""
-    return isinstance(text, str) and not (STEERING.search(text) or "\t" in text or "\n" in text)
+    return isinstance(text, str) and not (CONTROL_CHARACTERS.search(text) or "\t" in text or "\n" in text)
 
 
 Vector = tuple[float, float, float]

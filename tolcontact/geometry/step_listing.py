@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import STEERING, GeometryFault, ModelError, OptionError, shown
+from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
 from tolcontact.geometry.brep_face import FaceInFile, describe_faces, plain_vector
 from tolcontact.geometry.files import key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
@@ -103,7 +103,7 @@ def parts_from(
 
 
 def _part_name(body: BodyInFile) -> str:
-    name = re.sub(r"[/\t\n]", "_", STEERING.sub("_", body.name)).strip()
+    name = re.sub(r"[/\t\n]", "_", CONTROL_CHARACTERS.sub("_", body.name)).strip()
     return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 
 

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, fields
 
 import numpy as np
 
-from tolcontact import poses as pose
-from tolcontact import vocabulary as terms
+from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import ContactResolver, Resolved

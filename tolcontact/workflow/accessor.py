@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import plot
-from tolcontact import vocabulary as terms
+from tolcontact import plot, vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
 from tolcontact.report.notebook import results_html

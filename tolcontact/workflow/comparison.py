@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import poses as pose
-from tolcontact import vocabulary as terms
+from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive import check_rows, open_archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize

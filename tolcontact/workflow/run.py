@@ -13,8 +13,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
-from tolcontact.statistics import Summary
-from tolcontact.statistics import summarize as summary_of
+from tolcontact.statistics import Summary, summarize as summary_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
 from tolcontact.workflow.run_sums import RunSums
