@@ -34,7 +34,7 @@ ROUNDED = 1e-9  # mm: less penetration than this is rounding
 
 
 class Status(enum.IntEnum):
-    """What became of a realization. Archives keep these numbers."""
+    """The outcome of a realization. Archives hold these numbers."""
 
     UNTOUCHED = 0  # no contact point penetrates: the corrected state is the raw state, to the last bit
     RESOLVED = 1  # contact moved parts, and the QP's optimality conditions hold
