@@ -43,9 +43,10 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
-    "scipy.stats": ("declaration/tolerance.py",),
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
 }
+# Slow to import: "import scipy" is enough, and imports them when they are first used.
+SLOW = ("scipy.optimize", "scipy.stats")
 IMPORTERS = ("import_module", "__import__", "load")
 # Rooms that a room does not import from, though they stand before it.
 APART = {
@@ -116,6 +117,7 @@ def test_imports_keep_to_the_walls(file):
         library = name.split(".")[0]
         if library in ROOMS:
             assert place.startswith(ROOMS[library]), f"{place} imports {library}"
+        assert name not in SLOW, f"{place} imports {name}, which scipy imports when it is used"
         if library in NOT_IN:
             assert not place.startswith(NOT_IN[library]), f"{place} imports {library}"
         if library == "tolcontact" and name != "tolcontact":

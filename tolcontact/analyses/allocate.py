@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.optimize import Bounds, minimize
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
@@ -255,13 +255,13 @@ class Search:
 
         lower = np.where(self.prices.is_free, np.maximum(logs - radius, np.log(MIN_FACTOR)), logs)
         upper = np.where(self.prices.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
-        bounds = Bounds(lower, upper)
-        solution = minimize(
+        bounds = scipy.optimize.Bounds(lower, upper)
+        solution = scipy.optimize.minimize(
             self.prices.total, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},
             options={"maxiter": 200},
         )  # fmt: skip
         if not solution.success:
-            solution = minimize(missed, logs, method="SLSQP", bounds=bounds)
+            solution = scipy.optimize.minimize(missed, logs, method="SLSQP", bounds=bounds)
         return np.asarray(np.clip(solution.x, lower, upper))
 
 

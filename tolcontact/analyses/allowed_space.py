@@ -6,7 +6,7 @@ tolerances, with the bonus that its size leaves. Measured parts are one of their
 """
 
 import numpy as np
-from scipy.optimize import linprog
+import scipy
 
 from tolcontact.declaration import Tolerance
 from tolcontact.variation.contributors import TAIL, ComponentZone, Contributor
@@ -178,7 +178,9 @@ class Region:
             rows = np.flatnonzero(np.abs(planes[:, columns]).any(axis=1))
             limits = ends[rows] - planes[np.ix_(rows, fixed)] @ point[fixed]
             goal = -direction / np.abs(direction).max()
-            solution = linprog(goal, planes[np.ix_(rows, columns)], limits / scale, bounds=bounds, options=LP_TOLERANCES)
+            solution = scipy.optimize.linprog(
+                goal, planes[np.ix_(rows, columns)], limits / scale, bounds=bounds, options=LP_TOLERANCES
+            )
             point[columns] = scale * solution.x
             tangents, tangent_ends = self.planes(point, slack)
             if not len(tangents):

@@ -14,7 +14,7 @@ To first order in deviations and motions. Pairs of round faces have no rows, whi
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, milp
+import scipy
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
@@ -63,14 +63,14 @@ def _reactions(model: LinearModel, region: Region) -> _Reactions | None:
         return None
     # A motion d that opens all gaps by 1, with the least sum of |d|: one of nearly the least energy is as good.
     freedoms, eye = A.shape[1], np.eye(A.shape[1])
-    lift = milp(
+    lift = scipy.optimize.milp(
         np.r_[np.zeros(freedoms), np.ones(freedoms)],
         constraints=[
-            LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
-            LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
-            LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
+            scipy.optimize.LinearConstraint(np.hstack([A, np.zeros_like(A)]), 1.0, np.inf),
+            scipy.optimize.LinearConstraint(np.hstack([eye, eye]), 0.0, np.inf),
+            scipy.optimize.LinearConstraint(np.hstack([-eye, eye]), 0.0, np.inf),
         ],
-        bounds=Bounds(-np.inf, np.inf),
+        bounds=scipy.optimize.Bounds(-np.inf, np.inf),
     )
     if not lift.success:
         return None
@@ -108,8 +108,8 @@ class _Problem:
         lower[:contributors], upper[:contributors] = region.lower, region.upper
         if reactions is not None:
             lower[-2 * binaries :], upper[-2 * binaries :] = 0.0, np.r_[reactions.largest_reaction, np.ones(binaries)]
-        self._bounds = Bounds(lower, upper)
-        self._constraints: list[LinearConstraint] = []
+        self._bounds = scipy.optimize.Bounds(lower, upper)
+        self._constraints: list[scipy.optimize.LinearConstraint] = []
         if freedoms:
             self._add_contact(model)
         if reactions is not None:
@@ -134,7 +134,9 @@ class _Problem:
     def _add(self, rows: np.ndarray, lower: np.ndarray | float, upper: np.ndarray | float) -> None:
         """Add constraints with rows (row, variable) of the first variables."""
         if len(rows):
-            self._constraints.append(LinearConstraint(np.pad(rows, ((0, 0), (0, self._width - rows.shape[1]))), lower, upper))
+            self._constraints.append(
+                scipy.optimize.LinearConstraint(np.pad(rows, ((0, 0), (0, self._width - rows.shape[1]))), lower, upper)
+            )
 
     def bound(self) -> float:
         """Return an upper bound; infinite if there is none."""
@@ -142,7 +144,7 @@ class _Problem:
         bound, contributors = np.inf, len(self._region.lower)
         for _ in range(MAX_ROUNDS):
             self._add(planes, -np.inf, ends)
-            solution = milp(
+            solution = scipy.optimize.milp(
                 -self._goal, constraints=self._constraints, bounds=self._bounds, integrality=self._integer,
                 options={"time_limit": MAX_SECONDS},
             )  # fmt: skip

@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.optimize import Bounds, minimize
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
@@ -180,9 +180,9 @@ class Places:
         """Try further places from the best one on."""
         start = self._shares[int(np.nanargmin(self.values))]
         ceiling = 1e3 * max(value for value in self.values if np.isfinite(value))  # COBYQA takes no infinity
-        minimize(
+        scipy.optimize.minimize(
             lambda shares: min(self._try(shares), ceiling),
-            start, method="COBYQA", bounds=Bounds(np.zeros(len(start)), np.ones(len(start))),
+            start, method="COBYQA", bounds=scipy.optimize.Bounds(np.zeros(len(start)), np.ones(len(start))),
             options={"maxfev": MAX_TRIALS, "initial_tr_radius": 0.5 / self._count, "final_tr_radius": PLACE_TOLERANCE},
         )  # fmt: skip
 

@@ -1,10 +1,11 @@
 """The variation of a contributor: the range of its tolerance, and the distribution that fills this range."""
 
-import importlib  # scipy.stats takes longer to import than all the rest: only if it is needed
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
+
+import scipy
 
 from tolcontact.declaration.values import is_length
 from tolcontact.readable import Readable
@@ -98,9 +99,8 @@ def tolerance(value: Any) -> Tolerance:
 
 def scipy_distribution(name: str) -> Any | None:
     """Return the continuous distribution of scipy.stats with this name; None for an unknown name."""
-    stats = importlib.import_module("scipy.stats")
-    family = getattr(stats, name, None)
-    return family if isinstance(family, stats.rv_continuous) and family.name == name else None
+    family = getattr(scipy.stats, name, None)
+    return family if isinstance(family, scipy.stats.rv_continuous) and family.name == name else None
 
 
 def _not_archivable(frozen: Any) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import OptimizeResult, least_squares
+import scipy
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Cone, Cylinder, Plane, Sphere
 
@@ -141,8 +141,8 @@ FITS: tuple[Callable[[np.ndarray, np.ndarray], AnalyticSurface | None], ...] = (
 
 def _least_squares(
     residuals: Callable[[np.ndarray], np.ndarray], start: Sequence[float], scale: Sequence[float] | float
-) -> OptimizeResult:
-    return least_squares(residuals, start, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50)
+) -> "scipy.optimize.OptimizeResult":
+    return scipy.optimize.least_squares(residuals, start, x_scale=scale, xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=50)
 
 
 def _circle(points: np.ndarray) -> tuple[float, float, float]:

@@ -13,8 +13,8 @@ are 3 and 6 standard deviations.
 from functools import lru_cache
 
 import numpy as np
+import scipy
 from scipy import special
-from scipy.stats import qmc
 
 from tolcontact.statistics.intervals import (
     CONFIDENCE,
@@ -127,7 +127,7 @@ def percentile_ranks(n: int) -> np.ndarray:
 
     Rank 1 is the least value; a rank below 1 lies below all values.
     """
-    u = qmc.Sobol(3, rng=np.random.default_rng(0)).random(TRIALS).T
+    u = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(0)).random(TRIALS).T
     p = np.array(PERCENTS) / 100
     below_low = _hits(u[0], n, p[0])
     below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))

@@ -15,7 +15,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.stats import qmc
+import scipy
 
 from tolcontact.vocabulary import LATIN_HYPERCUBE, MONTE_CARLO, REPLICATE, SOBOL
 
@@ -59,7 +59,7 @@ class Plan:
 
 def _latin(seed: int, replicate: int, count: int) -> np.ndarray:
     rng = generator(seed, LATIN_HYPERCUBE, replicate)
-    return qmc.LatinHypercube(count, rng=rng).random(REPLICATE).clip(2.0**-BITS, 1 - 2.0**-BITS)
+    return scipy.stats.qmc.LatinHypercube(count, rng=rng).random(REPLICATE).clip(2.0**-BITS, 1 - 2.0**-BITS)
 
 
 def _sobol(seed: int, replicate: int, count: int) -> np.ndarray:
@@ -70,7 +70,7 @@ def _sobol(seed: int, replicate: int, count: int) -> np.ndarray:
 @functools.lru_cache(maxsize=8)
 def _net(seed: int, count: int) -> np.ndarray:
     """Return the points (REPLICATE, count) of a Sobol' sequence as whole numbers of BITS bits."""
-    points = qmc.Sobol(count, scramble=True, bits=BITS, rng=generator(seed, SOBOL, -1)).random(REPLICATE)
+    points = scipy.stats.qmc.Sobol(count, scramble=True, bits=BITS, rng=generator(seed, SOBOL, -1)).random(REPLICATE)
     return (points * 2.0**BITS).astype(np.int64)
 
 

@@ -9,9 +9,8 @@ quasi-random sequence of directions gives it to some 1e-5, without draws of feat
 import functools
 
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 from scipy.special import ndtri
-from scipy.stats import chi, qmc
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14
@@ -25,7 +24,7 @@ def share_inside(rows: np.ndarray, spreads: np.ndarray, width: float) -> float:
     if not varying.size or not rows.size:
         return 1.0
     longest = _longest(rows[..., varying], _directions(len(varying)) * spreads[varying])
-    return float(chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varying)).mean())
+    return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varying)).mean())
 
 
 def equal_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width: float) -> float:
@@ -43,7 +42,7 @@ def equal_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width:
     upper = width
     while excess(upper) > 0:  # rows may be short
         upper *= 2
-    return float(brentq(excess, MIN_SPREAD * width, upper, xtol=1e-9 * width))
+    return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, upper, xtol=1e-9 * width))
 
 
 def extreme_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width: float) -> float:
@@ -83,5 +82,5 @@ def _directions(components: int) -> np.ndarray:
     """Return unit vectors (direction, component) in all directions evenly."""
     if components == 1:
         return np.ones((1, 1))
-    normal = ndtri(qmc.Sobol(components, scramble=True, seed=0).random_base2(LOG2_DIRECTIONS))
+    normal = ndtri(scipy.stats.qmc.Sobol(components, scramble=True, seed=0).random_base2(LOG2_DIRECTIONS))
     return normal / np.linalg.norm(normal, axis=1, keepdims=True)
