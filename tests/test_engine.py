@@ -16,8 +16,9 @@ from tests.helpers import nightly, recompiled
 from tolcontact.compilation import contact_qp
 from tolcontact.compilation.contact_qp import is_convex
 from tolcontact.compilation.functions import InterpretedFunction
+from tolcontact.compilation.functions.code_cache import cache_folder
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
-from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError, cache_folder
+from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan

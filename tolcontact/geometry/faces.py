@@ -205,13 +205,20 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
     # Both are sampled, since either part may be small beside the other.
     for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
         step = max(selection.within, sampled.scale / NEAR_STATIONS)
-        vertices, faces, origin = trimesh.remesh.subdivide_to_size(
-            sampled.vertices, sampled.faces, max_edge=step, max_iter=30, return_index=True
+        # What lies outside of this box is too far away.
+        low, high = np.asarray(target.bounds) + selection.within * np.array([[-1.0], [1.0]])
+        corners = np.asarray(sampled.triangles)
+        reachable = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
+        vertices, faces, piece_of = trimesh.remesh.subdivide_to_size(
+            sampled.vertices, sampled.faces[reachable], max_edge=step, max_iter=30, return_index=True
         )
-        fine = trimesh.Trimesh(vertices, faces, process=False)
-        hit, nearest = Surface(target).nearest(fine.triangles_center)
-        is_opposing = (fine.face_normals * np.asarray(target.face_normals)[hit]).sum(axis=1) < OPPOSING_COSINE
-        is_near = is_opposing & (np.linalg.norm(fine.triangles_center - nearest, axis=1) <= selection.within)
+        centres = vertices[faces].mean(axis=1)
+        within_box = np.flatnonzero(((centres >= low) & (centres <= high)).all(axis=1))
+        centres, origin = centres[within_box], reachable[piece_of[within_box]]
+        hit, nearest = Surface(target).nearest(centres)
+        normals, target_normals = np.asarray(sampled.face_normals)[origin], np.asarray(target.face_normals)[hit]
+        is_opposing = (normals * target_normals).sum(axis=1) < OPPOSING_COSINE
+        is_near = is_opposing & (np.linalg.norm(centres - nearest, axis=1) <= selection.within)
         mask[(origin if sampled is mesh else hit)[is_near]] = True
     # A flat face is chosen as a whole, however it is cut into triangles.
     flat = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT_ANGLE]
