@@ -12,6 +12,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import nightly
 from tolcontact.archive.settings import declaration
 from tolcontact.declaration.document import from_document
 from tolcontact.declaration.measure import BINARY, UNARY, tape_of
@@ -70,10 +71,12 @@ STRANGE = [
 
 
 @pytest.mark.slow
-def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(document):
+@pytest.mark.parametrize("stride", [3, *nightly(1)])
+def test_whatever_stands_anywhere_in_a_document_ends_in_one_error(stride, document):
+    """At each place every third value: at the next place the others."""
     accepted = 0
-    for path in places(document):
-        for value in STRANGE:
+    for number, path in enumerate(places(document)):
+        for value in STRANGE[number % stride :: stride]:
             if value is Ellipsis and not path:
                 continue
             try:

@@ -6,6 +6,7 @@ python -m studies.site.build FOLDER [--samples N]
 import argparse
 import ast
 import inspect
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -24,16 +25,9 @@ from tolcontact.report.html.page import HERE as REPORT
 HERE = Path(__file__).resolve().parent
 MODELS = HERE.parents[1] / "models"
 LINES = 10  # of a model
-REFERENCE = (
-    "tolcontact",
-    *(
-        f"tolcontact.{chapter}"
-        for chapter in (
-            "declaration", "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics",
-            "archive", "report", "workflow", "cli", "testing",
-        )
-    ),
-)  # fmt: skip
+# The front of the guide, the chapters that it lists (but those among its own names), and the assertions.
+CHAPTERS = re.findall(r"\| `tolcontact\.(\w+)` \|", tc.__doc__ or "")
+REFERENCE = ("tolcontact", *(f"tolcontact.{name}" for name in [*CHAPTERS, "testing"] if name not in dir(tc)))
 
 
 def models() -> list[Path]:

@@ -63,7 +63,7 @@ True
 the deviations that cause them. It also returns bounds: to first order, no pose without penetration lies beyond them. Where
 contact alone does not hold a part, as with a block that can be lifted off a table, there is no bound.
 
->>> worst = tc.worst_case(assembly, samples=256, solver="daqp").sel(measure="height")
+>>> worst = tc.worst_case(assembly, samples=64, solver="daqp").sel(measure="height")
 >>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))
 (True, -0.0)
 
@@ -74,7 +74,7 @@ probabilities of 1e-6 or less to within a few tenths of their value.
 >>> bar = far.part("bar", tc.Box(50, 25, 10))
 >>> location = far.locate(bar, tc.three_two_one(bar.face("-z"), bar.face("-y"), bar.face("-x")), tolerance=0.6)
 >>> end = far.measure("end", bar.point(50, 12.5, 10), along="x", limits=(None, 0.5))
->>> _, lower, upper = tc.tails(far, samples=20_000).probability.sel(event="end outside limits").values
+>>> _, lower, upper = tc.tails(far, samples=6000).probability.sel(event="end outside limits").values
 >>> bool(0 < lower < upper < 1e-3)
 True
 
