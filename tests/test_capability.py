@@ -225,3 +225,13 @@ def test_what_is_just_on_a_limit_is_inside():
     x = Sample(lambda: [np.array([-1.0, 0.0, 1.0, 1.0])])
     assert capability.share_below(x, -1.0).value == 0 and capability.share_below(x, 0.0).value == 0.25
     assert capability.share_above(x, 1.0).value == 0 and capability.share_above(x, 0.0).value == 0.5
+
+
+def test_a_lower_limit_is_the_upper_one_of_the_mirrored_values():
+    """Of a skewed distribution: mean and spread vary together, so that the interval depends on the side."""
+    values = stats.gamma(4).ppf(np.random.default_rng(5).random(4000))
+    lower, upper = estimates(values, 0.5, np.inf), estimates(-values, -np.inf, -0.5)
+    np.testing.assert_allclose(lower["Ppk as normal"], upper["Ppk as normal"], rtol=1e-9)
+    other = estimates(values, -np.inf, 2 * values.mean() - 0.5)  # as far from the mean, on the other side
+    index, of_other = (side["Ppk as normal"] for side in (lower, other))
+    assert index.value == pytest.approx(of_other.value) and np.diff(index[1:]) != pytest.approx(np.diff(of_other[1:]), rel=0.05)

@@ -13,6 +13,7 @@ from tests import cases
 from tests.helpers import nightly
 from tolcontact.simulation.cluster import local_cluster
 from tolcontact.simulation.lazy import CHUNK_BLOCKS
+from tolcontact.simulation.packing import pack_model, packed_program
 
 
 def rows_of(results, name):
@@ -167,3 +168,11 @@ def test_studies_that_cannot_be():
     ):
         with pytest.raises(tc.OptionError, match=said):
             tc.study(models, 100, **options)
+
+
+def test_the_process_that_asks_does_not_compile_again():
+    a = tc.Assembly("asked for once")
+    a.measure("corner", a.part("plate", tc.Box(100, 50, 10), fixed=True).point(100, 50, 10), along="z")
+    program = tc.build(a)
+    tc.simulate(program, 10)
+    assert packed_program(pack_model(program)) is program

@@ -14,8 +14,11 @@ SEATED = tc.Method(objective="seating", resolution="exact")
 FIT = 0.05
 
 
-def peg() -> tc.Assembly:
-    """A round peg, free to spin, that a force pushes to the side of a hole whose place varies; on few points."""
+def peg(*size: tc.Size) -> tc.Assembly:
+    """A round peg, free to spin, that a force pushes to the side of a hole whose place varies; on few points.
+
+    size   of the hole, if it varies
+    """
     a = tc.Assembly("peg")
     plate = a.part("plate", tc.Mesh(trimesh.creation.annulus(5 + FIT, 20, 10, sections=180)), fixed=True)
     pin = a.part("pin", tc.Mesh(trimesh.creation.cylinder(5, 20, sections=180)), fixed=False)
@@ -26,7 +29,8 @@ def peg() -> tc.Assembly:
     a.locate(pin, [*ends, *cases.parked("X:-5,0,0:x", "Y1:0,-5,0:y", "Y2:4,-3,0:y")])
     a.force("push", at=pin.point(0, 0, 0), vector=(1, -2, 0))
     wall = plate.face(lambda c, n: (abs(n[:, 2]) < 0.1) & (np.hypot(c[:, 0], c[:, 1]) < 10))
-    a.contact("fit", moving=pin.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=wall, points=200)
+    hole = plate.feature("hole", wall, *size) if size else wall
+    a.contact("fit", moving=pin.face(lambda c, n: abs(n[:, 2]) < 0.1), reference=hole, points=200)
     a.measure("x", pin.point(0, 0, 0), along="x", tolerance=0.2)
     return a
 
@@ -43,6 +47,19 @@ def test_a_peg_that_rolled_into_the_wall_is_looked_for_again_with_points_project
     # The chord of 180 sides is off by 8e-4 mm.
     assert np.abs(np.linalg.norm(apart, axis=1) - FIT).max() < 1e-3
     assert np.abs(apart @ [1, -2] / np.sqrt(5) - FIT).max() < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_points_that_are_projected_anew_stand_on_the_face_as_it_came_out():
+    """The hole is larger by its size deviation: by half of it the peg goes farther, and touches."""
+    _, run = simulate(peg(tc.Size(10 + 2 * FIT, 2e-4, 0)), samples=6, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all() and (run["searched"] == 1).all()
+    _, t = R_t(run["poses"][:, CORRECTED])
+    apart = np.linalg.norm((t[:, 1] - t[:, 0])[:, :2], axis=1)
+    fit = FIT + run["deviations"][:, -1] / 2
+    assert np.ptp(fit) > 3e-5 and np.ptp(apart / fit) < 1e-5  # the chord adds the same share in all of them
+    assert np.abs(run["gap_min"][:, CORRECTED, 0]).max() < 1e-8
 
 
 def test_what_is_certified_near_is_tried_once_and_what_is_not_from_two_other_starts():

@@ -5,7 +5,8 @@ import numpy as np
 from tolcontact.compilation import ACCURACY
 from tolcontact.contact.record import initial_numbers
 from tolcontact.contact.repeated_steps import better_state
-from tolcontact.contact.state import State
+from tolcontact.contact.resolver import is_better
+from tolcontact.contact.state import Slots, State
 
 
 def state(residual, slack, *, doubtful=False):
@@ -49,3 +50,22 @@ def test_the_better_of_two_states_is_kept():
     assert found.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
     assert found.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
     assert better_state(None, here, inside).slack.tolist() == inside.tolist()
+
+
+def test_another_answer_is_preferred_by_its_rank_then_its_energy_or_its_depth():
+    certified, conflict, deeper, none = state(0.0, [0.0]), state(0.0, [0.01]), state(0.0, [0.02]), state(1.0, [0.0])
+
+    def preferred(answer, energy, best, best_energy):
+        return bool(is_better(answer, np.array([energy]), best, np.array([best_energy]))[0])
+
+    assert preferred(certified, 9.0, conflict, 1.0) and preferred(conflict, 9.0, none, 1.0)
+    assert not preferred(conflict, 1.0, certified, 9.0) and not preferred(none, 1.0, conflict, 9.0)
+    assert preferred(certified, 1.0, certified, 2.0) and not preferred(certified, 2.0, certified, 1.0)
+    assert not preferred(certified, 1.0, certified, 1.0)  # of two that are alike the first one stays
+    assert preferred(conflict, 2.0, deeper, 1.0) and not preferred(deeper, 1.0, conflict, 2.0)
+    assert not preferred(conflict, 1.0, conflict, 2.0) and not preferred(none, 1.0, none, 2.0)
+
+
+def test_a_point_that_changes_its_slot_keeps_its_reaction():
+    slots = Slots(np.array([[7, 3, 5]]), np.array([[True, True, False]]), np.array([[0.2, 0.9, 0.4]]))
+    assert slots.reactions_of(np.array([[3, 7, 5, 8]])).tolist() == [[0.9, 0.2, 0.0, 0.0]]  # the slot of 5 is not in use

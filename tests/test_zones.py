@@ -124,6 +124,26 @@ def test_capability_and_shifts():
     assert drawn.mean() == pytest.approx(0.03, abs=3e-4) and drawn.std() == pytest.approx(0.01, rel=0.02)
 
 
+def test_a_capability_off_centre_shifts_the_place_of_a_face_and_not_its_tilts():
+    block = toleranced.block_with("top", tc.Profile(0.3, "A", cp=1.5, cpk=1.2))
+    place, *tilts = [each for each in Draws(discretize(block)).contributors if each.layer is not None]
+    assert place.mean_shift == pytest.approx(3 * place.spread * 1.5 * (1 - 1.2 / 1.5), rel=1e-12) and len(tilts) == 2
+    assert [tilt.mean_shift for tilt in tilts] == [0, 0]
+
+
+def test_spreads_are_in_proportion_to_the_width_down_to_a_nanometre():
+    rows = np.random.default_rng(1).normal(size=(7, 2, 3))
+    inner, factor = np.array([0.05]), equal_spread(rows, np.array([0.05]), 2, 1.0)
+    for width in (1e3, 1e-3, 1e-6):
+        assert equal_spread(rows, inner * width, 2, width) == pytest.approx(factor * width, rel=1e-6)
+
+
+def test_a_feature_that_does_not_vary_is_inside_its_zone():
+    rows = np.random.default_rng(1).normal(size=(7, 2, 3))
+    assert share_inside(rows, np.zeros(3), 1e-3) == 1.0
+    assert share_inside(rows[:0], np.ones(3), 1e-3) == 1.0  # nor does one without points, whatever its components do
+
+
 def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
     """Tolerances of one feature share its freedoms: spreads are then those of the stricter one, whatever its rule is."""
 

@@ -156,17 +156,10 @@ class ContactResolver:
             attempt = self._step.start(poses, relative)
             self._attempt(part, attempt, start)
             accumulate_starts(state, rows, attempt)
-            better = self._is_better(part, attempt, state.take(rows))
+            best = state.take(rows)
+            better = is_better(attempt, self._energy_of(part, attempt), best, self._energy_of(part, best))
             state.put(rows[better], attempt.take(better))
             rows = rows[state.rank[rows] > 0]
-
-    def _is_better(self, task: Task, state: State, best: State) -> Bool[Array, " n"]:
-        """Return whether an answer has a lower rank than the best one so far, or the same and a better objective (n,)."""
-        energy, best_energy = self._energy_of(task, state), self._energy_of(task, best)
-        depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
-        is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
-        gains = np.where(state.rank == 0, is_lower, (state.rank == 1) & (depth < best_depth - MIN_GAIN))
-        return (state.rank < best.rank) | ((state.rank == best.rank) & gains)
 
     def _energy_of(self, task: Task, state: State) -> Float[Array, " n"]:
         return self._energy(poses=state.poses, raw=task.raw, moments=task.moments, deviations=task.deviations)
@@ -180,6 +173,17 @@ class ContactResolver:
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
         relative = self._relate(poses=poses, deviations=task.deviations)
         return poses, relative.reshape(len(task), len(self.pairs), -1)
+
+
+def is_better(state: State, energy: Float[Array, " n"], best: State, best_energy: Float[Array, " n"]) -> Bool[Array, " n"]:
+    """Return whether answers are better than the best ones so far (n,).
+
+    A lower rank is better. Of two certified answers the one with less energy (n,) is better, of two conflicts the less deep.
+    """
+    depth, best_depth = state.slack.max(axis=1), best.slack.max(axis=1)
+    is_lower = energy < best_energy - MIN_GAIN * np.abs(best_energy)
+    gains = np.where(state.rank == 0, is_lower, (state.rank == 1) & (depth < best_depth - MIN_GAIN))
+    return (state.rank < best.rank) | ((state.rank == best.rank) & gains)
 
 
 def checked_residual(state: State, depth: Float[Array, " n"]) -> Float[Array, " n"]:
