@@ -21,7 +21,7 @@ from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
 from tolcontact.contact import kernel
-from tolcontact.contact.scan import CompiledScan, PairScan, cluster_labels, pair_scan
+from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.mechanics.gap import gap_map, gap_matrix
 from tolcontact.mechanics.groups import contact_groups
@@ -201,26 +201,6 @@ def test_no_gap_of_a_box_is_below_its_bound_in_spite_of_rounding(offset, tilt):
         kernel.bounds(boxes, 0, 500, np.array([offset, slope]), middle, reach)
         gaps = offset + slope * np.concatenate([lower, upper])
         assert (gaps >= middle - reach).all() and (gaps <= middle + reach).all()
-
-
-@pytest.mark.parametrize("constant", [0.0, -7.0])
-def test_the_first_of_points_that_are_as_deep_is_taken(constant):
-    """On a lattice, where sums are exact: the gaps of many points, and the bounds of leaves without them, are one number."""
-    rng = np.random.default_rng(4)
-    for _ in range(20):
-        points = rng.integers(-6, 7, size=(2, 120, 8))
-        points[0] = np.sort(points[0], axis=0)  # leaves of points with much the same x, in any order
-        leaves = rng.permutation(points.swapaxes(0, 1)).swapaxes(0, 1).reshape(2, -1).astype(float)
-        count = leaves.shape[1]
-        scan = CompiledScan(
-            tables=(), P_m=np.zeros((count, 3)), offsets=Offsets.none(count), basis=np.eye(13)[:, :3], columns=np.zeros(0, int),
-            coordinates=np.vstack([np.ones(count), leaves]), P_r=np.zeros((count, 3)), n_r=np.zeros((count, 3)),
-            leaves=np.arange(0, count + 1, 8), branches=np.array([0, 30, 60, 90, 120]), clusters=np.array([0, 3, 4]),
-        )  # fmt: skip
-        relative = np.zeros((9, 12))
-        relative[:, 0], relative[:, 1:3] = constant, list(itertools.product([-1, 0, 2], [-1, 1, 2]))
-        found, expected = (kind.deepest(scan, relative, np.zeros((9, 0))) for kind in (CompiledScan, PairScan))
-        assert (found.points == expected.points).all() and (found.depth == expected.depth).all()
 
 
 @pytest.mark.parametrize(("coordinates", "corners"), [([[3.0, 1.0, 2.0, 5.0]], [1, 3]), ([], [0]), ([[2.0, 2.0]], [0])])
