@@ -91,7 +91,8 @@ def test_results_are_those_of_one_process(name, samples, method, client, tmp_pat
     assert_same(tmp_path / "two.nc", tmp_path / "one.nc")
 
 
-@pytest.mark.parametrize("workers", [1, *nightly(4)])
+@pytest.mark.nightly
+@pytest.mark.parametrize("workers", [1, 4])
 def test_results_do_not_depend_on_the_number_of_workers(workers, tmp_path):
     tc.run(cases.ra1(), samples=20_000, solver="qpoases", out=tmp_path / "one.nc", surfaces=4).close()
     with local_cluster(workers) as own:
@@ -124,7 +125,7 @@ def test_contributions_and_sensitivities_are_those_of_one_process(client):
 def test_searches_and_comparisons_are_those_of_one_process(client):
     program = tc.build(cases.ra1(), solver="daqp")
     for ask, model, options in (
-        (tc.worst_case, tc.build(cases.one_dimensional(6), solver="daqp"), {"samples": 32}),
+        (tc.worst_case, tc.build(cases.one_dimensional(6), solver="daqp"), {"samples": 8}),
         (tc.tails, program, {"samples": 4000}),
         (tc.allocate, program, {"require": "corner height: ppm 10000", "by": "part", "samples": 1024}),
     ):
@@ -165,7 +166,7 @@ def test_a_killed_run_goes_on_with_other_workers_and_leaves_none_behind(seed, tm
         "--surfaces",
         4,
         "--samples",
-        200_000,
+        120_000,
         "--keep",
         "poses",
         "--quiet",
@@ -252,11 +253,11 @@ def test_a_slow_network_changes_nothing(dask_processes, tmp_path):
         "worker", f"tcp://127.0.0.1:{port}", "--nthreads", 1, "--no-dashboard", "--no-nanny",
         "--listen-address", f"tcp://127.0.0.1:{own}", "--contact-address", f"tcp://127.0.0.1:{line.port}",
     )  # fmt: skip
-    options = {"samples": 20_000, "solver": "daqp", "surfaces": 4}
+    options = {"samples": 12_000, "solver": "daqp", "surfaces": 4}
     tc.run(cases.stack(), out=tmp_path / "whole.nc", **options).close()
     with running_cluster(f"tcp://127.0.0.1:{port}") as client:
         tc.run(cases.stack(), out=tmp_path / "run.nc", client=client, **options).close()
-    assert line.passed > 10e6
+    assert line.passed > 5e6
     assert_same(tmp_path / "run.nc", tmp_path / "whole.nc")
 
 

@@ -188,7 +188,7 @@ def test_a_newer_format_is_named(good, tmp_path):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",
-    [*NAMES[:1], "part_", "état", "x" * 200, *nightly(*NAMES[1:], "part__", "sum", "vertices", "e\u0301tat", "a b", "点")],
+    ["part_", "état", *nightly(*NAMES, "x" * 200, "part__", "sum", "vertices", "e\u0301tat", "a b", "点")],
 )
 def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
     a = tc.Assembly(name)

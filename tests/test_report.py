@@ -13,7 +13,7 @@ from playwright.sync_api import sync_playwright
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import call, nightly
 from tests.test_formats import STORED
 from tolcontact.report import grouped, write_page
 from tolcontact.report.html import decimation
@@ -175,7 +175,7 @@ def picture(page):
 
 @pytest.mark.slow
 @needs_browser
-@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("width", [1280, *nightly(390)])
 def test_the_page_is_used(archive, page, width, open_page):
     opened = open_page(page, width)
     assert opened.evaluate("document.documentElement.scrollWidth") <= width

@@ -72,7 +72,7 @@ def test_a_limit_far_out_is_exceeded_as_often_as_the_closed_form_says():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("samples", [60_000, *nightly(200_000)])
+@pytest.mark.parametrize("samples", [40_000, *nightly(200_000)])
 def test_ra1_as_a_run_counts_it(samples):
     """An event that a run still sees."""
     a = cases.ra1()

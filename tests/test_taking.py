@@ -120,7 +120,7 @@ def test_an_interrupted_run_says_how_far_it_is_has_its_fields_and_goes_on(tmp_pa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("by", "code"), [(signal.SIGINT, 130), *nightly((signal.SIGTERM, 143))])
 def test_a_command_that_is_stopped_says_how_to_go_on_and_leaves_nothing_else(by, code, tmp_path):
     begun = begin(tmp_path, "--samples", 10_000_000, "--out", "stopped.nc", "--keep", "measures")
     while begun.poll() is None and not finished(tmp_path / "stopped.nc"):
