@@ -15,7 +15,9 @@ from tolcontact.mechanics.quiet import quiet
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("solver", usable_plugins())
+@pytest.mark.parametrize(
+    "solver", ["daqp", "qpoases", *nightly(*(name for name in usable_plugins() if name not in ("daqp", "qpoases")))]
+)
 @pytest.mark.parametrize("case", ["block on six", *nightly("parked")])
 def test_solvers_print_nothing(solver, case, capfd):
     a = {"block on six": lambda: cases.block_on_six(1.0), "parked": cases.shaft_in_a_v}[case]()
