@@ -15,7 +15,7 @@ import xarray as xr
 import tolcontact as tc
 from tolcontact.cli import command_line
 from tolcontact.compilation import ContactGroup
-from tolcontact.compilation.contact_qp import contact_program
+from tolcontact.compilation.contact_qp import contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.simulation import Block, simulate_blocks
 
@@ -46,7 +46,7 @@ def recompiled(program, *, plugin=None, standing=None):
     plugin, groups = plugin or program.plugin, [group.group for group in program.groups]
     rows = [() if standing is None else [standing[pair] for pair in group.pairs] for group in groups]
     qps = [
-        contact_program(program.nominal, group, program.gaps, program.method, plugin, points)
+        contact_qp(program.nominal, group, program.gaps, program.method, plugin, points)
         for group, points in zip(groups, rows, strict=True)
     ]
     solved = tuple(ContactGroup(group, qp, ContactSolver(qp)) for group, qp in zip(groups, qps, strict=True))

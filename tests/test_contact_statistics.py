@@ -69,7 +69,7 @@ def test_the_page_shows_where_contact_is(tmp_path, open_page):  # noqa: F811 (a 
     opened = open_page(tmp_path / "ra1.html")
     opened.select_option("#field", "touching")
     assert opened.locator("#high").inner_text() == "1" and opened.locator("#units").inner_text() == "of realizations"
-    drawn = opened.evaluate("Array.from(stage.pairs[0].points.geometry.getAttribute('color').array.slice(0, 3))")
+    drawn = opened.evaluate("Array.from(viewer.pairs[0].points.geometry.getAttribute('color').array.slice(0, 3))")
     share = touching(results)["touching"].sel(interval="estimate").values[0]
     table = opened.evaluate("TABLES.get(VIRIDIS)")
     assert drawn == pytest.approx(table[round(255 * share)], abs=0.01)
@@ -78,4 +78,4 @@ def test_the_page_shows_where_contact_is(tmp_path, open_page):  # noqa: F811 (a 
     assert float(opened.locator("#high").inner_text()) == pytest.approx(mean, rel=1e-3)
     assert data_of((tmp_path / "ra1.html").read_text())["scene"]["reactionUnits"] == opened.locator("#units").inner_text()
     opened.select_option("#field", "sixSigma")
-    assert opened.evaluate("stage.pairs[0].material.vertexColors") is False
+    assert opened.evaluate("viewer.pairs[0].material.vertexColors") is False

@@ -51,7 +51,7 @@ def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method)
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal):
         gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
-        program = contact_qp.contact_program(nominal, group, gaps, method, plugin("daqp"))
+        program = contact_qp.contact_qp(nominal, group, gaps, method, plugin("daqp"))
         for function in (program.assemble, program.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
             for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):
@@ -101,7 +101,7 @@ def test_few_rows_give_what_all_rows_give(name, resolution):
     make = EVERY[name]
     few = tc.build(make(), solver="daqp", method=tc.Method(resolution=resolution))
     every = recompiled(few, standing=[np.arange(len(pair.P_m)) for pair in few.nominal.pairs])
-    assert any(len(g.program.standing[0]) > 4 for g in every.groups)
+    assert any(len(g.qp.standing[0]) > 4 for g in every.groups)
     blocks = [next(simulate_blocks(program, samples=24, seed=8)) for program in (few, every)]
     assert (blocks[0].status == blocks[1].status).all()
     apart = np.abs(blocks[0].poses - blocks[1].poses).max(axis=(1, 2, 3))

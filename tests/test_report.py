@@ -161,7 +161,7 @@ def open_page(browser):
         )
         opened.goto(path.as_uri())
         opened.wait_for_selector(drawn)
-        opened.wait_for_function(f"window.stage !== undefined || {json.dumps(drawn)} !== '#scene'")
+        opened.wait_for_function(f"window.viewer !== undefined || {json.dumps(drawn)} !== '#scene'")
         return opened
 
     yield open_
@@ -207,7 +207,7 @@ def test_the_page_is_used(archive, page, width, open_page):
     opened.locator("input[name=state][value='0']").check()
     assert picture(opened) != moved
     opened.select_option("#across", "x")
-    assert opened.evaluate("stage.parts[0].materials[0].clippingPlanes.length") == 1
+    assert opened.evaluate("viewer.parts[0].materials[0].clippingPlanes.length") == 1
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tolcontact.discretization import discretize
-from tolcontact.mechanics.correction import Carried, increments, linear, published, rigid
+from tolcontact.mechanics.correction import Mobility, increments, linear, published, rigid
 from tolcontact.mechanics.displacement import displacement_energy, moment_table
 from tolcontact.mechanics.gap import gap_matrix
 from tolcontact.mechanics.measures import record, replay
@@ -45,7 +45,7 @@ def test_energy_from_moments_is_the_sum_over_points():
     points, centre = RNG.normal(size=(40, 3)) * 20, np.array([3.0, -1, 2])
     R, t = random_pose()
     z = ca.SX.sym("z", 6)
-    part, raw = Carried((0,), centre, False), Pose(ca.SX(R), ca.SX(t))
+    part, raw = Mobility((0,), centre, False), Pose(ca.SX(R), ca.SX(t))
     moves = increments(z, 10.0, [raw.apply(ca.DM(centre))])
     energy = displacement_energy(ca.SX(moment_table(points, centre).sum(axis=1)), centre, raw, linear(part, raw, moves))
     step = RNG.normal(size=6)
@@ -60,7 +60,7 @@ def test_corrected_pose_moves_points_by_the_increment_to_first_order(update, is_
     centre, point = np.array([10.0, 5, -3]), RNG.normal(size=3) * 10
     z = ca.SX.sym("z", 6)
     raw = Pose(ca.SX(R), ca.SX(t))
-    part = Carried((0,), centre, is_reference)
+    part = Mobility((0,), centre, is_reference)
     moves = increments(z, 5.0, [raw.apply(ca.DM(centre))])
     moved = ca.Function("x", [z], [update(part, raw, moves).apply(ca.DM(point)), update(part, raw, moves).R])
     step = RNG.normal(size=6) * 1e-4

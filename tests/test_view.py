@@ -104,7 +104,7 @@ def test_faces_are_picked(tmp_path, open_page):  # noqa: F811
     box = opened.locator("#scene").bounding_box()
     opened.mouse.click(box["x"] + 5, box["y"] + 5)
     assert "Click on a face" in opened.locator("#said").inner_text()
-    place = opened.evaluate("new THREE.Vector3(50, 25, 20).project(stage.camera).toArray()")
+    place = opened.evaluate("new THREE.Vector3(50, 25, 20).project(viewer.camera).toArray()")
     opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
     said = opened.locator("#said").inner_text()
     assert said.startswith("part box\n") and 'face("+z")\npoint(' in said and said.endswith("on it")
@@ -120,7 +120,7 @@ def test_points_are_picked_in_the_parts_own_frame(tmp_path, open_page):  # noqa:
     box = opened.locator("#scene").bounding_box()
     for own in ((99.5, 0.5, 20), (50, 25, 20)):
         at = [30 - own[1], -20 + own[0], 5 + own[2]]  # turned to the left
-        place = opened.evaluate(f"new THREE.Vector3(...{at}).project(stage.camera).toArray()")
+        place = opened.evaluate(f"new THREE.Vector3(...{at}).project(viewer.camera).toArray()")
         opened.mouse.click(box["x"] + (1 + place[0]) / 2 * box["width"], box["y"] + (1 - place[1]) / 2 * box["height"])
         words = opened.locator("#said").inner_text().splitlines()[-1]
         found = [float(x) for x in re.search(r"point\((.*)\)", words)[1].split(", ")]
@@ -138,4 +138,4 @@ def test_features_are_named_where_they_are(tmp_path, open_page):  # noqa: F811
     opened = open_page(tmp_path / "lid.html")
     before = picture(opened)
     opened.check("#features")
-    assert picture(opened) != before and opened.evaluate("stage.marks.features.children.length") == 8
+    assert picture(opened) != before and opened.evaluate("viewer.marks.features.children.length") == 8

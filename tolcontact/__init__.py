@@ -18,9 +18,9 @@ measure with and without contact, each figure with a 95 % confidence interval. L
 
 ## The guide
 
-Each stage of a run is a package, and its documentation is a chapter: read them in this order.
+Each phase of a run is a package, and its documentation is a chapter: read them in this order.
 
-| stage | chapter | subject |
+| phase | chapter | subject |
 |---|---|---|
 | declare | `tolcontact.declaration` | parts, faces, locators, features, tolerances, contact pairs, forces, measures |
 | read shapes | `tolcontact.geometry` | meshes, STEP files, faces and their surfaces |

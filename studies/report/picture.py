@@ -31,7 +31,7 @@ def main() -> None:
         )
         opened = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
         opened.goto(page.as_uri())
-        opened.wait_for_function("window.stage !== undefined")
+        opened.wait_for_function("window.viewer !== undefined")
         opened.add_style_tag(content=SMALLER)
         opened.wait_for_timeout(1000)
         taken = opened.screenshot()

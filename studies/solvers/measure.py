@@ -91,7 +91,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
     finally:
         contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]
         contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined, method-assign]
-    functions = program.groups[0].program
+    functions = program.groups[0].qp
     h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
     for one in found:
         one["H"], one["A"] = ca.DM(h, one["h"]).full(), ca.DM(a, one["a"]).full()

@@ -104,7 +104,7 @@ def _freedoms(program: Program) -> list[tuple[Group, int, int]]:
 
 def _moves(group: Group, mover: int, axis: int, points: np.ndarray) -> np.ndarray:
     """Return displacements (point, 3) for a step 1 of a freedom."""
-    centre = group.carried[group.position(group.free[mover])].centre
+    centre = group.mobilities[group.position(group.free[mover])].centre
     unit = np.eye(3)[axis % 3]
     return np.broadcast_to(unit, points.shape) if axis < 3 else np.cross(unit / group.length, points - centre)
 
@@ -116,8 +116,8 @@ def _motions(program: Program, sign: int) -> np.ndarray:
     for row, (group, mover, axis) in enumerate(freedoms):
         origin, *ends = _moves(group, mover, axis, np.vstack([np.zeros(3), np.eye(3)]))
         turn = np.column_stack([end - origin for end in ends])
-        for part, carried in zip(group.parts, group.carried, strict=True):
-            if mover in carried.movers:
+        for part, mobility in zip(group.parts, group.mobilities, strict=True):
+            if mover in mobility.movers:
                 poses[row, part] += sign * STEP * np.concatenate([turn.ravel(), origin])
     return poses.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts))
 
@@ -145,7 +145,7 @@ def _displacements(program: Program) -> np.ndarray:
     for compiled in program.groups:
         count = sum(len(side.points) for side in compiled.group.sides)
         for side in compiled.group.sides:
-            movers = compiled.group.carried[side.part].movers
+            movers = compiled.group.mobilities[side.part].movers
             columns = [
                 _moves(group, mover, axis, side.points).ravel() / np.sqrt(2 * count)
                 if group is compiled.group and mover in movers

@@ -61,12 +61,12 @@ def is_convex(Q: ca.SX) -> ca.SX:
     return ca.mmin(ca.if_else(pivots > 0, 1, 0))
 
 
-Standing = Sequence[np.ndarray | None]  # see ContactProgram
+Standing = Sequence[np.ndarray | None]  # see ContactQP
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
 
 
 @dataclass(frozen=True, eq=False)
-class ContactProgram:
+class ContactQP:
     """The Functions of a group: `assemble` makes the QP of the inputs, `plugin` solves it, `finish` makes the outputs.
 
     energy       the objective at `poses` (realization, 1) [mm^2], or [mm] for seating: of poses, raw, moments, deviations
@@ -85,7 +85,7 @@ class ContactProgram:
     equations: int
     standing: Standing
 
-    def qp(self, plugin: Plugin) -> ca.Function:
+    def solver(self, plugin: Plugin) -> ca.Function:
         """Return a new solver of a plugin, without memory of any problem."""
         return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
 
@@ -96,9 +96,9 @@ class ContactProgram:
         return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
-def contact_program(
+def contact_qp(
     nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing = ()
-) -> ContactProgram:
+) -> ContactQP:
     """Return the Functions of a group.
 
     `standing` holds the points of each pair of the group that always have a row, by default those of `standing_points`.
@@ -122,8 +122,8 @@ def contact_program(
         **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
     )  # fmt: skip
     current = poses_of(inputs["poses"])
-    centres = [current[k].apply(ca.DM(group.carried[k].centre)) for k in map(group.position, group.free)]
-    motion = Motion(group.carried, current, increments(setting.z, group.length, centres))
+    centres = [current[k].apply(ca.DM(group.mobilities[k].centre)) for k in map(group.position, group.free)]
+    motion = Motion(group.mobilities, current, increments(setting.z, group.length, centres))
     moved = motion.by(linear)
     rows = contact_rows(setting, standing, current, moved, inputs)
     goal = energy(setting, moved)
@@ -138,7 +138,7 @@ def contact_program(
     poses = motion.by(rigid if method.is_exact else published)
     solution_symbols, results = outcome(setting, goal, rows, poses, problem, inputs["stride"])
     pure_energy = ca.substitute(setting.at_rest(goal.value), setting.firmness, 1)
-    return ContactProgram(
+    return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,
         finish=_function("finish", inputs | solution_symbols, results),

@@ -63,7 +63,7 @@ def contact_rows(
     end_poses: Sequence[Pose],
     inputs: Mapping[str, ca.SX],
 ) -> Rows:
-    """Return the rows about `start_poses`, which the increments change to `end_poses`; see contact_program for `inputs`."""
+    """Return the rows about `start_poses`, which the increments change to `end_poses`; see contact_qp for `inputs`."""
     slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
     slopes: list[ca.SX] = []
     pairs: list[int] = []

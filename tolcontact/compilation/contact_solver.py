@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from tolcontact.arrays import Array, Float
-from tolcontact.compilation.contact_qp import ContactProgram
+from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.functions import InterpretedFunction, NamedFunction, flat
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
@@ -77,13 +77,13 @@ Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 
 
 class ContactSolver:
-    """A solver of the QPs of a ContactProgram. Threads must not share it."""
+    """A solver of the QPs of a ContactQP. Threads must not share it."""
 
-    def __init__(self, program: ContactProgram) -> None:
-        self._program = program
-        self._assemble, self._finish = NamedFunction(program.assemble), NamedFunction(program.finish)
-        self._energy, self._relate = (NamedFunction.dense(function) for function in (program.energy, program.relate))
-        self._plugin = program.plugin
+    def __init__(self, qp: ContactQP) -> None:
+        self._qp = qp
+        self._assemble, self._finish = NamedFunction(qp.assemble), NamedFunction(qp.finish)
+        self._energy, self._relate = (NamedFunction.dense(function) for function in (qp.energy, qp.relate))
+        self._plugin = qp.plugin
         self.start_over()
 
     def twin(self) -> "ContactSolver":
@@ -94,11 +94,11 @@ class ContactSolver:
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
-        self._solver: _PluginSolver = _PluginSolver(self._program, self._plugin)
+        self._solver: _PluginSolver = _PluginSolver(self._qp, self._plugin)
         self._fallbacks: dict[str, _PluginSolver] = {}
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
-        """Return the outputs of contact_program by name, (realization, entry), for its inputs by name, (realization, ...).
+        """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
         A further output is `second` (realization, 1): whether another plugin had to answer. Other plugins solve the problems
         that this plugin misses, without curvature. If all fail, `residual` is infinite, and other outputs may be NaN.
@@ -111,7 +111,7 @@ class ContactSolver:
             if not lost.size:
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _PluginSolver(self._program, PLUGINS[name])
+                self._fallbacks[name] = _PluginSolver(self._qp, PLUGINS[name])
             retry = self._solved(self._fallbacks[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
             retry["second"] = np.ones((len(lost), 1))
             better = retry["residual"][:, 0] < answer["residual"][lost, 0]
@@ -121,7 +121,7 @@ class ContactSolver:
         return answer
 
     def energy(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, " realization"]:
-        """Return the objective (realization,) at poses, for raw poses, moments and deviations (see ContactProgram)."""
+        """Return the objective (realization,) at poses, for raw poses, moments and deviations (see ContactQP)."""
         return self._energy(**arrays)["energy"][:, 0]
 
     def relative(self, **arrays: Float[Array, "realization ..."]) -> Float[Array, "realization _"]:
@@ -157,11 +157,11 @@ class ContactSolver:
 
     def _polished(self, problem: Arrays, solution: Arrays) -> Arrays:
         dense = {name: self._dense(name, problem[name]) for name in ("h", "g", "a", "lba")}
-        return polished(dense, solution, self._program.equations, self._program.slacks)
+        return polished(dense, solution, self._qp.equations, self._qp.slacks)
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
-        sparsity = self._program.assemble.sparsity_out(name)
+        sparsity = self._qp.assemble.sparsity_out(name)
         columns = np.zeros((len(stored), sparsity.numel()))
         columns[:, sparsity.find()] = stored
         if sparsity.size2() == 1:
@@ -172,19 +172,19 @@ class ContactSolver:
 class _PluginSolver:
     """A plugin's solver with its own memory."""
 
-    def __init__(self, program: ContactProgram, plugin: Plugin) -> None:
+    def __init__(self, qp: ContactQP, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
-            qp = program.qp(plugin)
-        self._inputs = [name for name in qp.name_in() if name in QP]
-        self._results = [qp.name_out().index(name) for name in SOLUTION]
-        lower_bounds = np.zeros(qp.numel_in("g"))
-        lower_bounds[: -program.slacks] = -np.inf
+            solver = qp.solver(plugin)
+        self._inputs = [name for name in solver.name_in() if name in QP]
+        self._results = [solver.name_out().index(name) for name in SOLUTION]
+        lower_bounds = np.zeros(solver.numel_in("g"))
+        lower_bounds[: -qp.slacks] = -np.inf
         bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
         # The other inputs are zero: starting points that no plugin uses.
-        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(qp.name_in()) if name not in QP}
+        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(solver.name_in()) if name not in QP}
         with CONSTRUCTION_LOCK, quiet():
-            self._solve = InterpretedFunction(qp, fixed_inputs)
+            self._solve = InterpretedFunction(solver, fixed_inputs)
 
     def __call__(self, problem: Arrays, reactions: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.

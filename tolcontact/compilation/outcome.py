@@ -24,7 +24,7 @@ def outcome(
     problem: Mapping[str, ca.SX],
     stride: ca.SX,
 ) -> tuple[dict[str, ca.SX], dict[str, ca.SX]]:
-    """Return symbols of the QP and its solution, and the outputs of contact_program as expressions of them.
+    """Return symbols of the QP and its solution, and the outputs of contact_qp as expressions of them.
 
     `poses` are those after z. The QP's matrices are inputs, so that nothing is computed twice and the residuals are those of
     the QP that was solved.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.contact_qp import ContactProgram, contact_program
+from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
@@ -31,10 +31,10 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, eq=False)
 class ContactGroup:
-    """A group of coupled parts and its QP (see contact_program)."""
+    """A group of coupled parts and its QP (see contact_qp)."""
 
     group: Group
-    program: ContactProgram
+    qp: ContactQP
     solve: ContactSolver
 
 
@@ -119,9 +119,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             observe=NamedFunction.dense(observe),
             gaps=gaps,
             round_gaps={k: NamedFunction.dense(function) for k, function in round_functions.items()},
-            groups=tuple(
-                _contact_group(group, contact_program(nominal, group, gaps, method, conic_plugin)) for group in groups
-            ),
+            groups=tuple(_contact_group(group, contact_qp(nominal, group, gaps, method, conic_plugin)) for group in groups),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -137,12 +135,12 @@ def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca
     return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
 
 
-def _contact_group(group: Group, program: ContactProgram) -> ContactGroup:
-    return ContactGroup(group, program, ContactSolver(program))
+def _contact_group(group: Group, qp: ContactQP) -> ContactGroup:
+    return ContactGroup(group, qp, ContactSolver(qp))
 
 
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
-    moved = {part for group in groups for part, carried in zip(group.parts, group.carried, strict=True) if carried.movers}
+    moved = {part for group in groups for part, mobility in zip(group.parts, group.mobilities, strict=True) if mobility.movers}
     faults = [
         f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
         "leave the force out, or declare the part free, with its contacts"

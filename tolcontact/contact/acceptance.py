@@ -29,7 +29,7 @@ class Limits:
         self._presses = method.minimizes.presses
         self._size, self._max_travel = size, method.near_travel * size
         self._max_turn = 8 * np.sin(method.near_turn / 2) ** 2  # |R - S|^2 of rotations that far apart
-        self._movers = [k for k, carried in enumerate(group.carried) if carried.movers]
+        self._movers = [k for k, mobility in enumerate(group.mobilities) if mobility.movers]
         self._group_pairs = [nominal.pairs[index] for index in group.pairs]
         self._max_depth = min(DEPTH_SIZES * size, DEPTH_SHARE * nominal.assembly.smallest_zone())
         self._round = {}

@@ -111,7 +111,7 @@ class Candidates:
     def __init__(self, program: Program, group: ContactGroup) -> None:
         self._method = program.method
         self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
-        self._standing, self._spans = group.program.standing, group.program.spans
+        self._standing, self._spans = group.qp.standing, group.qp.spans
         self._varying = [k for k, points in enumerate(self._standing) if points is None]
         self._all_scans: list[Scan] = []
         self._carrying_scans: list[Scan] = []

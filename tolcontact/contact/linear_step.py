@@ -37,8 +37,8 @@ class LinearStep:
         self._solve = group.solve
         self._remembers = program.plugin.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
-        self.spans = group.program.spans
-        self.varying = [k for k, points in enumerate(group.program.standing) if points is None]
+        self.spans = group.qp.spans
+        self.varying = [k for k, points in enumerate(group.qp.standing) if points is None]
         # The curvature of walls around round faces counts in every step, not in Newton's alone.
         self.knows_walls = any(program.nominal.pairs[pair].round for pair in group.group.pairs)
 

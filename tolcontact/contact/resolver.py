@@ -167,9 +167,9 @@ class ContactResolver:
     def _at_nominal(self, task: Task) -> tuple[np.ndarray, np.ndarray]:
         """Return poses and X_RM with the free parts, and the parts located on them, in their nominal places."""
         poses = task.raw.copy()
-        for k, carried in enumerate(self._group.carried):
-            if carried.movers:
-                lowest = self._group.position(self._group.free[carried.movers[0]])
+        for k, mobility in enumerate(self._group.mobilities):
+            if mobility.movers:
+                lowest = self._group.position(self._group.free[mobility.movers[0]])
                 poses[:, k] = pose.relative(task.raw[:, k], task.raw[:, lowest])
         relative = self._relate(poses=poses, deviations=task.deviations)
         return poses, relative.reshape(len(task), len(self.pairs), -1)

@@ -12,8 +12,8 @@ FREEDOMS = 6
 
 
 @dataclass(frozen=True, eq=False)
-class Carried:
-    """A part of a group, with the free parts that move it.
+class Mobility:
+    """How a part of a group can move: by the increments of free parts.
 
     movers    positions, among the group's movers, of the free parts whose increments move it; parts it is located on come first
     centre    nominal point (3,) [mm] about which its increments turn: the centroid of its contact points
@@ -46,13 +46,13 @@ class Twist:
 class Motion:
     """The increments of the movers of a group, about the present `poses` of its parts."""
 
-    carried: Sequence[Carried]
+    mobilities: Sequence[Mobility]
     poses: Sequence[Pose]
     movers: Sequence[Twist]
 
-    def by(self, update: Callable[[Carried, Pose, Sequence[Twist]], Pose]) -> list[Pose]:
+    def by(self, update: Callable[[Mobility, Pose, Sequence[Twist]], Pose]) -> list[Pose]:
         """Return the poses after the increments, by the rule `linear`, `rigid`, `quadratic` or `published`."""
-        return [update(part, X, self.movers) for part, X in zip(self.carried, self.poses, strict=True)]
+        return [update(part, X, self.movers) for part, X in zip(self.mobilities, self.poses, strict=True)]
 
 
 def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:
@@ -60,20 +60,20 @@ def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[T
     return [Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)]
 
 
-def linear(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+def linear(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
     """Return the pose after the increments to first order, affine in them: R <- (I + [W]x) R, paper (12)."""
     twist = _total(part, X, movers)
     return twist.moving(X, ca.SX.eye(3) + ca.skew(twist.W))
 
 
-def rigid(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Return the pose after rigid motions R <- exp([w]x) R: those of the part itself, then of the parts that carry it."""
+def rigid(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
+    """Return the pose after rigid motions R <- exp([w]x) R: first its own, then of the parts that it is located on."""
     for mover in reversed(part.movers):
         X = movers[mover].moving(X, rotation(movers[mover].W))
     return X
 
 
-def quadratic(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+def quadratic(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
     """Return the pose of `rigid` to second order in the increments."""
     for mover in reversed(part.movers):
         K = ca.skew(movers[mover].W)
@@ -81,7 +81,7 @@ def quadratic(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
     return X
 
 
-def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
+def published(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
     """Return the pose of paper (12), which keeps the linearized gap exactly; a part that others rest on turns by exp([W]x).
 
     Equation (12) would stretch a reference part, and its normals (4) would no longer be normal to it. To first order both
@@ -93,7 +93,7 @@ def published(part: Carried, X: Pose, movers: Sequence[Twist]) -> Pose:
     return twist.moving(X, rotation(twist.W))
 
 
-def _total(part: Carried, X: Pose, movers: Sequence[Twist]) -> Twist:
+def _total(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Twist:
     """Return the sum of the twists of all movers of a part, about the part's own centre."""
     c = X.apply(ca.DM(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
-from tolcontact.mechanics.correction import Carried
+from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
 
 BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point represents
@@ -40,7 +40,7 @@ class Group:
 
     parts, pairs     indices into the nominal model's
     free             indices of the movers among all parts
-    carried          one per part of `parts`
+    mobilities       one per part of `parts`
     sides            sides of pairs that enter the objective, in the order of the Function's moments
     length           root mean square distance of the contact points from their centroid [mm]
     """
@@ -48,7 +48,7 @@ class Group:
     parts: tuple[int, ...]
     pairs: tuple[int, ...]
     free: tuple[int, ...]
-    carried: tuple[Carried, ...]
+    mobilities: tuple[Mobility, ...]
     sides: tuple[Side, ...]
     length: float
 
@@ -120,8 +120,8 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
         parts=parts,
         pairs=tuple(index for index, _ in members),
         free=free,
-        carried=tuple(
-            Carried(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
+        mobilities=tuple(
+            Mobility(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
         ),
         sides=tuple(sides),
         length=spread or float(nominal.parts[members[0][1].moving].mesh.scale),

@@ -72,7 +72,7 @@ def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
     work, total = ca.SX(0), 0.0
     for force in nominal.assembly.forces:
         part = nominal.part_index(force.at.part)
-        if part in group.parts and group.carried[group.position(part)].movers:
+        if part in group.parts and group.mobilities[group.position(part)].movers:
             p, k = ca.DM(nominal.position(force.at)), group.position(part)
             work += ca.dot(ca.DM(np.array(force.vector)), poses[k].apply(p) - setting.raw[k].apply(p))
             total += float(np.linalg.norm(force.vector))
@@ -113,15 +113,15 @@ _REGULARIZATIONS = {"points": _point_energies, "identity": _identity_energies}
 
 
 def _side_energy(setting: Setting, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
-    """Return the displacement energy of all points of a side, relative to the free part that carries it, if there is one."""
+    """Return the displacement energy of all points of a side, relative to the free part that it is located on, if any."""
     group, part = setting.group, side.part
     moments = ca.SX(side.ball_moments(group.ball))
-    carriers = group.carried[part].movers[:-1]
-    if not carriers:
+    supporting = group.mobilities[part].movers[:-1]
+    if not supporting:
         return displacement_energy(moments, side.centre, start[part], end[part])
-    carrier = group.position(group.free[carriers[-1]])
-    end_relative = setting.linear(relative(end[part], end[carrier]))
-    return displacement_energy(moments, side.centre, relative(start[part], start[carrier]), end_relative)
+    support = group.position(group.free[supporting[-1]])
+    end_relative = setting.linear(relative(end[part], end[support]))
+    return displacement_energy(moments, side.centre, relative(start[part], start[support]), end_relative)
 
 
 def _count(setting: Setting) -> int:

@@ -22,8 +22,8 @@ from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
 SCRIPTS = {
-    "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "stage.js", "charts.js", "report.js"),
-    "view": ("vendor/three.min.js", "data.js", "stage.js", "view.js"),
+    "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "viewer.js", "charts.js", "report.js"),
+    "view": ("vendor/three.min.js", "data.js", "viewer.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
 }
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",

@@ -3,7 +3,7 @@
 
 const OF_CONTACT = ["touching", "reaction"];
 
-function drive(stage) {
+function drive(viewer) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
   const gaps = unpacked(one.gaps), measured = unpacked(one.measured), residual = unpacked(one.residual).values;
   const state = () => Number(document.querySelector("input[name=state]:checked").value);
@@ -12,8 +12,8 @@ function drive(stage) {
 
   function painted() {
     const name = byId("field").value, isOfContact = OF_CONTACT.includes(name);
-    const bodies = stage.paint(isOfContact ? "" : name, Number(byId("component").value), state());
-    const points = stage.paintContacts(isOfContact ? name : ""), range = isOfContact ? points : bodies;
+    const bodies = viewer.paint(isOfContact ? "" : name, Number(byId("component").value), state());
+    const points = viewer.paintContacts(isOfContact ? name : ""), range = isOfContact ? points : bodies;
     byId("bar").hidden = !range;
     if (!range) return;
     byId("low").textContent = figure(range.low);
@@ -25,7 +25,7 @@ function drive(stage) {
   function moved() {
     if (!byId("single").checked) {
       byId("said").textContent = "";
-      return stage.move(null);
+      return viewer.move(null);
     }
     const k = Number(byId("which").value), seen = Math.min(state(), CORRECTED), pairs = gaps.shape[2];
     const own = Array.from(gaps.values.subarray((k * 2 + seen) * pairs, (k * 2 + seen + 1) * pairs));
@@ -37,7 +37,7 @@ function drive(stage) {
     byId("said").textContent = [
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
-    return stage.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
+    return viewer.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
   }
 
   const both = () => { painted(); moved(); };
@@ -158,9 +158,9 @@ for (const measure of data.charts) {
 data.contributions.forEach(contributions);
 relations();
 try {
-  window.stage = new Stage(data.scene);
-  control(window.stage);
-  drive(window.stage);
+  window.viewer = new Viewer(data.scene);
+  control(window.viewer);
+  drive(window.viewer);
 } catch (error) {
   byId("scene").replaceWith(`The assembly cannot be drawn here: ${error.message}`);
   console.warn(error);

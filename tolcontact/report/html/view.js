@@ -4,36 +4,36 @@
 const GAP_TOLERANCE = 1e-6; // mm
 const SNAP_DISTANCE = 0.03; // of the size of the assembly, between a click and a corner
 
-function pick(stage) {
+function pick(viewer) {
   const ray = new THREE.Raycaster(), place = new THREE.Vector2();
   let pressed = null;
-  stage.canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
-  stage.canvas.addEventListener("pointerup", (event) => {
+  viewer.canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
+  viewer.canvas.addEventListener("pointerup", (event) => {
     if (!pressed || Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return; // it was turned
-    const box = stage.canvas.getBoundingClientRect();
+    const box = viewer.canvas.getBoundingClientRect();
     place.set((2 * (event.clientX - box.left)) / box.width - 1, 1 - (2 * (event.clientY - box.top)) / box.height);
-    ray.setFromCamera(place, stage.camera);
-    const shown = stage.parts.filter((part) => part.group.visible);
-    const inside = (hit) => !stage.parts[0].materials[0].clippingPlanes.length || stage.section.distanceToPoint(hit.point) >= 0;
+    ray.setFromCamera(place, viewer.camera);
+    const shown = viewer.parts.filter((part) => part.group.visible);
+    const inside = (hit) => !viewer.parts[0].materials[0].clippingPlanes.length || viewer.section.distanceToPoint(hit.point) >= 0;
     const hit = ray.intersectObjects(shown.map((part) => part.mesh)).find(inside);
-    choose(stage, hit && stage.parts.find((part) => part.mesh === hit.object), hit);
+    choose(viewer, hit && viewer.parts.find((part) => part.mesh === hit.object), hit);
   });
 }
 
-function choose(stage, part, hit) {
-  stage.paint("", 3, CORRECTED);
+function choose(viewer, part, hit) {
+  viewer.paint("", 3, CORRECTED);
   if (!part) {
     byId("said").textContent = "Click on a face for its selector and the point.";
     return;
   }
-  const known = data.scene.parts[stage.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
+  const known = data.scene.parts[viewer.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
   const number = faces[hit.faceIndex], face = known.described[number];
   const colour = part.mesh.geometry.getAttribute("color"), red = new THREE.Color("#f59e0b").toArray();
   faces.forEach((own, triangle) => {
     if (own === number) for (const corner of [0, 1, 2]) colour.setXYZ(3 * triangle + corner, ...red);
   });
   colour.needsUpdate = true;
-  stage.draw();
+  viewer.draw();
   byId("said").textContent = [`part ${part.name}`, face.said, face.words, pointAt(known, part, hit)].join("\n");
 }
 
@@ -42,16 +42,16 @@ function pointAt(known, part, hit) {
   const place = part.mesh.geometry.getAttribute("position");
   const corners = [0, 1, 2].map((corner) => new THREE.Vector3().fromBufferAttribute(place, 3 * hit.faceIndex + corner));
   const nearest = corners.reduce((one, other) => (other.distanceTo(hit.point) < one.distanceTo(hit.point) ? other : one));
-  const isNear = nearest.distanceTo(hit.point) < SNAP_DISTANCE * stage.size;
+  const isNear = nearest.distanceTo(hit.point) < SNAP_DISTANCE * viewer.size;
   const [a, b] = [(isNear ? nearest : hit.point).toArray(), known.placement];
   const off = a.map((x, k) => x - b[9 + k]);
   const own = [0, 1, 2].map((k) => off[0] * b[k] + off[1] * b[3 + k] + off[2] * b[6 + k]); // R transposed
   return `point(${own.map((x) => Number(x.toFixed(3)) + 0).join(", ")})${isNear ? "" : " on it"}`;
 }
 
-function gaps(stage) {
+function gaps(viewer) {
   data.scene.contacts.forEach((pair, k) => {
-    const values = unpacked(pair.gaps).values, points = stage.pairs[k].points, colour = new THREE.Color();
+    const values = unpacked(pair.gaps).values, points = viewer.pairs[k].points, colour = new THREE.Color();
     const colours = Float32Array.from(Array.from(values).flatMap((gap) =>
       colour.set(gap < -GAP_TOLERANCE ? RED : gap > GAP_TOLERANCE ? "#2563eb" : TOUCHED).toArray()));
     points.geometry.setAttribute("color", new THREE.BufferAttribute(colours, 3));
@@ -60,9 +60,9 @@ function gaps(stage) {
   });
 }
 
-const stage = new Stage(data.scene);
-control(stage);
-gaps(stage);
-stage.paint("", 3, CORRECTED);
-pick(stage);
-window.stage = stage;
+const viewer = new Viewer(data.scene);
+control(viewer);
+gaps(viewer);
+viewer.paint("", 3, CORRECTED);
+pick(viewer);
+window.viewer = viewer;

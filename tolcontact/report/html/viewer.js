@@ -29,7 +29,7 @@ const TOUCHED = "#0a7d4f";
 const RED = "#d01c1c";
 const MANY = 30_000; // triangles
 
-class Stage {
+class Viewer {
   constructor(scene) {
     this.data = scene;
     this.canvas = byId("scene");
@@ -283,16 +283,16 @@ class Stage {
 }
 
 /** What is shown, and cut: the same controls on every page. */
-function control(stage) {
+function control(viewer) {
   ["locators", "contacts", "points", "features", "forces"].forEach((id) =>
-    byId(id).addEventListener("change", () => { stage.marks[id].visible = byId(id).checked; stage.draw(); }));
-  const cut = () => stage.cut(byId("across").value, Number(byId("cut").value) / 1000);
+    byId(id).addEventListener("change", () => { viewer.marks[id].visible = byId(id).checked; viewer.draw(); }));
+  const cut = () => viewer.cut(byId("across").value, Number(byId("cut").value) / 1000);
   byId("across").addEventListener("change", cut);
   byId("cut").addEventListener("input", cut);
-  for (const part of stage.parts) {
+  for (const part of viewer.parts) {
     const label = document.createElement("label"), box = document.createElement("input");
     Object.assign(box, { type: "checkbox", checked: true });
-    box.addEventListener("change", () => { part.group.visible = box.checked; stage.draw(); });
+    box.addEventListener("change", () => { part.group.visible = box.checked; viewer.draw(); });
     label.append(box, ` ${part.name}`);
     byId("parts").append(label);
   }
