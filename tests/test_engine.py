@@ -51,8 +51,8 @@ def test_compiled_functions_equal_interpreted_ones_to_the_last_bit(name, method)
     nominal = discretize(PLANAR[name]())
     for group in contact_groups(nominal):
         gaps = [gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs]
-        program = contact_qp.contact_qp(nominal, group, gaps, method, plugin("daqp"))
-        for function in (program.assemble, program.finish):
+        qp = contact_qp.contact_qp(nominal, group, gaps, method, plugin("daqp"))
+        for function in (qp.assemble, qp.finish):
             inputs = [RNG.normal(size=(7, function.nnz_in(k))) for k in range(function.n_in())]
             for found, expected in zip(NativeFunction(function)(inputs), InterpretedFunction(function)(inputs)[0], strict=True):
                 assert np.array_equal(found, expected, equal_nan=True)

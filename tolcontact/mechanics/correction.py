@@ -67,7 +67,7 @@ def linear(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 
 def rigid(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
-    """Return the pose after rigid motions R <- exp([w]x) R: first its own, then of the parts that it is located on."""
+    """Return the pose after rigid motions R <- exp([w]x) R: the part's own first, then those of the parts below it."""
     for mover in reversed(part.movers):
         X = movers[mover].moving(X, rotation(movers[mover].W))
     return X
