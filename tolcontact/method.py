@@ -8,7 +8,7 @@ from tolcontact.errors import OptionError
 RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
-SEARCHES = ("fixed", "iterated")
+SEARCHES = ("fixed", "iterated", "bounded")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class Method:
                         "closed": points that the correction itself drives into contact are constrained too
         activity        a contact point is active below this gap [mm]
         search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected
-                        again at the corrected pose until they no longer move (paper, 2.2)
+                        again at the corrected pose until they no longer move (paper, 2.2); "bounded": faces end where they
+                        end, and touch at corners, edges and facets of both bodies, found at every pose
         near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other
                         starts, and never certified
         near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
@@ -95,8 +96,8 @@ class Method:
             raise OptionError(f"near_turn is {self.near_turn!r}; expected an angle in rad, above 0 and at most pi")
         if not 0 < self.near_travel < float("inf"):
             raise OptionError(f"near_travel is {self.near_travel!r}; expected a number of part sizes above 0")
-        if self.search == "iterated" and self.resolution != "exact":
-            raise OptionError('search is "iterated" with a linearized resolution; it needs resolution "exact"')
+        if self.search != "fixed" and self.resolution != "exact":
+            raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
     @property
     def minimizes(self) -> Objective:
@@ -112,6 +113,11 @@ class Method:
     def is_iterated(self) -> bool:
         """Whether contact points are projected again before every step."""
         return self.search == "iterated"
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether faces end, and touch at corners, edges and facets of both bodies."""
+        return self.search == "bounded"
 
     @property
     def is_closed(self) -> bool:

@@ -115,7 +115,7 @@ def contact_qp(
                          the whole correction
     astray               largest misfit [mm] of exact two-sided locators at `corrected`
     """
-    standing = standing or [standing_points(nominal.pairs[index], gaps[index], method) for index in group.pairs]
+    standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing)
     setting = Setting(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),

@@ -1,18 +1,22 @@
 """The compiled model: it is built once, and evaluated by name for blocks of realizations."""
 
 import logging
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
+from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
+from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
+from tolcontact.geometry.meeting import Meeting
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
@@ -47,6 +51,8 @@ class Program(Pictured):
     observe      poses, deviations -> measured (realization, measure), relative (realization, 12 * pair): X_RM of every pair
     gaps         gaps of each pair at X_RM, which are affine in it; None for round faces
     round_gaps   X_RM, deviations -> gaps (realization, point), distances (realization, point) by number of the pair
+    meetings     by number of the pair: where its bodies can touch, if fixed planes do not represent its reference face
+    trials       by number of the pair: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     tapes        the users' own expressions by measure name
@@ -60,6 +66,8 @@ class Program(Pictured):
     observe: NamedFunction
     gaps: tuple[GapMap | None, ...]
     round_gaps: dict[int, NamedFunction]
+    meetings: dict[int, Meeting]
+    trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
     tapes: dict[str, Tape]
@@ -109,17 +117,22 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
         round_functions = {k: _round_gap_function(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round}
         if method.minimizes.presses:
             _check_forces(nominal, groups)
+        place = NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"]))
+        observed = NamedFunction.dense(observe)
+        meetings, trials = _meetings(nominal, draws, place, observed) if method.is_bounded else ({}, {})
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
             draws=draws,
             method=method,
             plugin=conic_plugin,
-            place=NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"])),
-            observe=NamedFunction.dense(observe),
+            place=place,
+            observe=observed,
             gaps=gaps,
             round_gaps={k: NamedFunction.dense(function) for k, function in round_functions.items()},
-            groups=tuple(_contact_group(group, contact_qp(nominal, group, gaps, method, conic_plugin)) for group in groups),
+            meetings=meetings,
+            trials=trials,
+            groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings) for group in groups),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -135,7 +148,32 @@ def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca
     return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
 
 
-def _contact_group(group: Group, qp: ContactQP) -> ContactGroup:
+def _meetings(
+    nominal: Nominal, draws: Draws, place: NamedFunction, observe: NamedFunction
+) -> tuple[dict[int, Meeting], dict[int, Trial]]:
+    """Return the meetings of the pairs that need them, and the trials of all pairs of faces."""
+    if not nominal.pairs:
+        return {}, {}
+    deviations = draws(seed=TRIAL_SEED, start=0, stop=TRIALS)
+    poses = place(deviations=deviations)["poses"]
+    relative = observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), ENTRIES)
+    known = np.isfinite(relative).all(axis=(1, 2))
+    decisions = {k: bounded_pair(nominal, k, relative[known, k], deviations[known]) for k in range(len(nominal.pairs))}
+    meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
+    return meetings, {k: trial for k, (_, trial) in decisions.items()}
+
+
+def _contact_group(
+    nominal: Nominal,
+    group: Group,
+    gaps: Sequence[GapMap | None],
+    method: Method,
+    plugin: Plugin,
+    meetings: Mapping[int, Meeting],
+) -> ContactGroup:
+    # Where bodies meet changes with every pose, so that no row of such a pair stands.
+    standing = [None if k in meetings else standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
+    qp = contact_qp(nominal, group, gaps, method, plugin, standing if meetings else ())
     return ContactGroup(group, qp, ContactSolver(qp))
 
 

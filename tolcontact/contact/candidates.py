@@ -10,8 +10,9 @@ from scipy.spatial import KDTree
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
+from tolcontact.contact.bounded_scan import bounded_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, fixed, min_gaps, pair_scan
-from tolcontact.contact.state import State
+from tolcontact.contact.state import Slots, State
 from tolcontact.geometry.surface import Surface
 from tolcontact.mechanics import curved_pairs
 
@@ -72,6 +73,7 @@ def project(scan: PairScan, surface: Surface | None, relative: Float[Array, "rea
 
 
 MAX_CLUSTERS = 6
+EDGE_SHARE = 1 / 4000  # of the smallest tolerance range: error of planes beyond their edges, in steps
 OVERHANG_SHARE = 0.01  # of their radius, by which balls and shafts that travelled far may carry beside a wall
 
 
@@ -125,24 +127,39 @@ class Candidates:
                 continue
             self._all_scans.append(pair_scan(pair, gaps, tables, MAX_CLUSTERS))
             # If the paper's set of points may carry, those between the corners count, too.
-            corners = self._method.corners_suffice
+            corners = self._method.corners_suffice and index not in program.meetings
             self._carrying_scans.append(
                 pair_scan(pair, gaps, (), MAX_CLUSTERS, gaps.corners) if corners else self._all_scans[-1]
             )
+        self._edge_error = EDGE_SHARE * program.nominal.assembly.smallest_zone()
+        self.bounded = {k: program.meetings[index] for k, index in enumerate(group.group.pairs) if index in program.meetings}
         is_iterated = self._method.is_iterated
-        self.curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
-        projected = [k for k, pair in enumerate(self._pairs) if pair.round is None] if is_iterated else self.curved
+        curved = curved_pairs(program.nominal, group.group) if self._method.is_exact and not is_iterated else []
+        self.curved = [k for k in curved if k not in self.bounded]
+        sampled = [k for k, pair in enumerate(self._pairs) if pair.round is None and k not in self.bounded]
+        projected = sampled if is_iterated else self.curved
         self._margins = {k: half_spacing(fixed(self._all_scans[k])) for k in projected}
 
-    def scans(self, relative: Float[Array, "realization pair 12"], *, projected: bool = False) -> list[Scan]:
+    def scans(
+        self,
+        relative: Float[Array, "realization pair 12"],
+        deviations: Float[Array, "realization contributor"],
+        *,
+        projected: bool = False,
+        slots: Sequence[Slots] = (),
+    ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
-        With `projected`, points against curved faces are projected again in any case.
+        Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
+        remain a little beyond their edges. With `projected`, points against curved faces are projected again in any case.
         """
         scans = list(self._carrying_scans)
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
+        for k, places in self.bounded.items():
+            kept, error = (slots[self._varying.index(k)].labels, self._edge_error) if slots else (None, 0.0)
+            scans[k] = bounded_scan(scans[k], places, relative[:, k], self._pairs[k].heights(deviations), kept, error)
         return scans
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
@@ -153,8 +170,10 @@ class Candidates:
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
     ) -> RawSurvey:
         """Return the survey of raw states, for deviations (realization, contributor)."""
-        scans = self.scans(relative)
-        surveyed = scans if self._method.is_iterated else self._all_scans
+        scans = self.scans(relative, deviations)
+        surveyed = [
+            scan if self._method.is_iterated and k not in self.bounded else self._all_scans[k] for k, scan in enumerate(scans)
+        ]
         surveys = [scan.survey(relative[:, k], deviations, self._method.activity) for k, scan in enumerate(surveyed)]
         return RawSurvey(
             scans=scans,
@@ -182,12 +201,16 @@ class Candidates:
         if self._method.is_closed:
             return [None for _ in scans]
         return [
-            None if pair.is_supports or pair.round else scan.gaps(relative[:, k], deviations) < self._method.activity
+            None
+            if pair.is_supports or pair.round or k in self.bounded
+            else scan.gaps(relative[:, k], deviations) < self._method.activity
             for k, (pair, scan) in enumerate(zip(self._pairs, scans, strict=True))
         ]
 
     def carriers(self, k: int, state: State) -> Carriers:
-        """Return the points of pair k that carry."""
+        """Return the points of pair k that carry; none of a bounded pair, whose places lie on both bodies."""
+        if k in self.bounded:
+            return Carriers(np.zeros(0, dtype=int), np.zeros((0, 3)), np.zeros(0, dtype=bool), 0.0)
         loaded, standing, pair = state.loaded[:, self._spans[k]], self._standing[k], self._pairs[k]
         if pair.round:
             points = pair.round.points

@@ -41,7 +41,7 @@ def search(
         size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, caution=cautions)
         energy = energy_of(unsettled.task, unsettled.state)
         gain_ratio = (last_energy - energy) / np.maximum(scaled**2 / 2, 1e-300)  # to the gain that the QP foresaw
-        scans = candidates.scans(unsettled.state.relative, projected=True)
+        scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, projected=True)
         # A step whose points lie deeper inside afterwards gains only what it loses again.
         sinks = _depth_left(scans, unsettled) > np.maximum((1 - GOOD_RATIO) * np.minimum(size, scaled), STEP_TOLERANCE)
         stalls = (size > GOOD_RATIO * last_size) & (gain_ratio < 1 - GOOD_RATIO) | sinks

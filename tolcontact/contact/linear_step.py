@@ -13,7 +13,7 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
-from tolcontact.contact.scan import Deepest, PairScan, fixed
+from tolcontact.contact.scan import Deepest, SlotScan, changing
 from tolcontact.contact.state import NEGLIGIBLE_SHARE, Slots, State, Task
 from tolcontact.mechanics import ENTRIES
 
@@ -74,7 +74,9 @@ class LinearStep:
         firmness   multiplies the regularization
         newton     whether the curvature of objective and gaps counts
         """
-        start_slots = [slots.copy() for slots in state.slots]
+        start_slots = [
+            slots.only(changing(task.scans[k]).holds(slots.points)) for k, slots in zip(self.varying, state.slots, strict=True)
+        ]
         inputs = self._inputs(task, state, start_slots, newton)
         for name, value in {"stride": stride, "caution": caution, "firmness": firmness, "newton": float(newton)}.items():
             inputs[name] = np.broadcast_to(value, len(task))
@@ -107,7 +109,9 @@ class LinearStep:
         bends = [np.zeros((len(task), 0)), *(np.zeros((len(task), ENTRIES)) for _ in slots)]
         if newton:
             inputs["reactions"] = _cleared(inputs["reactions"], self.spans)
-            bends[1:] = [_bend(fixed(task.scans[k]), old, task.deviations) for k, old in zip(self.varying, slots, strict=True)]
+            bends[1:] = [
+                _bend(changing(task.scans[k]), old, task.deviations) for k, old in zip(self.varying, slots, strict=True)
+            ]
         return inputs | {"bend": np.concatenate(bends, axis=1)}
 
     def _set_reactions(self, inputs: dict[str, np.ndarray], start_slots: Sequence[Slots], slots: Sequence[Slots]) -> None:
@@ -125,7 +129,8 @@ class LinearStep:
         """
         count = len(task)
         points = [
-            fixed(task.scans[k]).rows(of_pair.points, task.deviations) for k, of_pair in zip(self.varying, slots, strict=True)
+            changing(task.scans[k]).rows(of_pair.points, task.deviations)
+            for k, of_pair in zip(self.varying, slots, strict=True)
         ]
         P_m, P_r, n_r = (
             np.concatenate([np.zeros((count, 0, 3)), *vectors], axis=1)
@@ -158,7 +163,7 @@ class LinearStep:
 
     def _deepest(self, task: Task, relative: np.ndarray) -> list[Deepest]:
         """Return the deepest points of the varying pairs that may carry, at X_RM (n, pair, 12)."""
-        return [fixed(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
+        return [changing(task.scans[k]).deepest(relative[:, k], task.deviations, task.may_carry[k]) for k in self.varying]
 
 
 def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
@@ -167,9 +172,9 @@ def _cleared(multipliers: np.ndarray, spans: Sequence[slice]) -> np.ndarray:
     return np.concatenate([np.where(m > NEGLIGIBLE_SHARE * m.max(axis=1, keepdims=True), m, 0.0) for m in of_pairs], axis=1)
 
 
-def _bend(scan: PairScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
+def _bend(scan: SlotScan, slots: Slots, deviations: np.ndarray) -> np.ndarray:
     """Return the sum of reaction times the gap's gradient by the entries of X_RM, (n, 12)."""
     P_m, _, n_r = scan.rows(slots.points, deviations)
-    weighted = slots.reactions[..., None] * n_r
+    weighted = (slots.reactions * scan.moves(slots.points))[..., None] * n_r
     turning = (weighted[..., :, None] * P_m[..., None, :]).sum(axis=1)
     return np.concatenate([turning.reshape(len(turning), 9), weighted.sum(axis=1)], axis=1)

@@ -4,12 +4,14 @@ The first steps are like the paper's. Realizations that still move then have fre
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.contact.acceptance import Limits
+from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import PENETRATION, LinearStep
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.state import State, Task, Unsettled
@@ -34,7 +36,7 @@ STEPS = (
 )
 
 
-def repeat(step: LinearStep, limits: Limits, task: Task, state: State, stride: float) -> None:
+def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, best = Unsettled(task, state), None
     for kind in STEPS:
@@ -53,6 +55,9 @@ def repeat(step: LinearStep, limits: Limits, task: Task, state: State, stride: f
         unrest, best = unrest[moves], None if best is None else best.take(moves)
         if not len(unsettled):
             return
+        if candidates.bounded:
+            scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots)
+            unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             best = better_state(best, unsettled.state, true_penetration(unsettled.task, unsettled.state))
     final = unsettled.state

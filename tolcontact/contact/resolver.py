@@ -69,6 +69,11 @@ class ContactResolver:
         self._step.start_over()
 
     @property
+    def finds_places(self) -> bool:
+        """Whether places of contact are found at every pose, so that gaps are not those of the nominal contact points."""
+        return bool(self._candidates.bounded)
+
+    @property
     def spans(self) -> list[slice]:
         """The rows of each pair in the QP."""
         return self._step.spans
@@ -115,12 +120,12 @@ class ContactResolver:
             caution = 1.0 if self._method.minimizes.presses else 0.0  # forces pull far if nothing holds
             search(self._step, self._limits, self._candidates, self._energy_of, task, state, start.stride, caution)
         elif self._method.is_exact:
-            repeat(self._step, self._limits, task, state, start.stride)
+            repeat(self._step, self._limits, self._candidates, task, state, start.stride)
         else:
             self._step.take(task, state, stride=start.stride)
-        state.searched[:] = projected
+        state.searched[:] = projected or self.finds_places
         self._leave_adrift(task, state)
-        task = replace(task, scans=self._candidates.scans(state.relative, projected=projected))
+        task = replace(task, scans=self._candidates.scans(state.relative, task.deviations, projected=projected))
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)
         if self._method.is_exact:
             depth = undone(task.scans, state.gap_min, state.relative, task.deviations, task.may_carry, state.slack)
@@ -152,7 +157,7 @@ class ContactResolver:
                 return
             part = task.take(rows)
             poses, relative = self._at_nominal(part) if start.at_nominal else (part.raw, part.relative)
-            part = replace(part, scans=self._candidates.scans(relative, projected=start.projected))
+            part = replace(part, scans=self._candidates.scans(relative, part.deviations, projected=start.projected))
             attempt = self._step.start(poses, relative)
             self._attempt(part, attempt, start)
             accumulate_starts(state, rows, attempt)

@@ -75,8 +75,33 @@ class Scan:
         return self.gaps(relative, deviations).min(axis=1)
 
 
+class SlotScan(Scan):
+    """A scan whose points take turns in the slots of the QP."""
+
+    def rows(
+        self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
+    ) -> tuple[Float[Array, "realization slot 3"], Float[Array, "realization slot 3"], Float[Array, "realization slot 3"]]:
+        """Return P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot), which their rows of the QP need."""
+        raise NotImplementedError
+
+    def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
+        """Return the deepest point of each cluster; its depth is 0 if no point is inside.
+
+        may_carry   (realization, point): the points to look at; all if it is None
+        """
+        raise NotImplementedError
+
+    def holds(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
+        """Return whether the scan still has some `points` (realization, slot)."""
+        return np.ones(points.shape, dtype=bool)
+
+    def moves(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
+        """Return which of `points` (realization, slot) are fixed to the moving body, so that their gaps are linear in X_RM."""
+        return np.ones(points.shape, dtype=bool)
+
+
 @dataclass(frozen=True, eq=False)
-class PairScan(Scan):
+class PairScan(SlotScan):
     """Contact constants of a pair, its points sorted by cluster; and within a cluster into branches and leaves of neighbours.
 
     basis              (13, r),
@@ -110,20 +135,13 @@ class PairScan(Scan):
             result += np.multiply(slope[:, None], row, out=term)
         return result
 
-    def rows(
-        self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
-    ) -> tuple[Float[Array, "realization slot 3"], Float[Array, "realization slot 3"], Float[Array, "realization slot 3"]]:
-        """Return P^m, P^r, n^r (realization, slot, 3) of some `points` (realization, slot), which their rows of the QP need."""
+    def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         P_m, P_r, n_r = self.P_m[points], self.P_r[points], self.n_r[points]
         if self.columns.size:
             P_r = P_r + self.offsets.heights(deviations, points)[..., None] * n_r
         return P_m, P_r, n_r
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        """Return the deepest point of each cluster; its depth is 0 if no point is inside.
-
-        may_carry   (realization, point): the points to look at; all if it is None
-        """
         gaps = np.minimum(self.gaps(relative, deviations), 0)
         if may_carry is not None:
             gaps = np.where(may_carry, gaps, 0)
@@ -148,6 +166,12 @@ class RoundScan(Scan):
 def fixed(scan: Scan) -> PairScan:
     """Return a scan, which must not be one of round faces."""
     assert isinstance(scan, PairScan)
+    return scan
+
+
+def changing(scan: Scan) -> SlotScan:
+    """Return a scan, which must be one whose points take turns in slots."""
+    assert isinstance(scan, SlotScan)
     return scan
 
 

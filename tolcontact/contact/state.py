@@ -31,9 +31,14 @@ class Slots:
         """Return slots that hold no point."""
         return cls(np.zeros((count, slots), dtype=int), np.zeros((count, slots), dtype=bool), np.zeros((count, slots)))
 
-    def copy(self) -> "Slots":
-        """Return a copy, which stays while these slots change."""
-        return Slots(self.points.copy(), self.filled.copy(), self.reactions.copy())
+    @property
+    def labels(self) -> Int[Array, "n slot"]:
+        """The numbers of the points, -1 in slots that are empty."""
+        return np.where(self.filled, self.points, -1)
+
+    def only(self, present: Bool[Array, "n slot"]) -> "Slots":
+        """Return a copy, which stays while these slots change, of the slots whose points are still `present` (n, slot)."""
+        return Slots(self.points.copy(), self.filled & present, self.reactions.copy())
 
     def take(self, rows: np.ndarray) -> "Slots":
         """Return the slots of some realizations."""

@@ -79,6 +79,16 @@ class Surface:
         """The parts of the face that lie on its analytic surfaces."""
         return [Piece(surface, side < 0, self.part(rows)) for surface, rows, side in self._standings]
 
+    @cached_property
+    def bulge(self) -> float:
+        """The largest distance [mm] of triangles, in their middle and on their edges, from their analytic surfaces."""
+        corners = np.asarray(self.mesh.triangles)
+        middles = np.concatenate([(corners + np.roll(corners, -1, axis=1)) / 2, corners.mean(axis=1, keepdims=True)], axis=1)
+        return max(
+            (float(np.abs(surface.distance(middles[rows].reshape(-1, 3))[0]).max()) for surface, rows, _ in self._standings),
+            default=0.0,
+        )
+
     @property
     def unknown(self) -> "Surface":
         """The triangles that stand for no analytic surface."""

@@ -35,7 +35,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
         surfaces.penetration[:, k] = faces.depth(X_RM, heights)
-        if fixed and not pair.round:  # else contact points are those that stand over the face
+        if fixed and not pair.round and k not in program.meetings:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
             row, point = np.nonzero(gaps < TOUCHING_GAP + heights[:, None])

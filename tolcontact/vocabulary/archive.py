@@ -149,7 +149,7 @@ SEARCHED = ArchiveVariable(
     "searched",
     (REALIZATION,),
     "i1",
-    "1: contact points were projected again at the corrected pose, onto curved faces, and gap_min refers to those; "
+    "1: contact points were projected again, or found, at the poses themselves, and gap_min refers to those; "
     "0: it refers to the archived ones",
     "1",
 )

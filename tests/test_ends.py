@@ -1,0 +1,119 @@
+"""Bodies touch as they end: no contact beside a face, none missed at tips and edges, judged by exact distances of polyhedra."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from studies.certificates.ends import METHOD, Convex, judged, piece, scene, separation
+from tests.cases.ends import CASES, case
+from tolcontact.geometry.meeting import meeting
+from tolcontact.geometry.surface import Surface
+
+FAULTS = ("false contact", "missed contact", "lifted off", "inside")
+
+
+def assert_right(assembly, bodies, samples, seed=1, solver="daqp"):
+    counts, _ = judged(assembly, bodies, samples, seed, solver)
+    assert {name: counts[name] for name in FAULTS} == dict.fromkeys(FAULTS, 0)
+    assert counts["certified"] == samples
+    return counts
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_every_certificate_holds_for_the_bodies(name):
+    assert_right(*case(name), samples=60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cone", "crossing roofs", "needles, tilted"])
+def test_another_solver_certifies_the_same(name):
+    assert_right(*case(name), samples=40, solver="qpoases")
+
+
+def test_fixed_planes_would_have_been_wrong():
+    """The judge finds what it is there for: planes that do not end hold a plate beside a chamfer, and let a tip sink in."""
+    method = replace(METHOD, search="fixed")
+    chamfer, _ = judged(*case("chamfer", method=method), 60, 1, "daqp")
+    tip, _ = judged(*case("cone", method=method), 60, 1, "daqp")
+    assert chamfer["false contact"] > 10
+    assert tip["inside"] > 10
+
+
+@pytest.mark.parametrize("selection", [None, lambda c, n: n[:, 2] > 0.9])
+def test_a_plate_that_slides_clear_of_a_chamfered_block_is_never_touched(selection):
+    assembly, _ = case("chamfer without clearance")
+    if selection is not None:
+        block, plate = assembly.parts
+        assembly.contact("top alone", moving=plate.face("-z"), reference=block.face(selection))
+    run = tc.run(assembly, samples=300, seed=2, surfaces=0, fields="none")
+    assert (run.status == 0).all()
+    assert np.array_equal(run.measured.sel(state="raw"), run.measured.sel(state="corrected"))
+
+
+def test_few_points_over_a_rib_lose_nothing():
+    assert_right(*case("rib", points=20), samples=60)
+
+
+def test_the_frame_does_not_matter(name="rib"):  # whose contact points are the same in every frame
+    """Locators, contact and the measured point turn with the assembly; the distance that contact moves the point stays."""
+    places = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((0.3, -0.5, 1.1), (300.0, -200.0, 100.0))
+    runs = [tc.run(case(name, turn=turn, shift=shift)[0], samples=60, surfaces=0) for turn, shift in places]
+    assert np.array_equal(runs[0].status, runs[1].status)
+    shifts = [(run.measured.sel(state="corrected") - run.measured.sel(state="raw")).values for run in runs]
+    lengths = [np.linalg.norm(shift, axis=1) for shift in shifts]
+    assert np.allclose(*lengths, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(0, 24, 2))
+def test_random_bodies(seed):
+    assembly, bodies = scene(seed)
+    assert_right(assembly, bodies, 4, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(1, 24, 2))
+def test_random_unions_of_bodies(seed):
+    assembly, bodies = scene(seed)
+    assert_right(assembly, bodies, 4, seed)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_bodies_touch_exactly_if_a_place_has_a_gap_below_0(seed):
+    """At any pose in which convex bodies hardly touch: the least gap of all places has the sign of their distance."""
+    rng = np.random.default_rng(seed)
+    reference, moving = piece(rng, True), piece(rng, False)
+    bodies = [trimesh.convex.convex_hull(points) for points in (moving, reference)]
+    places = meeting(tuple(Surface(body) for body in bodies), tuple(bodies), travel=1.0, tilt=0.1, height=0.5)
+    convex = Convex(moving), Convex(reference)
+    poses, distances = [], []
+    for _ in range(200):
+        R = Rotation.from_rotvec(rng.normal(size=3) * 0.02).as_matrix()
+        t = np.array([*rng.uniform(-0.3, 0.3, 2), 0.0])
+        t[2] = rng.uniform(-0.3, 0.3)
+        poses.append(np.concatenate([R.ravel(), t]))
+        distances.append(separation(*convex, R, t))
+    gaps = places.at(np.array(poses)).gaps.min(axis=1, initial=np.inf)
+    distances = np.array(distances)
+    clear = np.abs(distances) > 1e-9
+    assert np.array_equal(gaps[clear] < 0, distances[clear] < 0)
+
+
+def test_a_bounded_search_needs_the_exact_resolution():
+    with pytest.raises(tc.OptionError, match='search is "bounded" with a linearized resolution'):
+        tc.Method(search="bounded")
+
+
+def test_flat_faces_whose_overlap_stays_keep_their_fixed_points():
+    a = tc.Assembly("stand", method=METHOD)
+    table = a.part("table", tc.Box(100, 100, 10), fixed=True)
+    block = a.part("block", tc.Box(20, 20, 10), at=(40, 40, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
+    a.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(0, 0, 10), along="z", tolerance=1)
+    program = tc.build(a)
+    assert not program.meetings
+    assert program.trials[0].error < program.trials[0].allowed

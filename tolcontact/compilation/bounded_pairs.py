@@ -1,0 +1,81 @@
+"""Which pairs need contact of bodies as they end: a trial at raw poses, pair by pair, when the model is compiled."""
+
+import warnings
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Float
+from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.errors import ContactWarning, shown
+from tolcontact.geometry.meeting import Meeting, meeting
+
+TRIALS = 1024  # raw poses
+TRIAL_SEED = 2_718_281_828
+ALLOWED_SHARE = 1 / 2000  # of the smallest tolerance range: error of fixed planes that is accepted
+FACET_FACTOR = 4  # times the distance of triangles from the analytic surfaces for which they stand: smaller errors are theirs
+COARSE_SHARE = 1 / 20  # of the smallest tolerance range: where triangles are off by more, they are the body
+TRAVEL_FACTOR = 2  # times the largest travel of the trial: how far places are looked for
+POSES_AT_ONCE = 64
+MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
+
+
+class Trial(NamedTuple):
+    """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm]."""
+
+    error: float
+    allowed: float
+
+
+def bounded_pair(
+    nominal: Nominal, index: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
+) -> tuple[Meeting | None, Trial]:
+    """Return where the faces of a pair can touch as they end, or None if fixed planes represent its reference face well.
+
+    X_RM   (n, 12), raw, at trial poses, for `deviations` (n, contributor)
+    """
+    pair = nominal.pairs[index]
+    smallest = nominal.assembly.smallest_zone()
+    nothing = None, Trial(0.0, np.inf)
+    if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
+        return nothing
+    if not np.isfinite(smallest):
+        return nothing
+    difference = X_RM - pose.AT_REST
+    corners = np.array(np.meshgrid(*np.array(pair.moving_face.mesh.bounds).T)).reshape(3, -1).T
+    travel = float(np.linalg.norm(pose.apply(difference, corners), axis=2).max())
+    tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
+    size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
+    distances = np.linalg.norm(pair.P_m - pair.P_r, axis=1)
+    bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
+    places = meeting(
+        (pair.moving_face, pair.reference_face), bodies,
+        travel=TRAVEL_FACTOR * travel + MIN_TRAVEL_SHARE * size, tilt=tilt, height=float(distances.min()),
+    )  # fmt: skip
+    if places is None:
+        warnings.warn(
+            f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '
+            "use coarser meshes, or choose smaller faces",
+            ContactWarning,
+            stacklevel=2,
+        )
+        return nothing
+    error = 0.0
+    for k in range(0, len(X_RM), POSES_AT_ONCE):
+        rows = slice(k, k + POSES_AT_ONCE)
+        heights = pair.heights(deviations[rows])
+        bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights
+        error = max(error, float(np.abs(_depth(bounded) - _depth(_fixed_gap(pair, X_RM[rows], heights))).max(initial=0)))
+    bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
+    trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)))
+    return (places if trial.error > trial.allowed else None), trial
+
+
+def _fixed_gap(pair: ContactPoints, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the least gap (n,) [mm] of the contact points above their fixed planes."""
+    return ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2).min(axis=1) - heights
+
+
+def _depth(gap: np.ndarray) -> np.ndarray:
+    return -np.minimum(gap, 0)

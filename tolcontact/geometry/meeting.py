@@ -1,0 +1,191 @@
+"""Where two bodies can meet: a corner on a facet, a facet on a corner, an edge across an edge, or corners of facing planes.
+
+Two polyhedra touch first at one of three kinds of places: a corner of the moving body on a facet of the reference body, a
+corner of the reference body on a facet of the moving body, or an edge across an edge. A place counts only while it lies within
+the facet or on both edges, and while its normal fits between the facets around the corner or edge; so faces have ends.
+
+Planes that face each other touch at the corners of their overlap. There the gap is measured along the normal of the reference
+plane, since the common normal of two rims leans without limit as they become parallel.
+"""
+
+import itertools
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry import kernel
+from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
+from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
+from tolcontact.geometry.surface import Surface
+
+FACING = -0.99  # cosine of the angle between the normals of planes that face each other
+SPARE_LEANING = 0.1  # beside the largest tilt, by which places may lean that are looked at
+MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
+MAX_CANDIDATES = 100_000
+MAX_PLACES = 32  # that are returned of one pose
+DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
+ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
+ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
+TINY = 1e-300
+
+
+class Places(NamedTuple):
+    """Places at which two bodies can touch, at n poses.
+
+    labels    (n, place): numbers of the places among the candidates of the meeting, -1 where there is none
+    gaps      (n, place) [mm], infinite where there is none
+    P_m, P_r, n_r   (n, place, 3): the places on both bodies, and the normal, in the frames of the paper
+    """
+
+    labels: Int[Array, "n p"]
+    gaps: Float[Array, "n p"]
+    P_m: Float[Array, "n p 3"]
+    P_r: Float[Array, "n p 3"]
+    n_r: Float[Array, "n p 3"]
+
+
+@dataclass(frozen=True, eq=False)
+class Meeting:
+    """The places at which two faces can touch as long as they stay near their nominal places.
+
+    kinds, firsts, seconds   (candidate,): the kind, and the numbers of the moving and the reference body's part
+    planes   (candidate,): for corners of facing planes the number of these planes, else -1
+    facing   (plane, 2): a facet of the moving and of the reference plane
+    depth, height   [mm]: the largest depth and gap at which a place counts
+    """
+
+    moving: Polyhedron
+    reference: Polyhedron
+    kinds: Int[Array, " c"]
+    firsts: Int[Array, " c"]
+    seconds: Int[Array, " c"]
+    planes: Int[Array, " c"]
+    facing: Int[Array, "p 2"]
+    depth: float
+    height: float
+    size: float
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def at(self, X_RM: Float[Array, "n 12"], kept: Int[Array, "n k"] | None = None, error: float = 0.0) -> Places:
+        """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `kept` (n, k), -1 for none.
+
+        Facing planes count beyond their edges as far as they err there by no more than `error` [mm]. Steps need it: without it
+        a corner that hangs over an edge comes and goes.
+        """
+        room = max(min(len(self), MAX_PLACES), 1)
+        shape = (len(X_RM), room)
+        places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
+        kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.ascontiguousarray(kept)
+        kernel.find(
+            _touching_parts(self.moving), _touching_parts(self.reference),
+            kernel.Candidates(self.kinds, self.firsts, self.seconds, self.planes, self.facing),
+            np.array([self.depth, self.height]), kernel.MARGIN * self.size, np.array([error, self.depth]),
+            np.ascontiguousarray(X_RM), kept, DIRECTIONS, *places,
+        )  # fmt: skip
+        return places
+
+
+def _touching_parts(body: Polyhedron) -> kernel.Body:
+    return kernel.Body(
+        body.vertices, body.cones, body.directions, body.facets, body.normals, body.inward, body.edges, body.into,
+        body.edge_normals, body.body,
+    )  # fmt: skip
+
+
+def meeting(faces: tuple[Surface, Surface], bodies: tuple, travel: float, tilt: float, height: float) -> Meeting | None:
+    """Return where a moving and a reference face can touch; None if they have too many corners and edges to compare.
+
+    faces, bodies   in their nominal places
+    travel [mm], tilt [rad]   how far the moving body moves and turns relative to the reference body
+    height          [mm]: the largest gap at which a place is of interest
+    """
+    A, B = (polyhedron(face, body) for face, body in zip(faces, bodies, strict=True))
+    comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
+    if comparisons > MAX_COMPARISONS:
+        return None
+    leaning = min(kernel.LEANING + tilt + SPARE_LEANING, 1.0)
+    facing, facets = _facing_planes(A, B, travel, height)
+    parts = [
+        _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
+        _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
+        _across_edges(A, B, facing, travel, leaning),
+    ]
+    if sum(len(part) for part in parts) > MAX_CANDIDATES:
+        return None
+    kinds = np.repeat([CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE], [len(part) for part in parts])
+    firsts, seconds, planes = (np.ascontiguousarray(column) for column in np.concatenate(parts).T)
+    size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
+    return Meeting(A, B, kinds, firsts, seconds, planes, facets, depth=travel, height=height + travel, size=size)
+
+
+def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers of facing planes in a table (plane of A + 1, plane of B + 1), -1 for others, and their facets (n, 2).
+
+    The last row and column stand for no plane. Only planes count that are nominally near each other.
+    """
+    table, facets = np.full((_plane_count(A) + 1, _plane_count(B) + 1), -1), list[tuple[int, int]]()
+    planes_A, firsts_A = np.unique(A.facet_planes, return_index=True)
+    planes_B, firsts_B = np.unique(B.facet_planes, return_index=True)
+    cosines = A.normals[firsts_A] @ B.normals[firsts_B].T
+    for i, j in np.argwhere(cosines < FACING):
+        heights = (A.facets[A.facet_planes == planes_A[i]] - B.facets[firsts_B[j], 0]) @ B.normals[firsts_B[j]]
+        if (heights >= -travel).any() and (heights <= height + travel).any():
+            table[planes_A[i], planes_B[j]] = len(facets)
+            facets.append((int(firsts_A[i]), int(firsts_B[j])))
+    return table, np.array(facets, dtype=np.int64).reshape(-1, 2)
+
+
+def _plane_count(body: Polyhedron) -> int:
+    return int(max(body.facet_planes.max(initial=-1), body.edge_planes.max(initial=-1), body.vertex_planes.max(initial=-1))) + 1
+
+
+def _on_facets(
+    corners: Polyhedron, facets: Polyhedron, facing: np.ndarray, travel: float, leaning: float, kind: int
+) -> np.ndarray:
+    """Return candidates (candidate, 3), first, second and plane, of the corners of one body on the facets of the other.
+
+    `facing` is the table of facing planes, its rows those of `corners`.
+    """
+    low, high = facets.facets.min(axis=1) - travel, facets.facets.max(axis=1) + travel
+    candidates = []
+    for corner in range(len(corners.vertices)):
+        near = np.flatnonzero(((corners.vertices[corner] >= low) & (corners.vertices[corner] <= high)).all(axis=1))
+        directions = corners.directions[corners.cones[corner] : corners.cones[corner + 1]]
+        near = near[(directions @ facets.normals[near].T).min(axis=0, initial=0) >= -leaning]
+        plane = facing[corners.vertex_planes[corner]][:, facets.facet_planes[near]].max(axis=0, initial=-1)
+        pair = (np.full(len(near), corner), near)
+        first, second = pair if kind == CORNER_ON_FACET else pair[::-1]
+        candidates.append(np.stack([first, second, plane], axis=1))
+    return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
+
+
+def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: float, leaning: float) -> np.ndarray:
+    """Return candidates (candidate, 3), first, second and plane, of edges of the moving body across edges of the reference."""
+    low, high = B.edges.min(axis=1) - travel, B.edges.max(axis=1) + travel
+    arcs_A, arcs_B = _arcs(A), _arcs(B)
+    candidates = []
+    for edge in range(len(A.edges)):
+        near = np.flatnonzero(((A.edges[edge].max(axis=0) >= low) & (A.edges[edge].min(axis=0) <= high)).all(axis=1))
+        plane = np.full(len(near), -1)
+        for plane_A in A.edge_planes[edge]:
+            for side in range(2):
+                plane = np.maximum(plane, facing[plane_A, B.edge_planes[near, side]])
+        cosine = -np.einsum("ai,eki->eak", arcs_A[edge], arcs_B[near]).min(axis=(1, 2))
+        meets = (cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))) & B.convex[near].astype(bool)
+        kept = (plane >= 0) | (meets & bool(A.convex[edge]))
+        candidates.append(np.stack([np.full(kept.sum(), edge), near[kept], plane[kept]], axis=1))
+    return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
+
+
+def _arcs(body: Polyhedron) -> np.ndarray:
+    """Return normals (edge, share, 3) at equal angles between those of the two facets at each edge."""
+    first, second = body.edge_normals[:, 0], body.edge_normals[:, 1]
+    cosine = (first * second).sum(axis=1, keepdims=True)
+    across = second - cosine * first
+    sine = np.linalg.norm(across, axis=1, keepdims=True)
+    angles = np.arctan2(sine, cosine) * ARC
+    return np.cos(angles)[..., None] * first[:, None] + np.sin(angles)[..., None] * (across / np.maximum(sine, TINY))[:, None]

@@ -1,0 +1,126 @@
+"""A face of a body with its ends: the corners, edges and facets at which it can touch another one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+
+from tolcontact.arrays import Array, Float, Int
+from tolcontact.geometry.edges import edges
+from tolcontact.geometry.surface import Surface
+
+SHARP_ANGLE = 1e-5  # rad: facets whose normals differ by less are one plane
+MERGE_SHARE = 1e-9  # of the body's size: vertices that are no farther apart are one
+
+
+@dataclass(frozen=True, eq=False)
+class Polyhedron:
+    """The triangles of a face, and the edges and corners around them, in the nominal assembly frame [mm].
+
+    Vertices inside a plane, and edges between facets of one plane, cannot touch anything first; they are left out.
+
+    vertices     (v, 3): the corners of the face
+    cones        (v + 1,): the first direction of each corner, and the end
+    directions   (d, 3): unit vectors along the edges of the body that start at each corner
+    facets       (t, 3, 3): the triangles
+    normals      (t, 3): their outward unit normals
+    inward       (t, 3, 3): unit vectors across each edge of a triangle, into it; edge j starts at corner j
+    edges        (e, 2, 3): the edges of the face, between planes or at its rim
+    into         (e, 2, 3): unit vectors across each edge into the two facets of the body that meet there
+    edge_normals (e, 2, 3): outward unit normals of these two facets
+    convex       (e,): whether the body is convex there
+    facet_planes, vertex_planes, edge_planes   number of the plane of each facet (t,); planes around each vertex (v, plane)
+                 and beside each edge (e, 2), as numbers, -1 where there is none
+    body         (f, 3, 3): all triangles of the body, none if it is not closed
+    """
+
+    vertices: Float[Array, "v 3"]
+    cones: Int[Array, " _"]
+    directions: Float[Array, "d 3"]
+    facets: Float[Array, "t 3 3"]
+    normals: Float[Array, "t 3"]
+    inward: Float[Array, "t 3 3"]
+    edges: Float[Array, "e 2 3"]
+    into: Float[Array, "e 2 3"]
+    edge_normals: Float[Array, "e 2 3"]
+    convex: Int[Array, " e"]
+    facet_planes: Int[Array, " t"]
+    vertex_planes: Int[Array, "v p"]
+    edge_planes: Int[Array, "e 2"]
+    body: Float[Array, "f 3 3"]
+
+
+def polyhedron(face: Surface, body: trimesh.Trimesh) -> Polyhedron:
+    """Return the polyhedron of a face of a body, both in their nominal places.
+
+    Facets of the body count as a whole, also where the face was cut out of them: the body does not end there.
+    """
+    merged = trimesh.Trimesh(body.vertices, body.faces, process=False)
+    merged.merge_vertices(digits_vertex=int(np.ceil(-np.log10(MERGE_SHARE * max(merged.scale, 1e-9)))))
+    merged.update_faces(merged.area_faces > 0)
+    vertices, faces = np.asarray(merged.vertices), np.asarray(merged.faces)
+    facet_normals = np.asarray(merged.face_normals)
+    numbers, _ = Surface(merged).nearest(np.asarray(face.mesh.triangles_center))
+    chosen = np.unique(numbers)
+    is_chosen = np.zeros(len(faces), dtype=bool)
+    is_chosen[chosen] = True
+    outer_ends, edge, triangles_there = edges(faces)
+    is_open = triangles_there[edge] == 1
+    lone = np.flatnonzero(is_open)[:, None] // 3
+    neighbours = np.concatenate([merged.face_adjacency, lone.repeat(2, axis=1)])
+    ends = np.concatenate([merged.face_adjacency_edges, outer_ends[is_open]])
+    is_sharp = np.concatenate([np.asarray(merged.face_adjacency_angles) > SHARP_ANGLE, np.ones(len(lone), dtype=bool)])
+    is_convex = np.concatenate([merged.face_adjacency_convex, np.ones(len(lone), dtype=bool)])
+    planes = trimesh.graph.connected_component_labels(neighbours[~is_sharp], node_count=len(faces))
+    is_ours = is_sharp & is_chosen[neighbours].any(axis=1)
+    start, end = vertices[ends[:, 0]], vertices[ends[:, 1]]
+    along = (end - start) / np.linalg.norm(end - start, axis=1)[:, None]
+    into = np.cross(facet_normals[neighbours], along[:, None])
+    towards = np.asarray(merged.triangles_center)[neighbours] - start[:, None]
+    into *= np.where((into * towards).sum(axis=2) < 0, -1.0, 1.0)[..., None]
+    corners = np.unique(ends[is_ours])
+    corners = corners[np.isin(corners, faces[chosen])]
+    cones, directions = _cones(corners, ends[is_sharp], vertices)
+    edge_planes = np.where(is_chosen[neighbours], planes[neighbours], -1)
+    triangles = vertices[faces[chosen]]
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    sides /= np.linalg.norm(sides, axis=2)[..., None]
+    return Polyhedron(
+        vertices=vertices[corners],
+        cones=cones,
+        directions=directions,
+        facets=triangles,
+        normals=facet_normals[chosen],
+        inward=np.cross(facet_normals[chosen][:, None], sides),
+        edges=np.stack([start, end], axis=1)[is_ours],
+        into=into[is_ours],
+        edge_normals=facet_normals[neighbours][is_ours],
+        convex=is_convex[is_ours].astype(np.int64),
+        facet_planes=planes[chosen],
+        vertex_planes=_planes_around(corners, faces[chosen], planes[chosen]),
+        edge_planes=edge_planes[is_ours],
+        body=vertices[faces] if body.is_watertight else np.zeros((0, 3, 3)),
+    )
+
+
+def _cones(corners: np.ndarray, edges: np.ndarray, vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return cones (corner + 1,) and directions (d, 3) of `corners` (corner,), from the numbers of the ends of edges."""
+    starts, ends = np.concatenate([edges, edges[:, ::-1]]).T
+    kept = np.isin(starts, corners)
+    starts, ends = starts[kept], ends[kept]
+    order = np.argsort(starts, kind="stable")
+    directions = vertices[ends[order]] - vertices[starts[order]]
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    return np.searchsorted(starts[order], np.append(corners, len(vertices))), directions
+
+
+def _planes_around(corners: np.ndarray, faces: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return the planes (corner, plane) of the `faces` (face, 3) around each corner, filled up with -1."""
+    pairs = np.unique(np.stack([faces.ravel(), planes.repeat(3)], axis=1), axis=0)
+    place = np.searchsorted(corners, pairs[:, 0])
+    is_corner = np.isin(pairs[:, 0], corners)
+    place, plane = place[is_corner], pairs[is_corner, 1]
+    rank = np.arange(len(place)) - np.searchsorted(place, place)
+    table = np.full((len(corners), rank.max(initial=0) + 1), -1)
+    table[place, rank] = plane
+    return table
