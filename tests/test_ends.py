@@ -1,10 +1,12 @@
 """Bodies touch as they end: no contact beside a face, none missed at tips and edges, judged by exact distances of polyhedra."""
 
+import io
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
+from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
@@ -12,8 +14,15 @@ from studies.certificates.ends import METHOD, Convex, judged, piece, scene, sepa
 from tests.cases.ends import CASES, case
 from tolcontact.geometry.meeting import meeting
 from tolcontact.geometry.surface import Surface
+from tolcontact.report import summary_text
 
 FAULTS = ("false contact", "missed contact", "lifted off", "inside")
+
+
+def printed(summary):
+    console = Console(width=200, record=True, file=io.StringIO())
+    console.print(summary_text(summary))
+    return console.export_text()
 
 
 def assert_right(assembly, bodies, samples, seed=1, solver="daqp"):
@@ -107,13 +116,38 @@ def test_a_bounded_search_needs_the_exact_resolution():
         tc.Method(search="bounded")
 
 
-def test_flat_faces_whose_overlap_stays_keep_their_fixed_points():
+def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_helps():
+    """The check after a run looks both ways: a plate held beside a chamfer is found, and is free once faces end."""
+    fixed, bounded = (
+        tc.run(case("chamfer", method=replace(METHOD, search=search))[0], samples=200, seed=1)
+        for search in ("fixed", "bounded")
+    )
+    summary = tc.summarize(fixed)
+    assert 0.05 < float(summary.false_contact.max()) < 0.4
+    assert 'contact pair "contact": points lie up to' in printed(summary)
+    assert 'use Method(resolution="exact", search="bounded")' in printed(summary)
+    assert np.isnan(tc.summarize(bounded).false_contact).all()
+    assert "apart" not in printed(tc.summarize(bounded))
+
+
+def stand():
+    """Return a block well inside the face of a table: its contact points stay over that face."""
     a = tc.Assembly("stand", method=METHOD)
     table = a.part("table", tc.Box(100, 100, 10), fixed=True)
     block = a.part("block", tc.Box(20, 20, 10), at=(40, 40, 10))
     a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
     a.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
     a.measure("height", block.point(0, 0, 10), along="z", tolerance=1)
-    program = tc.build(a)
+    return a
+
+
+def test_flat_faces_whose_overlap_stays_keep_their_fixed_points():
+    program = tc.build(stand())
     assert not program.meetings
     assert program.trials[0].error < program.trials[0].allowed
+
+
+def test_contact_of_faces_that_do_not_end_is_not_called_false():
+    run = tc.run(stand(), samples=200, seed=3, method=tc.Method())
+    assert (run.status == 1).any()
+    assert float(tc.summarize(run).false_contact.max()) == 0

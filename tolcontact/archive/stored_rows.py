@@ -149,4 +149,5 @@ def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
         terms.CHECKED_REALIZATION: np.full(count, terms.UNFINISHED),
         terms.SURFACE_PENETRATION: np.full((count, pairs), np.nan),
         terms.BESIDE: np.full((count, pairs), np.nan),
+        terms.FALSE_CONTACT: np.full((count, pairs), np.nan),
     }

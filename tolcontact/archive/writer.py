@@ -182,11 +182,10 @@ class ArchiveWriter:
             R, t = (file[variable.name][:end, terms.CORRECTED][rows] for variable in (terms.ROTATION, terms.TRANSLATION))
         return rows, poses.pose(R, t)
 
-    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, distance: np.ndarray) -> None:
-        """Write the results (row, pair) [mm] of the check of some rows: penetration, and distance outside the faces."""
+    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, distance: np.ndarray, false_contact: np.ndarray) -> None:
+        """Write the results (row, pair) [mm] of the check of some rows: see SURFACE in the vocabulary."""
         values = empty_checks(self._checked, self._pairs)
-        results = {terms.CHECKED_REALIZATION: rows, terms.SURFACE_PENETRATION: penetration, terms.BESIDE: distance}
-        for variable, array in results.items():
+        for variable, array in zip(terms.SURFACE, (rows, penetration, distance, false_contact), strict=True):
             values[variable][: len(rows)] = array
         with _as_archive_error(self._path):
             self._values.overwrite_together({"surface": values})

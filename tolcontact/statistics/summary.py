@@ -40,6 +40,8 @@ def summarize(results: xr.DataTree) -> Summary:
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations
+    false_contact   (pair)                               of these: how deep contact points lay inside in the raw state, where
+                                                         the surfaces were apart [mm]; NaN where that is not known
     carried         (pair, interval)                     share of realizations in which a pair carries
     reaction        (pair, of_reaction, interval)        mean and percentiles of its reaction, in the objective's units
     together        (combination, interval)              share of realizations in which exactly these pairs carry
@@ -162,13 +164,21 @@ def _penetration(rows: xr.Dataset) -> np.ndarray:
 
 def _surface_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
     """Return what the check against the surfaces found; NaN for archives of format 1, which have no such check."""
-    largest, count = [np.nan, np.nan], 0
+    largest, count, false_contact = [np.nan, np.nan], 0, np.full(results.sizes[terms.PAIR], np.nan)
     if "surface" in results.children:
         surface = results["surface"].to_dataset()
         columns = [surface[variable.name].values for variable in (terms.SURFACE_PENETRATION, terms.BESIDE)]
         largest = [np.nan if np.isnan(values).all() else float(np.nanmax(values)) for values in columns]
         count = int((surface[terms.CHECKED_REALIZATION.name] != terms.UNFINISHED).sum())
-    return {terms.DEEPEST_SURFACE: largest[0], terms.FARTHEST_BESIDE: largest[1], terms.SURFACES_CHECKED: count}
+        if terms.FALSE_CONTACT.name in surface and count:
+            depths = surface[terms.FALSE_CONTACT.name].values
+            false_contact = np.where(np.isnan(depths).all(axis=0), np.nan, np.nan_to_num(depths).max(axis=0))
+    return {
+        terms.DEEPEST_SURFACE: largest[0],
+        terms.FARTHEST_BESIDE: largest[1],
+        terms.SURFACES_CHECKED: count,
+        terms.DEEPEST_FALSE_CONTACT: false_contact,
+    }
 
 
 def _steps(rows: xr.Dataset) -> list[float]:

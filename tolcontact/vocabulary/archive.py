@@ -283,7 +283,14 @@ BESIDE = ArchiveVariable(
     "how far contact points that touch lie outside the rim of the reference face; NaN if that is not known",
     "mm",
 )
-SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE)
+FALSE_CONTACT = ArchiveVariable(
+    "false_contact",
+    (CHECKED, PAIR),
+    "f8",
+    "how deep contact points lay inside in the raw state, where the surfaces themselves were apart; NaN if that is not known",
+    "mm",
+)
+SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE, FALSE_CONTACT)
 TOUCHING_SHARE = ArchiveVariable(
     "touching",
     (POINT,),

@@ -61,6 +61,13 @@ DEEPEST_SURFACE = ArchiveVariable(
 FARTHEST_BESIDE = ArchiveVariable(
     "beside", (), "f8", "largest distance of touching contact points outside the face, of the realizations checked", "mm"
 )
+DEEPEST_FALSE_CONTACT = ArchiveVariable(
+    "false_contact",
+    (PAIR,),
+    "f8",
+    "largest depth of contact points in the raw state where the surfaces were apart, of the realizations that were checked",
+    "mm",
+)
 SURFACES_CHECKED = ArchiveVariable(
     "surfaces_checked", (), "i8", "number of realizations that were checked against the surfaces", "1"
 )

@@ -31,6 +31,7 @@ RAW, CORRECTED = STATES
 CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
 PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
+BOUNDED = 'Method(resolution="exact", search="bounded")'  # what resolves contact where faces end
 PENETRATION_SHARE = 0.01  # of the smallest tolerance range; deeper penetration calls for an exact resolution
 APART = "* differs from the index by percentiles: the measure is not normally distributed"
 
@@ -193,9 +194,13 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     if math.isfinite(depth):
         yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
-            yield f"advice: it exceeds {PENETRATION_SHARE:.0%} of the smallest tolerance range; use more contact points"
+            yield f"advice: it exceeds {PENETRATION_SHARE:.0%} of the range; use more points, or, where faces end, {BOUNDED}"
         if overhang > limit:
             yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
+    for pair, depth in zip(summary["pair"].values, summary["false_contact"].values, strict=True):
+        if depth > limit:
+            yield f'contact pair "{pair}": points lie up to {depth:.3g} mm inside where its surfaces are apart'
+            yield f"advice: its faces end within reach of contact; use {BOUNDED}"
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
