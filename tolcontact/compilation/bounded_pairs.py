@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
-from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.discretization import Nominal
 from tolcontact.errors import ContactWarning, shown
 from tolcontact.geometry.meeting import Meeting, meeting
 
@@ -66,15 +66,10 @@ def bounded_pair(
         rows = slice(k, k + POSES_AT_ONCE)
         heights = pair.heights(deviations[rows])
         bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights
-        error = max(error, float(np.abs(_depth(bounded) - _depth(_fixed_gap(pair, X_RM[rows], heights))).max(initial=0)))
+        error = max(error, float(np.abs(_depth(bounded) - _depth(pair.least_gap(X_RM[rows], heights))).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)))
     return (places if trial.error > trial.allowed else None), trial
-
-
-def _fixed_gap(pair: ContactPoints, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Return the least gap (n,) [mm] of the contact points above their fixed planes."""
-    return ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2).min(axis=1) - heights
 
 
 def _depth(gap: np.ndarray) -> np.ndarray:

@@ -46,7 +46,7 @@ class Rows:
         return len(self.pairs)
 
 
-def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method, is_bounded: bool = False) -> np.ndarray | None:
+def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | None:
     """Return the points of a pair that always have a row, or None if slots hold changing points.
 
     Points of round faces always have a row. So have the points that can be the deepest, if they are few and fixed.

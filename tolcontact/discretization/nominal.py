@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 import trimesh
 
+from tolcontact import poses as pose
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.round_points import RoundPoints
@@ -129,6 +130,10 @@ class ContactPoints:
             if face is not None and face.grows:
                 heights += face.heights(deviations)
         return heights
+
+    def least_gap(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
+        """Return the least gap (row,) [mm] of the points at X_RM (row, 12), above planes grown by `heights` (row,) [mm]."""
+        return ((pose.apply(X_RM, self.P_m) - self.P_r) * self.n_r).sum(axis=2).min(axis=1) - heights
 
     @cached_property
     def bulge(self) -> float:

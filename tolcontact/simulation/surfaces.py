@@ -8,7 +8,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
 from tolcontact.simulation.block import simulate_block
-from tolcontact.vocabulary import CORRECTED, RAW
+from tolcontact.vocabulary import CORRECTED
 
 TOUCHING_GAP = 1e-6  # mm: a contact point with a smaller gap stands on its plane
 
@@ -32,8 +32,8 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
     nominal, fixed = program.nominal, not program.method.is_iterated
     surfaces = Surfaces(*(np.full((len(poses), len(nominal.pairs)), np.nan) for _ in Surfaces._fields))
     relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), 12)
-    raw = simulate_block(program, deviations)
-    raw_relative = program.observe(poses=raw.poses[:, RAW], deviations=deviations)["relative"].reshape(relative.shape)
+    raw = program.place(deviations=deviations)["poses"]
+    raw_relative = program.observe(poses=raw, deviations=deviations)["relative"].reshape(relative.shape)
     for k, pair in enumerate(nominal.pairs):
         faces = nominal.face_pair(k)
         if faces is None or pair.reference is None:
@@ -44,7 +44,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
             row, point = np.nonzero(gaps < TOUCHING_GAP + heights[:, None])
-            depth = np.maximum(-raw.gap_min[:, RAW, k], 0)
+            depth = np.maximum(-pair.least_gap(raw_relative[:, k], heights), 0)
             surfaces.false_contact[:, k] = np.where(faces.depth(raw_relative[:, k], heights) > 0, 0.0, depth)
             surfaces.overhang[:, k] = 0
             np.maximum.at(surfaces.overhang[:, k], row, faces.reference.face.overhang(places[row, point]))
