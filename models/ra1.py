@@ -7,7 +7,7 @@ import tolcontact as tc
 
 
 def assembly() -> tc.Assembly:
-    ra1 = tc.Assembly("RA1")
+    ra1 = tc.Assembly("RA1", method=tc.Method(resolution="linearized"))
     base = ra1.part("base", tc.Box(100, 50, 10))
     top = ra1.part("top", tc.Box(50, 25, 10), at=(50, 12.5, 10))
     ra1.locate(base, tc.three_two_one(base.face("-z"), base.face("-y"), base.face("-x"), inset=5), tolerance=10)

@@ -54,7 +54,7 @@ def solid(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
 
 
 def assembly() -> tc.Assembly:
-    ra2 = tc.Assembly("RA2")
+    ra2 = tc.Assembly("RA2", method=tc.Method(resolution="linearized"))
     outer = ra2.part("outer", tc.Mesh(plate(SHEET)), fixed=True)
     inner = ra2.part("inner", tc.Mesh(plate(0)))
     ra2.locate(

@@ -25,6 +25,8 @@ COMMAND = [sys.executable, "-m", "tolcontact"]
 
 WAITING = 300  # s after which a process that a test waits for is ended; a loaded machine needs many times what an idle one does
 
+PAPER = tc.Method(resolution="linearized")
+FIXED = tc.Method(search="fixed")  # planes of the contact points do not end
 EXACT = tc.Method(resolution="exact")
 ALL_POINTS = tc.Method(resolution="exact", objective="all points")
 SEATED = tc.Method(resolution="exact", objective="seating")

@@ -73,9 +73,7 @@ def test_check_finds_what_run_would_refuse(tmp_path):
 
 
 def test_resolutions_are_compared_with_the_default_solver_and_nothing_is_cut_in_a_pipe(tmp_path):
-    (tmp_path / "m.py").write_text(
-        (cases.MODELS / "ra1.py").read_text().replace('Assembly("RA1")', f'Assembly("{"RA1 " * 40}")')
-    )
+    (tmp_path / "m.py").write_text((cases.MODELS / "ra1.py").read_text().replace('Assembly("RA1"', f'Assembly("{"RA1 " * 40}"'))
     done = call(tmp_path, "compare", "m.py", "--resolution", "linearized,exact", "--samples", "20")
     assert done.returncode == 0, done.stderr
     assert "qpoases linearized" in done.stdout and "qpoases exact" in done.stdout
@@ -107,7 +105,7 @@ def test_a_method_that_does_not_exist_is_refused():
         {"eta": 0.0},
         {"activity": -1.0},
         {"search": "often"},
-        {"search": "iterated"},
+        {"search": "iterated", "resolution": "linearized"},
     ):
         with pytest.raises(tc.TolcontactError, match=next(iter(wrong))):
             tc.Method(**wrong)

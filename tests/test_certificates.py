@@ -10,7 +10,7 @@ import tolcontact as tc
 from studies.certificates.judge import contradictions
 from studies.certificates.scenes import scene
 from tests import cases
-from tests.helpers import ALL_POINTS, EXACT, SEATED, R_t, joined, nightly, recompiled, simulate
+from tests.helpers import ALL_POINTS, EXACT, PAPER, SEATED, R_t, joined, nightly, recompiled, simulate
 from tolcontact import poses as pose
 from tolcontact.compilation import usable_plugins
 from tolcontact.compilation.contact_solver import polished
@@ -75,8 +75,8 @@ def test_a_status_does_not_hang_on_the_last_digit(seed, solver):
 def test_every_solver_certifies_what_the_others_do(solver):
     if solver not in usable_plugins():
         pytest.skip(f"{solver} does not come with this CasADi")
-    _, reference = simulate(cases.stack(), samples=300, solver="daqp")
-    _, run = simulate(cases.stack(), samples=300, solver=solver)
+    _, reference = simulate(cases.stack(), samples=300, solver="daqp", method=PAPER)
+    _, run = simulate(cases.stack(), samples=300, solver=solver, method=PAPER)
     assert (run["status"] == reference["status"]).all()
     assert np.abs(run["poses"] - reference["poses"]).max() < 1e-6  # freedoms that only eta holds enlarge the residual
     assert run["kkt_residual"].max() < 1e-8
@@ -84,7 +84,7 @@ def test_every_solver_certifies_what_the_others_do(solver):
 
 def test_what_a_solver_misses_another_one_answers():
     """A solver that stops after one iteration: the poses are those of a good one, and the archive says who answered."""
-    program, good = simulate(cases.stack(), samples=100, solver="qpoases")
+    program, good = simulate(cases.stack(), samples=100, solver="qpoases", method=PAPER)
     lazy = Plugin("daqp", {"daqp": {"iter_limit": 1}}, fallbacks=("qpoases",))
     run = joined(simulate_blocks(recompiled(program, plugin=lazy), samples=100, seed=1))
     assert run["second_answers"].sum() > 30 and good["second_answers"].sum() == 0
@@ -167,7 +167,7 @@ def test_surfaces_are_checked_between_contact_points(tmp_path):
 
 def test_points_beside_the_rim_of_a_face_are_told():
     """RA1's top block stands out over the end of the base."""
-    results = tc.run(cases.ra1(), samples=300, solver="daqp")
+    results = tc.run(cases.ra1(), samples=300, solver="daqp", method=PAPER)
     summary = tc.summarize(results)
     assert float(summary["surface_penetration"]) < 1e-9
     assert 1 < float(summary["beside"]) < 15

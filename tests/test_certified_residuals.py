@@ -1,11 +1,12 @@
 """A residual tells what was left undone: nothing is certified that was not brought to its end."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-import tolcontact as tc
 from tests import cases, referee
-from tests.helpers import R_t, simulate
+from tests.helpers import PAPER, R_t, simulate
 from tolcontact.contact.resolver import ContactResolver, checked_residual
 from tolcontact.contact.state import State
 from tolcontact.simulation.block import simulate_block
@@ -14,7 +15,7 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 def test_points_that_are_deeper_than_the_rows_of_the_qp_count():
     """One round of row generation is too few where other points go inside: those rows have not converged, and say how deep."""
-    method = tc.Method(active_set="initial")  # every point that is active may need its row
+    method = replace(PAPER, active_set="initial")  # every point that is active may need its row
     program, whole = simulate(cases.ra1(), samples=200, solver="daqp", method=method)
     assert np.isin(whole["status"], [Status.UNTOUCHED, Status.RESOLVED]).all()
     resolvers = [ContactResolver(program, group, max_rounds=1) for group in program.groups]

@@ -1,11 +1,13 @@
 """The corrected state against a second method, other solvers, other blocks, and closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import tolcontact as tc
 from tests import cases, referee
-from tests.helpers import R_t, nightly, placed, simulate
+from tests.helpers import PAPER, R_t, nightly, placed, simulate
 from tolcontact.compilation import usable_plugins
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
@@ -33,8 +35,8 @@ def test_solvers_agree_on_the_same_draws(case, solver):
     """Freedoms that only eta = 1e-6 holds enlarge an error of the QP by up to 1e3 / (share of active points)."""
     if solver not in usable_plugins():
         pytest.skip(f"{solver} does not come with this CasADi")
-    _, reference = simulate(case(), samples=1000, solver="daqp")
-    _, run = simulate(case(), samples=1000, solver=solver)
+    _, reference = simulate(case(), samples=1000, solver="daqp", method=PAPER)
+    _, run = simulate(case(), samples=1000, solver=solver, method=PAPER)
     apart = np.abs(run["poses"] - reference["poses"]).max(axis=(1, 2, 3))
     if solver == "qpoases":
         assert apart.max() < 1e-8
@@ -84,7 +86,7 @@ def test_a_realization_without_penetration_is_left_untouched_to_the_last_bit():
 
 
 def test_gaps_agree_with_the_papers_formula_point_by_point():
-    program, run = simulate(cases.stack(), samples=50)
+    program, run = simulate(cases.stack(), samples=50, method=PAPER)
     R, t = R_t(run["poses"])
     for k in range(50):
         for state in (RAW, CORRECTED):
@@ -94,7 +96,7 @@ def test_gaps_agree_with_the_papers_formula_point_by_point():
 
 
 def test_contact_of_one_moving_part_leaves_no_penetration():
-    _, run = simulate(cases.ra1(), samples=1000)
+    _, run = simulate(cases.ra1(), samples=1000, method=PAPER)
     assert run["gap_min"][:, CORRECTED].min() > -1e-10
     assert (run["status"] != Status.NOT_CONVERGED).all()
     assert run["kkt_residual"].max() < 1e-10
@@ -102,8 +104,8 @@ def test_contact_of_one_moving_part_leaves_no_penetration():
 
 def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not():
     """Contact at the upper joint presses the middle plate onto the bottom, where nothing was active before."""
-    _, initial = simulate(cases.stack(), samples=200, method=tc.Method(active_set="initial"))
-    _, closed = simulate(cases.stack(), samples=200)
+    _, initial = simulate(cases.stack(), samples=200, method=replace(PAPER, active_set="initial"))
+    _, closed = simulate(cases.stack(), samples=200, method=PAPER)
     only_upper = (closed["active"][:, 0] == 0) & (closed["active"][:, 1] > 0)
     assert only_upper.sum() > 10
     assert initial["gap_min"][only_upper, CORRECTED, 0].min() < -0.1
@@ -200,7 +202,7 @@ def test_the_order_of_parts_and_pairs_changes_nothing(method):
 
 def test_rows_that_contradict_each_other_are_reported_and_nothing_is_dropped():
     """A tab wider than its slot: no increment opens both sides."""
-    _, run = simulate(cases.tab(tolerance=0.01, floor=False), samples=50)
+    _, run = simulate(cases.tab(tolerance=0.01, floor=False), samples=50, method=PAPER)
     assert (run["status"] == Status.NOT_CONVERGED).all()
     assert np.isfinite(run["poses"]).all()
     # The least-penetrating pose shares the excess of 0.1 mm between both sides.

@@ -113,7 +113,7 @@ def test_bodies_touch_exactly_if_a_place_has_a_gap_below_0(seed):
 
 def test_a_bounded_search_needs_the_exact_resolution():
     with pytest.raises(tc.OptionError, match='search is "bounded" with a linearized resolution'):
-        tc.Method(search="bounded")
+        tc.Method(resolution="linearized", search="bounded")
 
 
 def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_helps():

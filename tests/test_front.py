@@ -48,7 +48,7 @@ def test_declared_things_print_as_rows():
 
 def test_programs_and_blocks_are_readable():
     program = tc.build(cases.ra1(), solver="daqp")
-    assert repr(program).splitlines()[0] == "program of RA1: daqp, linearized, active points"
+    assert repr(program).splitlines()[0] == "program of RA1: daqp, exact, active points"
     assert "  contact interface: 202 contact points" in repr(program)
     (block,) = tc.simulate_blocks(program, samples=100, seed=1)
     assert repr(block).startswith("realizations 0 to 99: ") and "resolved" in repr(block)

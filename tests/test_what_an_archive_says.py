@@ -13,7 +13,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import simulate
+from tests.helpers import PAPER, simulate
 from tolcontact.errors import ArchiveError
 
 SEATED = {"resolution": "exact", "objective": "seating"}
@@ -22,7 +22,7 @@ SEATED = {"resolution": "exact", "objective": "seating"}
 @pytest.fixture(scope="module")
 def archive(tmp_path_factory):
     path = tmp_path_factory.mktemp("archive") / "stack.nc"
-    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=path, surfaces=12).close()
+    tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=PAPER, out=path, surfaces=12).close()
     return path
 
 
@@ -69,7 +69,7 @@ def test_the_settings_of_a_run_are_its_attributes(archive):
     expected = {
         "solver": "daqp", "resolution": "linearized", "objective": "active points", "weighting": "active points",
         "regularization": "points", "eta": 1e-6, "active_set": "closed", "activity": 1e-9, "search": "fixed", "near_turn": 1.0,
-        "near_travel": 0.5, "method_from": "defaults", "seed": 3, "samples": 300, "kept": "all", "solver_accuracy": 1e-8,
+        "near_travel": 0.5, "method_from": "options", "seed": 3, "samples": 300, "kept": "all", "solver_accuracy": 1e-8,
         "title": "variation simulation of stack",
     }  # fmt: skip
     assert {word: said[word] for word in expected} == expected
@@ -188,7 +188,7 @@ def test_resuming_a_model_whose_mesh_was_replaced_is_refused(tmp_path):
 def test_history_tells_when_a_run_went_on(archive, tmp_path):
     path = tmp_path / "copy.nc"
     path.write_bytes(archive.read_bytes())
-    tc.run(cases.stack(), samples=400, seed=3, solver="daqp", out=path, resume=True, surfaces=12).close()
+    tc.run(cases.stack(), samples=400, seed=3, solver="daqp", method=PAPER, out=path, resume=True, surfaces=12).close()
     attributes = xr.load_dataset(path).attrs
     begun, resumed = attributes["history"].splitlines()
     assert begun.endswith("created") and resumed.endswith("resumed after 0 realizations") and attributes["samples"] == 400

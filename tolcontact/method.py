@@ -1,7 +1,8 @@
 """The named choices of how contact is resolved. They decide the answer, so every archive carries them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
+from typing import Any
 
 from tolcontact.errors import OptionError
 
@@ -9,6 +10,7 @@ RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
 SEARCHES = ("fixed", "iterated", "bounded")
+USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}  # by resolution
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,8 @@ OBJECTIVES = {
 class Method:
     """How contact is resolved: paper (9) to (12), with its free choices named.
 
-        resolution      "linearized": one linear step (12), as in the paper; "exact": steps are repeated, with proper
-                        rotations, until the true gaps (5) are open and the objective is least
+        resolution      "exact": steps are repeated, with proper rotations, until the true gaps (5) are open and the
+                        objective is least; "linearized": one linear step (12), as in the paper
         objective       what the corrected pose minimizes. "active points": half the sum of squared displacements, from the
                         raw state, of the contact points that are active there (the paper's); "all points": of all contact
                         points; "locator stiffness": the energy of the two-sided locators as springs; "seating": the
@@ -56,9 +58,10 @@ class Method:
         active_set      "initial": only points below `activity` in the raw state are constrained (the paper's set);
                         "closed": points that the correction itself drives into contact are constrained too
         activity        a contact point is active below this gap [mm]
-        search          "fixed": contact points are projected once, in the nominal state; "iterated": they are projected
-                        again at the corrected pose until they no longer move (paper, 2.2); "bounded": faces end where they
-                        end, and touch at corners, edges and facets of both bodies, found at every pose
+        search          "bounded": faces end where they end, and touch at corners, edges and facets of both bodies, found at
+                        every pose; "fixed": contact points are projected once, in the nominal state, on planes without end;
+                        "iterated": they are projected again at the corrected pose until they no longer move (paper, 2.2).
+                        If it is not given, "bounded" with "exact", and "fixed" with "linearized", which has no other
         near_turn       [rad] an answer that turns a part by more, from its raw pose, is doubted: tried again from other
                         starts, and never certified
         near_travel     in sizes of the largest part that contact couples: an answer that moves contact points farther, from
@@ -67,17 +70,19 @@ class Method:
     Every archive states all of these choices.
     """
 
-    resolution: str = "linearized"
+    resolution: str = "exact"
     objective: str = "active points"
     regularization: str = "points"
     eta: float = 1e-6
     active_set: str = "closed"
     activity: float = 1e-9
-    search: str = "fixed"
+    search: str = ""
     near_turn: float = 1.0
     near_travel: float = 0.5
 
     def __post_init__(self) -> None:
+        if not self.search:
+            object.__setattr__(self, "search", USUAL_SEARCH.get(self.resolution, "fixed"))
         choices = {
             "resolution": RESOLUTIONS,
             "objective": tuple(OBJECTIVES),
@@ -98,6 +103,11 @@ class Method:
             raise OptionError(f"near_travel is {self.near_travel!r}; expected a number of part sizes above 0")
         if self.search != "fixed" and self.resolution != "exact":
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
+
+    def with_choices(self, **choices: Any) -> "Method":
+        """Return this method with other choices; another resolution comes with its usual search, unless one is given."""
+        other = choices.get("resolution", self.resolution) != self.resolution
+        return replace(self, **({"search": ""} if other else {}) | choices)
 
     @property
     def minimizes(self) -> Objective:

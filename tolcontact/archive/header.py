@@ -40,7 +40,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
     _write_rows(file, program, kept_rows(run.keep))
     _write_measures(file, program)
     _write_model(file.createGroup("model"), nominal, declaration(program))
-    _write_contact(file.createGroup("contact"), nominal)
+    _write_contact(file.createGroup("contact"), program)
     _write_sample(file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
     file["contact"].createDimension(terms.BOUND, 2)
     _lay_out_group(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
@@ -164,7 +164,8 @@ def _write_surfaces(group: netCDF4.Group, variables: Mapping[str, ArchiveVariabl
         write(group, variable, arrays[name])
 
 
-def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
+def _write_contact(group: netCDF4.Group, program: Program) -> None:
+    nominal = program.nominal
     group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
         group.createDimension(terms.ROUND_POINT, sum(len(pair.round) for pair in nominal.pairs if pair.round))
@@ -176,13 +177,13 @@ def _write_contact(group: netCDF4.Group, nominal: Nominal) -> None:
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
-    for variable, values in contact_values(nominal).items():
+    for variable, values in contact_values(program).items():
         write(group, variable, values)
 
 
-def contact_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
+def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
     """Return the values of the group `contact`: which parts touch, and where."""
-    pairs = nominal.pairs
+    nominal, pairs = program.nominal, program.nominal.pairs
     parts = {
         terms.MOVING_PART: [pair.moving for pair in pairs],
         terms.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
@@ -197,7 +198,19 @@ def contact_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
         terms.LOCATOR_OF_POINT: np.concatenate(locators),
     }
-    return values | _round_values(nominal) | _face_values(nominal)
+    return values | _bounded_values(program) | _round_values(nominal) | _face_values(nominal)
+
+
+def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
+    """Return which pairs touch where their faces end, and how wrong fixed contact points would be; none unless they may."""
+    if not program.method.is_bounded:
+        return {}
+    numbers = range(len(program.nominal.pairs))
+    trials = [program.trials[k] for k in numbers]
+    return {
+        terms.BOUNDED: [k in program.meetings for k in numbers],
+        terms.PLANE_ERROR: [trial.error for trial in trials],
+    }
 
 
 def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:

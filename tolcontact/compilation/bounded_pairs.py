@@ -22,7 +22,10 @@ MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 
 
 class Trial(NamedTuple):
-    """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm]."""
+    """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm].
+
+    NaN for a pair that has no choice: one-sided locators, round faces, tolerances without an end, or too many edges.
+    """
 
     error: float
     allowed: float
@@ -37,7 +40,7 @@ def bounded_pair(
     """
     pair = nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
-    nothing = None, Trial(0.0, np.inf)
+    nothing = None, Trial(np.nan, np.nan)
     if pair.moving_face is None or pair.reference_face is None or pair.reference is None or pair.round is not None:
         return nothing
     if not np.isfinite(smallest):

@@ -11,8 +11,8 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
-from tolcontact.contact.scan import PairScan, RoundScan, Scan, fixed, min_gaps, pair_scan
-from tolcontact.contact.state import Slots, State
+from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
+from tolcontact.contact.state import Slots, State, Task
 from tolcontact.geometry.surface import Surface
 from tolcontact.mechanics import curved_pairs
 
@@ -147,20 +147,30 @@ class Candidates:
         *,
         projected: bool = False,
         slots: Sequence[Slots] = (),
+        width: float = 1.0,
     ) -> list[Scan]:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
-        remain a little beyond their edges. With `projected`, points against curved faces are projected again in any case.
+        remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against curved faces are projected again in any case.
         """
         scans = list(self._carrying_scans)
         if projected or self._method.is_iterated:
             for k in self._margins:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in self.bounded.items():
-            kept, error = (slots[self._varying.index(k)].labels, self._edge_error) if slots else (None, 0.0)
+            kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             scans[k] = bounded_scan(scans[k], places, relative[:, k], self._pairs[k].heights(deviations), kept, error)
         return scans
+
+    def hold(self, task: Task, state: State) -> Bool[Array, " n"]:
+        """Return whether the places that carry are as near to their faces as they may be in an answer (n,)."""
+        scans = self.scans(state.relative, task.deviations, slots=state.slots)
+        held = np.ones(len(state), dtype=bool)
+        for k in self.bounded:
+            slots = state.slots[self._varying.index(k)]
+            held &= (changing(scans[k]).holds(slots.points) | ~slots.filled).all(axis=1)
+        return held
 
     def projected(self, k: int, relative: Float[Array, "realization 12"]) -> PairScan:
         """Return a scan of the points of pair k, projected again at X_RM (realization, 12)."""

@@ -34,7 +34,7 @@ class Record:
     iterations     (n,): linear steps taken
     starts         (n,): places the steps were started from
     second_answers (n,): QPs that another solver had to answer
-    searched       (n,): 1 if contact points were projected again at the corrected poses, or places were found there
+    searched       (n,): 1 if contact points were projected again at the corrected poses
     """
 
     kkt_residual: Float[Array, " n"] = field(metadata=number(terms.KKT_RESIDUAL, start=np.inf))

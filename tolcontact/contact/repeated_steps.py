@@ -22,27 +22,37 @@ ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
 
 
 class StepKind(NamedTuple):
-    """How firmly a step holds what the objective leaves open, and whether it counts curvature."""
+    """How firmly a step holds what the objective leaves open, whether it counts curvature, and how wide edges are taken."""
 
     firmness: float
     newton: bool
+    width: float = 1.0
 
 
-STEPS = (
-    *[StepKind(1.0, newton=False)] * 8,
-    *[StepKind(1e4, newton=True)] * 6,
-    *[StepKind(1e2, newton=True)] * 6,
-    *[StepKind(1.0, newton=True)] * 80,
+FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] * 6)
+STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
+# Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
+# held back, again later, with places that stay longer: they do not jump to and fro between places.
+WIDE = 4.0
+STEPS_WHERE_FACES_END = (
+    *[StepKind(1.0, newton=False)] * 24,
+    *(kind._replace(width=WIDE) for kind in FIRM_STEPS),
+    *[StepKind(10.0, newton=False, width=WIDE)] * 30,
+    *[StepKind(3.0, newton=False, width=WIDE)] * 20,
+    *[StepKind(1.0, newton=False, width=WIDE)] * 30,
+    *[StepKind(1.0, newton=True, width=WIDE)] * 50,
 )
 
 
 def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, best = Unsettled(task, state), None
-    for kind in STEPS:
+    for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
         size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
         knows_curvature = kind.newton or step.knows_walls
         moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not knows_curvature)))
+        if kind.width > 1:
+            moves |= ~candidates.hold(unsettled.task, unsettled.state)
         # The smaller one tells: steps are large in freedoms that nothing holds, and in the norm of the objective if
         # Newton's curvature is stiff.
         unrest = np.minimum(size, scaled)
@@ -56,7 +66,7 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         if not len(unsettled):
             return
         if candidates.bounded:
-            scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots)
+            scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots, width=kind.width)
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             best = better_state(best, unsettled.state, true_penetration(unsettled.task, unsettled.state))

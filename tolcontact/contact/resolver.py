@@ -69,11 +69,6 @@ class ContactResolver:
         self._step.start_over()
 
     @property
-    def finds_places(self) -> bool:
-        """Whether places of contact are found at every pose, so that gaps are not those of the nominal contact points."""
-        return bool(self._candidates.bounded)
-
-    @property
     def spans(self) -> list[slice]:
         """The rows of each pair in the QP."""
         return self._step.spans
@@ -123,7 +118,7 @@ class ContactResolver:
             repeat(self._step, self._limits, self._candidates, task, state, start.stride)
         else:
             self._step.take(task, state, stride=start.stride)
-        state.searched[:] = projected or self.finds_places
+        state.searched[:] = projected
         self._leave_adrift(task, state)
         task = replace(task, scans=self._candidates.scans(state.relative, task.deviations, projected=projected))
         state.gap_min[:] = min_gaps(task.scans, state.relative, task.deviations)

@@ -120,7 +120,6 @@ def simulate_block(
     for resolver in resolvers:
         resolved = resolver.resolve(raw, relative, deviations)
         _put(block, resolver, resolved)
-        block.searched[:] = np.maximum(block.searched, resolver.finds_places)
         worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
     unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
     worst[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf

@@ -13,9 +13,11 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
+from tolcontact.geometry.meeting import Meeting
 
 DIRECTIONS = 72  # that are tried at first
 NARROWINGS = 60
+POSES_AT_ONCE = 256
 GOLDEN = (np.sqrt(5) - 1) / 2
 Rows = Mapping[str, xr.DataArray]  # variables (realization, ...) by name
 
@@ -165,9 +167,13 @@ class ArchivedFaces:
 
 
 class ArchivedPair:
-    """The nominal contact points of a pair, and where the archived poses put them."""
+    """The nominal contact points of a pair, and where the archived poses put them.
 
-    def __init__(self, tree: xr.DataTree, pair: int) -> None:
+    With a `meeting`, the pair touches where its faces end, at places that are found again at the archived poses.
+    """
+
+    def __init__(self, tree: xr.DataTree, pair: int, meeting: Meeting | None = None) -> None:
+        self.meeting = meeting
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
         is_own = contact[terms.PAIR_OF_POINT.name] == pair
         points = (terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL)
@@ -200,10 +206,12 @@ class ArchivedPair:
         R_m, t_m = self.faces.placed(self.moving_face, deviations, *moving)
         R_r, t_r = self.faces.placed(self.reference_face, deviations, *reference)
         of_moving, of_reference = (self.faces.height(face, deviations) for face in (self.moving_face, self.reference_face))
-        if self.round:
+        if self.round or self.meeting:
             turn = np.broadcast_to(R_r.swapaxes(-1, -2), R_m.shape)
             offset = np.einsum("...ij,...j->...i", turn, t_m - t_r)
             grown = (of_moving[:, None], of_reference[:, None])
+            if self.meeting:
+                return (least_gaps(self.meeting, turn @ R_m, offset) - sum(grown))[..., None]
             return np.stack([point.gaps(turn @ R_m, offset, *grown) for point in self.round], axis=-1)
         # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
         back, n = R_r.swapaxes(-1, -2), self.normal
@@ -217,6 +225,15 @@ class ArchivedPair:
         if supports.any():
             gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]
         return gaps
+
+
+def least_gaps(meeting: Meeting, R: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Return the least gaps (...) [mm] of all places, with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference."""
+    X_RM = np.concatenate([R.reshape(-1, 9), t.reshape(-1, 3)], axis=1)
+    pieces = [
+        meeting.at(X_RM[k : k + POSES_AT_ONCE]).gaps.min(axis=1, initial=np.inf) for k in range(0, len(X_RM), POSES_AT_ONCE)
+    ]
+    return np.concatenate(pieces).reshape(R.shape[:-2])
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -237,6 +237,17 @@ LOCATOR_OF_POINT = ArchiveVariable(
     "number of the one-sided locator that a contact point represents, whose deviation is subtracted from its gap; -1: none",
 )
 
+BOUNDED = ArchiveVariable(
+    "bounded", (PAIR,), "i1", "1: faces end, and places of contact are found at every pose; 0: contact points are fixed", "1"
+)
+PLANE_ERROR = ArchiveVariable(
+    "plane_error",
+    (PAIR,),
+    "f8",
+    "largest error of fixed contact points in the depth of contact, at 1024 raw poses; NaN: not compared",
+    "mm",
+)
+
 COMPONENT_LABEL = label(COMPONENT, "component of the displacement")
 FIELD_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "surface points of the part, nominal", "mm")
 FIELD_FACES = MESH_FACES

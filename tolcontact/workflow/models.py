@@ -1,7 +1,7 @@
 """Models: what `run` and the analyses take, from a script's path to the compiled program."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +94,7 @@ def method_of(assembly: Assembly, method: Choice | None) -> Method:
     for name in method:
         if name not in names:
             raise OptionError(f"a method has no choice {name!r}; expected some of: {', '.join(names)}")
-    return replace(default, **method)
+    return default.with_choices(**method)
 
 
 def check_counts(**counts: int) -> None:

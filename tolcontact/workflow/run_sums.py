@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive import ArchiveWriter, Run, stored
@@ -59,12 +60,26 @@ def count_touching(
         relative = program.observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(counts), -1)
         for k, (gaps, points) in enumerate(zip(program.gaps, counts, strict=True)):
             X_RM = np.ascontiguousarray(relative[:, k])
-            if gaps is None:
+            if k in program.meetings:
+                points[:] = _nearest_counts(program, k, relative[:, k], deviations)
+            elif gaps is None:
                 distances = program.round_gaps[k](X_RM=X_RM, deviations=deviations)["distances"]
                 points[:] = (distances < TOUCHING_GAP).sum(axis=0)
             else:
                 kernel.count_below(gaps.basis, gaps.columns, gaps.coordinates, X_RM, deviations, TOUCHING_GAP, points)
     return TouchingCounts(np.concatenate([np.zeros(0, dtype=np.int64), *counts]), len(poses))
+
+
+def _nearest_counts(
+    program: Program, k: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
+) -> Int[Array, " point"]:
+    """Return in how many realizations pair k, whose places are found at every pose, touches nearest to each contact point."""
+    pair = program.nominal.pairs[k]
+    found = program.meetings[k].at(X_RM)
+    row, place = np.nonzero(found.gaps - pair.heights(deviations)[:, None] < TOUCHING_GAP)
+    _, nearest = KDTree(pair.P_m).query(found.P_m[row, place])
+    realization_and_point = np.unique(np.column_stack([row, nearest]), axis=0)
+    return np.bincount(realization_and_point[:, 1], minlength=len(pair.P_m))
 
 
 ReducedBlock = tuple[StoredBlock, tuple[BlockSums, TouchingCounts]]
