@@ -10,7 +10,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import SEATED, call, nightly
+from tests.helpers import PAPER, SEATED, call, nightly
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.tails import BISECTIONS, INFLATIONS, not_assemblable, simulated_scores
 from tolcontact.simulation import map_blocks
@@ -107,7 +107,7 @@ def score_of(engine, u):
 
 def test_what_has_no_rare_event_is_refused():
     with pytest.raises(tc.OptionError, match="no measure has limits"):
-        tc.tails(cases.one_dimensional(0))
+        tc.tails(cases.one_dimensional(0), method=PAPER)
     with pytest.raises(tc.OptionError, match="samples is 100;"):
         tc.tails(limited(4), samples=100)
     still = tc.Assembly("still")

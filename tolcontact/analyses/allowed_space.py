@@ -33,12 +33,15 @@ class Region:
         self.lower, self.upper = bounds.T.copy()
         self._drive = np.eye(len(contributors)) + draws.drive_matrix
         self._populations = draws.populations
+        self._add_shifts = draws.add_shifts
         measured = [column for columns, _ in self._populations for column in columns]
         for columns, values in self._populations:
             self.lower[columns], self.upper[columns] = values.min(axis=0), values.max(axis=0)
         self.zones = [zone for zone in draws.contributors.zones if not np.isin(zone.columns, measured).any()]
         for zone in self.zones:
             self._enclose(zone)
+        for column, lean in draws.leans.items():
+            self.lower[column], self.upper[column] = lean.bounds(self.lower, self.upper)
         self._joined = [(np.array(columns), values) for columns, values in self._populations]
         rng = np.random.default_rng(seed)
         for columns in self._joint_columns():
@@ -48,7 +51,9 @@ class Region:
 
     def deviations(self, points: np.ndarray) -> np.ndarray:
         """Return deviations (n, contributor), as a Program takes them, of points (n, contributor)."""
-        return np.asarray(points @ self._drive)
+        deviations = np.asarray(points @ self._drive)
+        self._add_shifts(deviations)
+        return deviations
 
     def slopes(self, slopes: np.ndarray) -> np.ndarray:
         """Return derivatives by points (..., contributor), from derivatives by deviations."""

@@ -88,10 +88,11 @@ def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np
     return np.array(checksums, dtype=np.int64)
 
 
-def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
-    """Return the numbers (row,) of at most `count` certified realizations, in order.
+def choose(file: netCDF4.Dataset, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the numbers (row,) of at most `count` certified realizations, in order, and whether each is a random choice.
 
     A third are those that penetrate most at contact points, a third those with most carrying points; the others are random.
+    The random ones are a fair sample of all certified realizations.
     """
     rows = len(file.dimensions[terms.REALIZATION]) if count else 0
     deepest, busiest, random = (_Largest(count // 3), _Largest(count // 3), _Largest(count))
@@ -103,8 +104,11 @@ def choose(file: netCDF4.Dataset, count: int, seed: int) -> np.ndarray:
         deepest.add(number, np.where(inside > terms.ROUNDED, inside, 0.0))
         busiest.add(number, carrying[number - start].sum(axis=1))
         random.add(number, lot.random(len(number)))
-    numbers = list(dict.fromkeys([*deepest.numbers, *busiest.numbers, *random.numbers]))
-    return np.sort(numbers[:count]).astype(np.int64)
+    fair = random.numbers[: count - 2 * (count // 3)]
+    numbers = np.array(list(dict.fromkeys([*fair, *deepest.numbers, *busiest.numbers, *random.numbers])), dtype=np.int64)
+    chosen = np.sort(numbers[:count])
+    left_out = np.flatnonzero(~np.isin(random.numbers, chosen))
+    return chosen, np.isin(chosen, random.numbers[: left_out[0] if len(left_out) else None])
 
 
 def _pieces(file: netCDF4.Dataset, rows: int) -> Iterator[tuple[int, np.ndarray, np.ndarray, np.ndarray]]:
@@ -150,4 +154,7 @@ def empty_checks(count: int, pairs: int) -> dict[ArchiveVariable, np.ndarray]:
         terms.SURFACE_PENETRATION: np.full((count, pairs), np.nan),
         terms.BESIDE: np.full((count, pairs), np.nan),
         terms.FALSE_CONTACT: np.full((count, pairs), np.nan),
+        terms.CONTACTS: np.full((count, pairs), np.nan),
+        terms.CONTACTS_ENDED: np.full((count, pairs), np.nan),
+        terms.AT_RANDOM: np.zeros(count, dtype=np.int8),
     }

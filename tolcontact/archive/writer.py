@@ -10,7 +10,7 @@ soon, a long run begins with room for few rows; when these are full, a copy gets
 import contextlib
 import shutil
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, Literal, NamedTuple
 
@@ -162,8 +162,8 @@ class ArchiveWriter:
                 {terms.field_of(part): values for part, values in zip(self._parts, fields, strict=True)}
             )
 
-    def chosen(self, seed: int) -> np.ndarray:
-        """Return the numbers (row,) of the realizations to check against the surfaces."""
+    def chosen(self, seed: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the numbers (row,) of the realizations to check against the surfaces, and whether each is a random choice."""
         with opened_locked(self._path, "r") as file:
             return choose(file, self._checked, seed)
 
@@ -182,10 +182,10 @@ class ArchiveWriter:
             R, t = (file[variable.name][:end, terms.CORRECTED][rows] for variable in (terms.ROTATION, terms.TRANSLATION))
         return rows, poses.pose(R, t)
 
-    def write_checked(self, rows: np.ndarray, penetration: np.ndarray, distance: np.ndarray, false_contact: np.ndarray) -> None:
-        """Write the results (row, pair) [mm] of the check of some rows: see SURFACE in the vocabulary."""
+    def write_checked(self, rows: np.ndarray, at_random: np.ndarray, findings: Iterable[np.ndarray]) -> None:
+        """Write the findings (row, pair) of the check of some rows, in the order of SURFACE in the vocabulary."""
         values = empty_checks(self._checked, self._pairs)
-        for variable, array in zip(terms.SURFACE, (rows, penetration, distance, false_contact), strict=True):
+        for variable, array in zip(terms.SURFACE, (rows, *findings, at_random), strict=True):
             values[variable][: len(rows)] = array
         with _as_archive_error(self._path):
             self._values.overwrite_together({"surface": values})

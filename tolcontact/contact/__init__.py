@@ -11,15 +11,17 @@
 
 ## Linearized or exact
 
-`resolution="linearized"` (default) is the paper's single linear step. If one plane meets one plane, this step opens all gaps
-with nearly the smallest motion. With several free bodies, or with curved or opposed faces, it leaves penetration, which the
-summary reports; above 1 % of the smallest tolerance range the summary recommends `exact`.
+`resolution="exact"` (default) repeats linear steps about the true pose, with proper rotations, until every true gap of the
+bodies is open and the objective is minimal. It usually takes 3 to 8 steps, and two to four times as long as one linear step
+(seven times with thirty free bodies, ten times where many facets meet).
 
-`resolution="exact"` repeats linear steps about the true pose, with proper rotations, until every true gap is open and the
-objective is minimal. It usually takes 3 to 8 steps, and two to four times as long (seven times with thirty free bodies). The
-single step fails for a U in a U without clearance; `exact` resolves all of 10 000 draws of it (see `studies/exact`).
+`resolution="linearized"` is the paper's single linear step, about contact points and planes that are fixed in the nominal
+state. If one plane meets one plane, this step opens all gaps with nearly the smallest motion. With several free bodies, or
+with curved or opposed faces, it leaves penetration, which the summary reports; above 1 % of the smallest tolerance range the
+summary recommends `exact`. The single step fails for a U in a U without clearance; `exact` resolves all of 10 000 draws of it
+(see `studies/exact`).
 
->>> exact = tc.run(stand, samples=200, method=tc.Method(resolution="exact"))
+>>> exact = tc.run(stand, samples=200)
 >>> sorted({tc.Status(int(status)).name for status in exact.status})
 ['RESOLVED', 'UNTOUCHED']
 >>> float(exact.gap_min.sel(state="corrected").min()) > -1e-8
@@ -32,8 +34,8 @@ are projected again. The best solution is kept; `starts` counts the starts.
 
 ## Contact search
 
-Contact points are projected once, in the nominal state. `tc.Method(resolution="exact", search="iterated")` projects them again
-at the corrected pose until they no longer move. It matters if curved surfaces slide along each other: for two rollers of
+With `search="fixed"` contact points are projected once, in the nominal state; `search="iterated"` projects them again at the
+corrected pose until they no longer move (paper, 2.2). It matters if curved surfaces slide along each other: for two rollers of
 radius 10, one set down 3 mm beside the top of the other, the axes end 20 mm apart as they must (to 0.002 mm of the mesh), and
 up to 0.5 mm too far apart with fixed points. If fixed points let a round part sink into its counterpart (a roller that spins),
 the exact resolution notices and searches again for these realizations, which then take about 0.2 s each; the archive marks
@@ -44,29 +46,30 @@ them in `searched`. Balls and shafts beside walls need no search: their contact 
 
 Fixed contact points are held outside the plane of their foot, even where that face has ended: a plate that slides clear of a
 chamfered block may be held by the plane of the chamfer, and a pointed tip of the reference side may sink in between points of
-the moving side. `tc.Method(resolution="exact", search="bounded")` resolves contact of the bodies as they end. Two bodies touch
+the moving side. The exact resolution therefore resolves contact of the bodies as they end (`search="bounded"`). They touch
 at a corner of one on a facet of the other, from both sides, or at an edge across an edge. Planes that face each other touch
 at the corners of their overlap. These places are found at every pose, and a place counts only while it lies on both bodies.
 
 When the model is compiled, 1024 raw poses decide for each pair: if fixed planes miss the depth of contact by no more than a
-two-thousandth of the smallest tolerance range, the pair keeps its fixed points and costs no more than before (`meetings` of
-the program holds the other pairs, `trials` the errors). Balls and shafts beside walls are exact anyway.
+two-thousandth of the smallest tolerance range, the pair keeps its fixed points and costs no more than with them (`check
+--verbose` says which pairs do, and so do `bounded` and `plane_error` in the archive). Balls and shafts beside walls are exact
+anyway.
 
 >>> plate, wedge = tc.Box(60, 50, 3), tc.Mesh(trimesh.creation.cone(8, 6, sections=24))
->>> tip = tc.Assembly("tip", method=tc.Method(resolution="exact", search="bounded"))
+>>> tip = tc.Assembly("tip")
 >>> cone = tip.part("cone", wedge, fixed=True)
 >>> cover = tip.part("cover", plate, at=(-30, -25, 6))
 >>> rows = tc.three_two_one(cover.face("-z"), cover.face("-y"), cover.face("-x"), inset=2)
 >>> location, pair = tip.locate(cover, rows, tolerance=1), tip.contact("seat", moving=cover.face("-z"), reference=cone.face())
 >>> middle = tip.measure("middle", cover.point(30, 25, 0), along="z", tolerance=1)
 >>> run = tc.run(tip, samples=100)
->>> bool((run.gap_min.sel(state="corrected") > -1e-8).all()), run.searched.values.min().item()
-(True, 1)
+>>> bool((run.gap_min.sel(state="corrected") > -1e-8).all()), run["contact"].bounded.values.tolist()
+(True, [1])
 
 `studies/certificates` judges certified realizations of random bodies by exact distances of polyhedra. Limits: triangles are the
 body, also where they stand for a curved face that is not known analytically. A pair of more than 100 000 places keeps its fixed
 points, with a warning. The objective still weighs the sampled contact points. Places are looked for within twice the largest
-travel of the 1024 raw poses. In the archive, such realizations are `searched`.
+travel of the 1024 raw poses.
 
 ## Statuses
 
@@ -93,8 +96,11 @@ do not help, the realization is `doubtful`.
 
 A certificate does not cover the surfaces *between* contact points. After the run, 64 certified realizations (`surfaces=`,
 `--surfaces`) are checked on the surfaces, at a much denser set of points and in both directions. One third are those that
-penetrate most, one third those with most points under load, and the rest are random. The summary states the largest
-penetration; the group `surface` of the archive states the realizations and pairs that were checked. One-sided locators are
+penetrate most, one third those with most points under load, and the rest are random. The check looks both ways: for
+penetration that contact points do not see, and, where points are fixed, for contact that was resolved while the surfaces were
+apart. The summary states the largest depths, shares with their intervals (from the random realizations), and how many touching
+points stand on a plane whose face has ended; above 1 % of the smallest tolerance range a `tc.ContactWarning` names the pair and
+the remedy. The group `surface` of the archive states the realizations and pairs that were checked. One-sided locators are
 points, so they are not part of this check. The study in `studies/certificates` looks for a counterexample in a million
 realizations.
 
@@ -103,14 +109,15 @@ True
 
 ## Limits
 
-- There is no friction, and features have no form error: they shift, tilt and grow. Gaps are correct only to first order
-  between faces that tilt and touch outside their nominal overlap, and for round faces with sampled points that change in size.
+- There is no friction, and features have no form error: they shift, tilt and grow. With fixed points, gaps are correct only to
+  first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with sampled points
+  that change in size.
   The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models ipopt, also started
   from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything holds, another
   optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat triangles has one
   optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no solution, or one far from
   the raw pose.
-- Contact points are those of the nominal state, unless the search is "bounded".
+- Linearized, or with `search="fixed"`, contact points and planes are those of the nominal state, and planes do not end.
   If rims of faces shift against each other *and* tilt, their edges may
   penetrate deeper than the points, by about shift times tilt; the check of `surfaces` measures this.
 - A ball or shaft keeps its nominal wall: the ends of a hole or a groove are not searched for again as it moves along. A hole

@@ -152,7 +152,8 @@ class Candidates:
         """Return scans of the points that may carry, projected again if the method requires it.
 
         Places of bounded pairs are found anew; in steps, with the `slots` of the pairs with changing points, places that carry
-        remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against curved faces are projected again in any case.
+        remain a little beyond their edges, `width` times as far as they may in an answer. With `projected`, points against
+        curved faces are projected again in any case.
         """
         scans = list(self._carrying_scans)
         if projected or self._method.is_iterated:

@@ -66,7 +66,9 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         if not len(unsettled):
             return
         if candidates.bounded:
-            scans = candidates.scans(unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots, width=kind.width)
+            scans = candidates.scans(
+                unsettled.state.relative, unsettled.task.deviations, slots=unsettled.state.slots, width=kind.width
+            )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             best = better_state(best, unsettled.state, true_penetration(unsettled.task, unsettled.state))

@@ -150,7 +150,7 @@ The function receives poses with the methods `position(point)`, `rotation(part)`
 ## The model's method, and faults
 
 A model can state the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells",
-method=tc.Method(resolution="exact", objective="all points"))`. Options of the command line, or `tc.run(...,
+method=tc.Method(objective="all points"))`. Options of the command line, or `tc.run(...,
 method={"objective": "seating"})`, replace single choices. The archive states which method was used, and whether it was the
 model's own, the defaults, or set by options.
 
@@ -209,11 +209,12 @@ from tolcontact.declaration.feature_tolerance import (
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Feature, Force, Part, Point
+from tolcontact.declaration.part import OUTSIDE, Face, Feature, Force, Part, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 
 __all__ = [
+    "OUTSIDE",
     "Angularity",
     "Assembly",
     "Box",

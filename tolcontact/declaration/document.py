@@ -33,7 +33,7 @@ from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, 
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
-from tolcontact.declaration.part import Face, Feature, Force, Part, Point
+from tolcontact.declaration.part import ASSOCIATIONS, Face, Feature, Force, Part, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
@@ -138,7 +138,10 @@ SIZE = Record(
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
 )
-FEATURE = Record(Feature, "faces tolerances name datum declared_at", tolerances=Items(CONTROL))
+FEATURE = Record(
+    Feature, "faces tolerances name datum association? declared_at",
+    tolerances=Items(CONTROL), association=Plain(text_type(ASSOCIATIONS)),
+)  # fmt: skip
 SHAPE = Shape(
     "Shape",
     "a box, or a file",

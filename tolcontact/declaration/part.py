@@ -10,6 +10,7 @@ from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.values import Vector, is_finite, is_length, script_line, vector
 from tolcontact.readable import Readable
 
+OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
 LETTER = re.compile(r"[A-Z]{1,2}")
 
 
@@ -34,8 +35,17 @@ class Part(Readable):
     def features(self) -> "tuple[Feature, ...]":
         return tuple(self._features)
 
-    def feature(self, name: str, *constituents: "Face | Size | GeometricTolerance", datum: str | None = None) -> "Feature":
-        """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`."""
+    def feature(
+        self,
+        name: str,
+        *constituents: "Face | Size | GeometricTolerance",
+        datum: str | None = None,
+        association: str = OUTSIDE,
+    ) -> "Feature":
+        """Name a face, or two that are opposed, with its tolerances: `part.feature("H1", face, tc.Size(...), datum="B")`.
+
+        `association` is how a plane that leans becomes a datum: "outside" or "least squares" (see `tolcontact.features`).
+        """
         for constituent in constituents:
             if not isinstance(constituent, Face | Size | GeometricTolerance):
                 raise TypeError(
@@ -44,7 +54,7 @@ class Part(Readable):
                 )
         faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
         tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
-        self.add(Feature(name, self, faces, tolerances, datum, script_line()))
+        self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
         return self._features[-1]
 
     def add(self, *features: "Feature") -> None:
@@ -128,7 +138,8 @@ class Feature(Readable):
     """A face of a part, or two that are opposed (a slot, a tab, a thickness), with a name and its tolerances.
 
     A feature may be used in place of a face. Contact, locators and measures on a feature share its deviation, which is positive
-    outward from the material. `datum` is the letter by which tolerances refer to it.
+    outward from the material. `datum` is the letter by which tolerances refer to it, and `association` is how a plane becomes
+    that datum if it leans: one of ASSOCIATIONS.
     """
 
     name: str
@@ -137,6 +148,7 @@ class Feature(Readable):
     tolerances: tuple[Size | GeometricTolerance, ...] = ()
     datum: str | None = None
     declared_at: str = ""
+    association: str = OUTSIDE
 
     @property
     def size(self) -> Size | None:
@@ -168,6 +180,8 @@ class Feature(Readable):
             yield f"it has {len(self.faces)} faces; expected one, or two that are opposed"
         if self.datum is not None and not (isinstance(self.datum, str) and LETTER.fullmatch(self.datum)):
             yield f"its datum letter is {self.datum!r}; expected one or two capital letters"
+        if self.association not in ASSOCIATIONS:
+            yield f"its association is {self.association!r}; expected one of: {', '.join(ASSOCIATIONS)}"
         for tolerance in self.tolerances:
             yield from (f"{tolerance.kind}: {fault}" for fault in tolerance.faults())
         yield from self._size_faults()

@@ -43,7 +43,10 @@ under ASME's Rule #1.
 
 Datums are features of the same part; "A-B" is a common datum, "B(M)" one at maximum material, as in `tc.Position(0.2,
 "A|B(M)")`. A tolerance limits only the freedoms that its datums lock: the position of a hole relative to a plane across its
-axis limits only its tilt. If a datum deviates, the features that refer to it follow. The frame of a part is the frame of its
+axis limits only its tilt. If a datum deviates, the features that refer to it follow. A plane that leans against the datums
+before it is taken where it touches its datum outside of the material (ISO 5459), or in its middle with `part.feature(...,
+association="least squares")`. That shift is a contributor, "far.datum B of A|B", which is not drawn: it follows from the tilts
+of the plane. Planes of a common datum count by least squares. The frame of a part is the frame of its
 shape, in which datums are nominal. A datum shift is not drawn: it follows from the contact of the datum feature with its mate.
 
 Several tolerances of a feature are nested, form within orientation within location; a finer lower segment of a frame is a

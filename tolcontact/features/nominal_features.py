@@ -1,6 +1,6 @@
 """Features with numbers: their contributors, and how their faces deviate with everything that varies."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -9,7 +9,7 @@ from tolcontact.declaration import Face, Feature, Part
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.tolerance_layers import Datum, Layer, freedom_names, tolerance_layers
+from tolcontact.features.tolerance_layers import Datum, Layer, Lean, freedom_names, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.surface import Surface
 
@@ -56,11 +56,12 @@ class FaceDeviation:
 
 @dataclass(frozen=True, eq=False)
 class NominalFeature:
-    """A feature in its part. Its contributors are the directions that its layers add, then its size.
+    """A feature in its part. Its contributors are the directions that its layers add, shifts of datums that lean, its size.
 
     first_column of its contributors
     labels       "part.feature.freedom" of its contributors
     coordinates  (coordinate, column): of the feature, for deviations of 1 of its own columns and all columns before
+    leans        by their columns: planes that lean against other datums of its tolerances
     surfaces     its faces, in the part's own frame
     areas        its faces on the part's mesh
     """
@@ -72,6 +73,7 @@ class NominalFeature:
     first_column: int
     labels: tuple[str, ...]
     coordinates: np.ndarray
+    leans: Mapping[int, Lean]
     surfaces: tuple[Surface, ...]
     areas: tuple[FaceArea, ...]
 
@@ -134,23 +136,33 @@ class Features:
         geometry = feature_geometry(surfaces)
         start = self.first_column + len(self.labels)
         datums = {
-            datum.feature.datum: Datum(datum.geometry, _padded(datum.coordinates, start))
+            datum.feature.datum: Datum(datum.feature, datum.geometry, padded(datum.coordinates, start))
             for datum in self.features
             if datum.part == part
         }
         layers = tolerance_layers(feature, geometry, datums, start)
         names = [name for layer in layers for name in freedom_names(geometry, layer.added)]
+        column, leans = start, dict[int, Lean]()
+        for layer in layers:
+            first = start + len(names)
+            leans |= {first + k: lean.at_column(start, first) for k, lean in enumerate(layer.frame.leans)}
+            names += [f"datum {lean.datum} of {layer.tolerance.datums}" for lean in layer.frame.leans]
+        shift = min(leans, default=0)
         if feature.size is not None:
             _check_size(feature, geometry)
             names.append("size")
-        coordinates, column = np.zeros((len(geometry.names), start + len(names))), start
+        coordinates = np.zeros((len(geometry.names), start + len(names)))
         for layer in layers:
-            count = layer.added.shape[1]
+            followed = layer.followed(geometry)
+            count, shifts = layer.added.shape[1], len(layer.frame.leans)
             coordinates[:, column : column + count] = layer.added
-            coordinates[:, :start] += layer.added @ layer.added.T @ geometry.values @ layer.frame.motion
-            column += count
+            coordinates[:, :start] += followed[:, :start]
+            coordinates[:, shift : shift + shifts] = followed[:, start:]
+            column, shift = column + count, shift + shifts
         labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.features.append(NominalFeature(feature, part, geometry, layers, start, labels, coordinates, surfaces, areas))
+        self.features.append(
+            NominalFeature(feature, part, geometry, layers, start, labels, coordinates, leans, surfaces, areas)
+        )
 
     def _check_disjoint(self, feature: Feature, areas: Sequence[FaceArea], meshes: Meshes) -> None:
         """Raise GeometryFault if a face that deviates with the feature also deviates with a feature added before."""
@@ -216,13 +228,6 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"
         )
-
-
-def _padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
-    """Return coordinates (coordinate, column) with zeros for the columns after theirs."""
-    padded = np.zeros((len(coordinates), columns))
-    padded[:, : coordinates.shape[1]] = coordinates
-    return padded
 
 
 def datum_order(part: Part) -> tuple[list[Feature], list[Feature]]:

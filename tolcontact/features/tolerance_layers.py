@@ -6,32 +6,81 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import Feature, GeometricTolerance
+from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.errors import GeometryFault
-from tolcontact.features.feature_geometry import FeatureGeometry
+from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
 from tolcontact.features.tolerance_kinds import zone_of
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
+MIN_LEAN = 1e-9  # mm of extremes of a plane, for deviations of 1
 RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: shapes of single precision are no better
 
 
 class Datum(NamedTuple):
     """A datum feature, and its coordinates (coordinate, column) for deviations of 1."""
 
+    feature: Feature
     geometry: FeatureGeometry
     coordinates: np.ndarray
+
+
+class Lean(NamedTuple):
+    """A plane that leans against the datums before it, so that its datum touches it at an extreme, outside of the material.
+
+    datum     its letter
+    extremes  (extreme, column) [mm]: how far the extremes of the plane stand out of its datum by least squares, for deviations
+              of 1. The datum is shifted by the largest one
+    """
+
+    datum: str | None
+    extremes: np.ndarray
+
+    def at_column(self, own: int, place: int) -> "Lean":
+        """Return this lean with its columns from number `own` on, which are those of the leans before it, at `place`."""
+        extremes = padded(self.extremes[:, :own], place)
+        return self._replace(extremes=np.hstack([extremes, self.extremes[:, own:]]))
+
+    def shifts(self, deviations: np.ndarray) -> np.ndarray:
+        """Return the shift (row,) [mm] of the datum for deviations (row, column), summed up in a fixed order."""
+        out = np.zeros((len(deviations), len(self.extremes)))
+        for column, factors in enumerate(self.extremes.T):
+            if factors.any():
+                out += deviations[:, column, None] * factors
+        return out.max(axis=1)
+
+    def bounds(self, lower: np.ndarray, upper: np.ndarray) -> tuple[float, float]:
+        """Return bounds [mm] of the shift for deviations between `lower` and `upper` (contributor,)."""
+        rows = np.vstack([self.extremes, self.extremes.mean(axis=0)])
+        ends = np.stack([rows * bound[: rows.shape[1]] for bound in (lower, upper)])
+        return float(ends.min(axis=0).sum(axis=1).max()), float(ends.max(axis=0).sum(axis=1).max())
 
 
 class DatumFrame(NamedTuple):
     """The frame of a datum system, for displacements (tau, rho) about one centre.
 
-    motion   (6, column) of the frame for deviations of 1
+    motion   (6, column) of the frame for deviations of 1; the last columns are for shifts of 1 mm by its leans
     free     (6, freedom): displacements that none of the datums notices
+    leans    of its planes, in the order of their columns
     """
 
     motion: np.ndarray
     free: np.ndarray
+    leans: tuple[Lean, ...]
+
+    def felt(self, effect: np.ndarray) -> "DatumFrame":
+        """Return this frame without the leans that change nothing of `effect` (coordinate, 6) of its motion."""
+        columns = self.motion.shape[1] - len(self.leans)
+        felt = np.abs(effect @ self.motion[:, columns:]).max(axis=0, initial=0.0) > MIN_LEAN
+        for k in reversed(range(len(self.leans))):
+            felt[k] |= any(felt[j] and self.leans[j].extremes[:, columns + k].any() for j in range(k + 1, len(self.leans)))
+        kept = [*range(columns), *(columns + np.flatnonzero(felt))]
+        leans = [
+            lean._replace(extremes=lean.extremes[:, [column for column in kept if column < lean.extremes.shape[1]]])
+            for lean, is_felt in zip(self.leans, felt, strict=True)
+            if is_felt
+        ]
+        return DatumFrame(self.motion[:, kept], self.free, tuple(leans))
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,25 +99,58 @@ class Layer:
     added: np.ndarray
     frame: DatumFrame
 
+    def followed(self, geometry: FeatureGeometry) -> np.ndarray:
+        """Return how the feature follows the frame (coordinate, column), in what this layer adds."""
+        return np.asarray(self.added @ self.added.T @ geometry.values @ self.frame.motion)
+
 
 def datum_frame(system: Sequence[Sequence[Datum]], centre: np.ndarray, reach: float, columns: int) -> DatumFrame:
     """Return the frame of datums in their precedence: each takes what it notices of the freedoms left by those before it.
 
-    The datums of one compartment count together, by least squares of their coordinates. Angles are weighed by `reach` [mm].
+    The datums of one compartment count together, by least squares of their coordinates. A plane by itself is then shifted to
+    its extreme outside of the material (ISO 5459), unless its association is by least squares. Angles are weighed by `reach`
+    [mm].
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
-    motion, free = np.zeros((6, columns)), np.eye(6)
+    motion, free, leans = np.zeros((6, columns)), np.eye(6), list[Lean]()
     for compartment in system:
         values = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
-        coordinates = np.vstack([datum.coordinates for datum in compartment])
+        coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
         U, S, Vt = np.linalg.svd(values @ free)
         largest = S.max(initial=0.0)
         rank = int((S > MIN_NOTICED * max(largest, 1e-300)).sum()) if largest > MIN_NOTICED else 0
         if rank:
             inverse = Vt[:rank].T @ (U[:, :rank] / S[:rank]).T
             motion = motion + free @ inverse @ (coordinates - values @ motion)
+            lean = _lean(compartment, coordinates - values @ motion)
+            if lean is not None:
+                leans.append(lean)
+                shift = free @ inverse @ compartment[0].geometry.values @ _translation(compartment[0].geometry)
+                motion = np.column_stack([motion, shift])
         free = free @ Vt[rank:].T
-    return DatumFrame(to_twist @ motion, to_twist @ free)
+    return DatumFrame(to_twist @ motion, to_twist @ free, tuple(leans))
+
+
+def _lean(compartment: Sequence[Datum], residuals: np.ndarray) -> Lean | None:
+    """Return how a plane leans, from what its datum leaves of its coordinates (coordinate, column); None if it does not."""
+    (datum, *others) = compartment
+    if others or not isinstance(datum.geometry, PlaneFeature) or datum.feature.association != OUTSIDE:
+        return None
+    extremes = datum.geometry.rows(datum.geometry.extremes)[:, 0] @ residuals
+    return Lean(datum.feature.datum, extremes) if np.abs(extremes).max(initial=0.0) > MIN_LEAN else None
+
+
+def _translation(geometry: FeatureGeometry) -> np.ndarray:
+    """Return the displacement (6,) of a plane by 1 mm along its normal."""
+    assert isinstance(geometry, PlaneFeature)
+    return np.concatenate([geometry.normal, np.zeros(3)])
+
+
+def padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
+    """Return coordinates (coordinate, column) with zeros for the columns after theirs."""
+    result = np.zeros((len(coordinates), columns))
+    result[:, : coordinates.shape[1]] = coordinates
+    return result
 
 
 def tolerance_layers(
@@ -93,7 +175,8 @@ def tolerance_layers(
                 f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
             )
         controlled_before = np.hstack([controlled_before, added])
-        layers.append(replace(candidate, added=added))
+        frame = candidate.frame.felt(added @ added.T @ geometry.values)
+        layers.append(replace(candidate, added=added, frame=frame))
     return tuple(layers)
 
 

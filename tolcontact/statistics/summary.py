@@ -11,6 +11,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.readable import FORMATTERS, HTML
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
+from tolcontact.statistics.checked_surfaces import surface_values
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, all_statistics, changes, limits
 from tolcontact.vocabulary import ArchiveVariable
@@ -40,6 +41,11 @@ def summarize(results: xr.DataTree) -> Summary:
     surface_penetration, beside   largest of the realizations that were checked against the surfaces [mm]: how deep a face lies
                                   in the other body, and how far contact points that touch stand beside the face
     surfaces_checked              number of these realizations
+    penetrating_share, false_contact_share   (interval)  shares of realizations whose surfaces penetrate each other, or were
+                                  apart in the raw state where contact was resolved, by more than 1 % of the smallest range;
+                                  from those realizations that were checked at random
+    contacts, contacts_ended      of the realizations checked: how many contact points touch, and how many of them a plane where
+                                  its face has ended; NaN where that is not known
     false_contact   (pair)                               of these: how deep contact points lay inside in the raw state, where
                                                          the surfaces were apart [mm]; NaN where that is not known
     carried         (pair, interval)                     share of realizations in which a pair carries
@@ -57,7 +63,7 @@ def summarize(results: xr.DataTree) -> Summary:
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
-    combinations = contact.combinations(rows)
+    combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
     values = {
         terms.STATISTIC_VALUE: all_statistics(rows),
         terms.CHANGE: changes(rows),
@@ -65,7 +71,7 @@ def summarize(results: xr.DataTree) -> Summary:
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
         terms.PENETRATION: _penetration(rows),
-        **_surface_values(results),
+        **surface_values(results, terms.NOTICED_SHARE * smallest),
         **_field_values(results),
     }
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
@@ -77,8 +83,9 @@ def summarize(results: xr.DataTree) -> Summary:
             "realizations": count,
             "samples": _planned_samples(results, count),
             **{name: results.attrs[name] for name in terms.METHOD_ATTRIBUTES},
+            "search": results.attrs.get("search", "fixed"),  # formats 1 and 2 do not say it
             "datum_shifts": ", ".join(_datum_shifts(results)),
-            "smallest_range": _smallest_range(results, rows),
+            "smallest_range": smallest,
         },
     )
 
@@ -160,25 +167,6 @@ def _penetration(rows: xr.Dataset) -> np.ndarray:
         return np.zeros(len(terms.STATES))
     gaps = [piece[terms.GAP_MIN.name].min([terms.REALIZATION, terms.PAIR]).values for piece in pieces(rows)]
     return np.maximum(-np.min(gaps, axis=0), 0)
-
-
-def _surface_values(results: xr.DataTree) -> dict[ArchiveVariable, Any]:
-    """Return what the check against the surfaces found; NaN for archives of format 1, which have no such check."""
-    largest, count, false_contact = [np.nan, np.nan], 0, np.full(results.sizes[terms.PAIR], np.nan)
-    if "surface" in results.children:
-        surface = results["surface"].to_dataset()
-        columns = [surface[variable.name].values for variable in (terms.SURFACE_PENETRATION, terms.BESIDE)]
-        largest = [np.nan if np.isnan(values).all() else float(np.nanmax(values)) for values in columns]
-        count = int((surface[terms.CHECKED_REALIZATION.name] != terms.UNFINISHED).sum())
-        if terms.FALSE_CONTACT.name in surface and count:
-            depths = surface[terms.FALSE_CONTACT.name].values
-            false_contact = np.where(np.isnan(depths).all(axis=0), np.nan, np.nan_to_num(depths).max(axis=0))
-    return {
-        terms.DEEPEST_SURFACE: largest[0],
-        terms.FARTHEST_BESIDE: largest[1],
-        terms.SURFACES_CHECKED: count,
-        terms.DEEPEST_FALSE_CONTACT: false_contact,
-    }
 
 
 def _steps(rows: xr.Dataset) -> list[float]:

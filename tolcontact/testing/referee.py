@@ -228,7 +228,7 @@ class ArchivedPair:
 
 
 def least_gaps(meeting: Meeting, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Return the least gaps (...) [mm] of all places, with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference."""
+    """Return least gaps (...) [mm] of all places, with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference."""
     X_RM = np.concatenate([R.reshape(-1, 9), t.reshape(-1, 3)], axis=1)
     pieces = [
         meeting.at(X_RM[k : k + POSES_AT_ONCE]).gaps.min(axis=1, initial=np.inf) for k in range(0, len(X_RM), POSES_AT_ONCE)

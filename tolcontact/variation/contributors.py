@@ -16,7 +16,7 @@ from tolcontact.variation import zones
 
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
 JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
-LOCATOR, FEATURE, VARIABLE = "locator", "feature", "variable"  # sources
+LOCATOR, FEATURE, DATUM, VARIABLE = "locator", "feature", "datum", "variable"  # sources
 TAIL = float(ndtr(-3))
 # Quantiles of the named distributions for a zone of width 1.
 QUANTILES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -32,7 +32,7 @@ Uniforms = Callable[[int], np.ndarray]  # numbers (n, component) between 0 and 1
 class Contributor(NamedTuple):
     """A column of the deviations.
 
-    source     "locator", "feature" or "variable"
+    source     "locator", "feature", "variable", or "datum": a shift that follows from other deviations
     tolerance  of a locator, a size or a variable
     layer      of a freedom of a feature: the tolerance that controls it
     spread     [mm] standard deviation of a freedom of a feature
@@ -67,6 +67,8 @@ class Contributor(NamedTuple):
         """The name of its distribution; of a freedom of a feature the tolerance, and the rule from its zone to the spread."""
         if self.layer is not None:
             return f"{self.layer.tolerance}; {self.layer.tolerance.rule}"
+        if self.source == DATUM:
+            return "follows from the tilts of the datum feature"
         if self.tolerance is None:
             return ""
         name = self.tolerance.distribution
@@ -163,7 +165,7 @@ class Contributors:
         return iter(self._contributors)
 
     def _feature_contributors(self, feature: NominalFeature) -> Iterator[Contributor]:
-        """Yield the freedoms of a feature's layers, from the innermost on, then its size."""
+        """Yield the freedoms of a feature's layers, from the innermost on, then its leans and its size."""
         labels, column = iter(feature.labels), feature.first_column
         basis, spreads = np.zeros((len(feature.geometry.names), 0)), np.zeros(0)
         for layer in feature.layers:
@@ -188,6 +190,8 @@ class Contributors:
             for k in range(count):
                 yield Contributor(next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]))
             column += count
+        for _ in feature.leans:
+            yield Contributor(next(labels), DATUM, "mm")
         if feature.feature.size is not None:
             yield Contributor(next(labels), FEATURE, "mm", feature.feature.size.tolerance)
 

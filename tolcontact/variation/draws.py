@@ -26,6 +26,7 @@ class Draws:
     def __init__(self, nominal: Nominal) -> None:
         self.contributors = Contributors(nominal)
         self._assembly = nominal.assembly
+        self.leans = {column: lean for feature in nominal.features for column, lean in feature.leans.items()}
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
         self._check_correlations()
         self._plan = Plan(MONTE_CARLO, [])
@@ -106,8 +107,14 @@ class Draws:
         for label, (columns, values) in zip(self.population_labels, self.populations, strict=True):
             deviations[:, columns] = values[(numbers(label) * len(values)).astype(int)]
         self._add_causes_and_bonuses(deviations)
+        self.add_shifts(deviations)
         self._check_finite(deviations)
         return deviations
+
+    def add_shifts(self, deviations: np.ndarray) -> None:
+        """Put into deviations (n, contributor) the shifts of datums whose planes lean, which follow from the other ones."""
+        for column, lean in self.leans.items():
+            deviations[:, column] = lean.shifts(deviations)
 
     def _single_draws(self, numbers: Numbers, count: int) -> np.ndarray:
         """Return deviations (count, contributor) of each contributor by itself, or in its correlation."""
@@ -140,6 +147,7 @@ class Draws:
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
         sets += [[int(column) for column in joint.columns] for joint in self.contributors.joint_draws]
+        sets += [[column, *map(int, np.flatnonzero(lean.extremes.any(axis=0)))] for column, lean in self.leans.items()]
         sets += [[bonus.size, *(int(column) for column in bonus.columns)] for bonus in self.contributors.bonuses]
         return sets + [
             [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.declaration import GeometricTolerance
+from tolcontact.declaration import OUTSIDE, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
-from tolcontact.features import NominalFeature, zone_of
+from tolcontact.features import NominalFeature, PlaneFeature, zone_of
 from tolcontact.variation.contributors import bonus
 from tolcontact.variation.draws import Draws
 
@@ -110,13 +110,17 @@ def _measurement(
     return _Measurement(rows, np.einsum("npk,pek->npe", displacements, directions).reshape(len(deviations), -1))
 
 
+def _touches_outside(datum: NominalFeature) -> bool:
+    return isinstance(datum.geometry, PlaneFeature) and datum.feature.association == OUTSIDE
+
+
 def _fitted_frame(
     feature: NominalFeature, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the motions (n, 6) of the datum frame about the feature's centre, and a basis (6, freedom) of its free motions.
 
     The datum features of each compartment are fitted by least squares, with the motions that the compartments before it leave
-    free.
+    free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum.
     """
     centre = feature.geometry.centre
     free = np.diag([1.0] * 3 + [1 / feature.geometry.reach] * 3)
@@ -131,4 +135,8 @@ def _fitted_frame(
         residuals = values - motion @ rows.T
         locked_motion, *_ = np.linalg.lstsq(rows @ locked, residuals.T, rcond=None)
         motion = motion + (locked @ locked_motion).T
+        if len(compartment) == 1 and _touches_outside(compartment[0]):
+            outermost = (values - motion @ rows.T).max(axis=1)
+            shift, *_ = np.linalg.lstsq(rows @ locked, np.ones(len(rows)), rcond=None)
+            motion = motion + outermost[:, None] * (locked @ shift)
     return motion, free

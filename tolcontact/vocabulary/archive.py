@@ -301,7 +301,27 @@ FALSE_CONTACT = ArchiveVariable(
     "how deep contact points lay inside in the raw state, where the surfaces themselves were apart; NaN if that is not known",
     "mm",
 )
-SURFACE = (CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE, FALSE_CONTACT)
+NOTICED_SHARE = 0.01  # of the smallest tolerance range: deeper penetration or false contact of surfaces is told
+CONTACTS = ArchiveVariable(
+    "contacts",
+    (CHECKED, PAIR),
+    "f8",
+    "number of contact points that touch in the corrected state; NaN if that is not known",
+    "1",
+)
+CONTACTS_ENDED = ArchiveVariable(
+    "contacts_ended", (CHECKED, PAIR), "f8", "number of these that touch a plane where its face has ended; NaN: not known", "1"
+)
+AT_RANDOM = ArchiveVariable(
+    "at_random",
+    (CHECKED,),
+    "i1",
+    "1: the realization was chosen at random; 0: because it penetrates most, or because most of its points carry",
+    "1",
+)
+SURFACE = (
+    CHECKED_REALIZATION, SURFACE_PENETRATION, BESIDE, FALSE_CONTACT, CONTACTS, CONTACTS_ENDED, AT_RANDOM,
+)  # fmt: skip
 TOUCHING_SHARE = ArchiveVariable(
     "touching",
     (POINT,),

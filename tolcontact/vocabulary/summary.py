@@ -68,6 +68,26 @@ DEEPEST_FALSE_CONTACT = ArchiveVariable(
     "largest depth of contact points in the raw state where the surfaces were apart, of the realizations that were checked",
     "mm",
 )
+PENETRATING_SHARE = ArchiveVariable(
+    "penetrating_share",
+    (INTERVAL,),
+    "f8",
+    "share of realizations in which surfaces penetrate each other by more than 1 % of the smallest tolerance range",
+    "1",
+)
+FALSE_CONTACT_SHARE = ArchiveVariable(
+    "false_contact_share",
+    (INTERVAL,),
+    "f8",
+    "share of realizations in which contact of more than that depth was resolved where the surfaces are apart",
+    "1",
+)
+CONTACTS_CHECKED = ArchiveVariable(
+    "contacts", (), "f8", "number of touching contact points, of the realizations that were checked", "1"
+)
+CONTACTS_WITHOUT_FACE = ArchiveVariable(
+    "contacts_ended", (), "f8", "number of these that touch a plane where its face has ended; NaN if that is not known", "1"
+)
 SURFACES_CHECKED = ArchiveVariable(
     "surfaces_checked", (), "i8", "number of realizations that were checked against the surfaces", "1"
 )

@@ -12,7 +12,7 @@ from tolcontact.archive import ArchiveWriter, Run, check_rows, open_archive, ope
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
-from tolcontact.simulation.surfaces import check_surfaces, simulated_poses
+from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import Summary, summarize as summary_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
@@ -156,12 +156,14 @@ def _simulate(
         if is_summed:
             sums.write_to(writer)
         raise
-    rows_to_check = writer.chosen(seed)
+    rows_to_check, at_random = writer.chosen(seed)
     if rows_to_check.size:
         stored_poses = writer.poses(rows_to_check)
         deviations = program.draws.rows(rows_to_check, seed=seed)
         poses = simulated_poses(program, deviations) if stored_poses is None else stored_poses
-        writer.write_checked(rows_to_check, *check_surfaces(program, poses, deviations))
+        surfaces = check_surfaces(program, poses, deviations)
+        writer.write_checked(rows_to_check, at_random, surfaces)
+        warn_of(program, surfaces)
 
 
 def summarize(results: xr.DataTree | str | Path) -> Summary:

@@ -15,6 +15,7 @@ from tolcontact.vocabulary import (
     ABOVE,
     BELOW,
     CAPABILITY,
+    NOTICED_SHARE,
     OUTSIDE,
     PP,
     PP_NORMAL,
@@ -31,8 +32,6 @@ RAW, CORRECTED = STATES
 CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
 SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
 PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
-BOUNDED = 'Method(resolution="exact", search="bounded")'  # what resolves contact where faces end
-PENETRATION_SHARE = 0.01  # of the smallest tolerance range; deeper penetration calls for an exact resolution
 APART = "* differs from the index by percentiles: the measure is not normally distributed"
 
 
@@ -188,28 +187,42 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
 
 
 def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
-    """Yield lines about penetration between contact points."""
+    """Yield lines about what lies between contact points, and about contact where faces have ended."""
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
-    limit = PENETRATION_SHARE * summary.attrs["smallest_range"]
+    limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
         yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
+        if depth > limit:
+            share = percent(summary["penetrating_share"].values)
+            yield f"penetration between surfaces above {NOTICED_SHARE:.0%} of the smallest range: {share} of the realizations"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
-            yield f"advice: it exceeds {PENETRATION_SHARE:.0%} of the range; use more points, or, where faces end, {BOUNDED}"
+            yield f"advice: {_way_out(summary)}"
         if overhang > limit:
             yield f"touching contact points lie up to {overhang:.3g} mm beside their reference face"
+    contacts, ended = (float(summary[name]) for name in ("contacts", "contacts_ended"))
+    if ended > 0:
+        yield f"contact with faces that have ended there: {ended:.0f} of {contacts:.0f} touching contact points of these"
     for pair, depth in zip(summary["pair"].values, summary["false_contact"].values, strict=True):
         if depth > limit:
-            yield f'contact pair "{pair}": points lie up to {depth:.3g} mm inside where its surfaces are apart'
-            yield f"advice: its faces end within reach of contact; use {BOUNDED}"
+            share = percent(summary["false_contact_share"].values)
+            yield f'contact pair "{pair}": points lie up to {depth:.3g} mm inside where its surfaces are apart ({share})'
+            yield f"advice: its faces end within reach of contact; {_way_out(summary)}"
+
+
+def _way_out(summary: xr.Dataset) -> str:
+    """Return what to do about surfaces that penetrate each other, or were resolved though apart."""
+    if summary.attrs["resolution"] == "linearized":
+        return "use --resolution exact"
+    return "use finer meshes" if summary.attrs["search"] == "bounded" else f'leave out search="{summary.attrs["search"]}"'
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     """Yield advice on penetration that a linear step, or the paper's set of active points, leaves."""
-    limit = PENETRATION_SHARE * summary.attrs["smallest_range"]
+    limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
     elif summary.attrs["resolution"] == "linearized" and penetration > limit:
-        yield f"advice: penetration exceeds {PENETRATION_SHARE:.0%} of the smallest range; use --resolution exact"
+        yield f"advice: penetration exceeds {NOTICED_SHARE:.0%} of the smallest range; use --resolution exact"
     elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
         yield "advice: some realizations did not converge; use --resolution exact"
 

@@ -1,0 +1,91 @@
+"""Datums of planes that lean touch them outside of the material (ISO 5459), judged by a linear program on displaced corners."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import tolcontact as tc
+from tolcontact.declaration.script import load_model
+from tolcontact.variation import draw
+
+CORNERS = np.array([(x, y, z) for x in (0.0, 60.0) for y in (0.0, 40.0) for z in (0.0, 20.0)])
+
+
+def plate(association, corner=(0.0, 0.0, 0.0)):
+    """A plate whose far face is located from a side that leans against its foot."""
+    model = tc.Assembly("plate")
+    part = model.part("plate", tc.Box(60, 40, 20), at=corner, fixed=True)
+    part.feature("foot", part.face("-z"), datum="A")
+    part.feature("side", part.face("-x"), tc.Perpendicularity(0.3, "A"), datum="B", association=association)
+    part.feature("end", part.face("-y"), tc.Perpendicularity(0.2, "A|B"), datum="C", association=association)
+    far = part.feature("far", part.face("+x"), tc.Position(0.1, "A|B|C"))
+    model.measure("far", far.point(60, 20, 10), along="x", tolerance=1)
+    return model
+
+
+def moved_corners(nominal, deviations, name, at):
+    """Displaced corners (row, corner, 3) [mm] of a feature's face, at x or y = `at` of the part."""
+    feature = next(feature for feature in nominal.features if feature.feature.name == name)
+    axis, value = at
+    corners = CORNERS[CORNERS[:, axis] == value]
+    motions = deviations[:, : feature.coordinates.shape[1]] @ (feature.geometry.twists @ feature.coordinates).T
+    return corners + motions[:, None, :3] + np.cross(motions[:, None, 3:], corners - feature.geometry.centre)
+
+
+def tangent_plane(corners):
+    """The plane x = c - s y that has all corners inside, and is nearest to them: c and s."""
+    y, x = corners[:, 1], corners[:, 0]
+    solution = linprog([-1, y.mean()], A_ub=np.column_stack([np.ones(len(y)), -y]), b_ub=x, bounds=[(None, None)] * 2)
+    return solution.x
+
+
+def outside_share(association, width=0.1):
+    """The share of far faces outside of the zone that the tangent of the side places."""
+    nominal = tc.build(plate(association), solver="daqp").nominal
+    deviations = draw(nominal, seed=3, start=0, stop=1000)
+    side, far = (moved_corners(nominal, deviations, name, (0, at)) for name, at in (("side", 0.0), ("far", 60.0)))
+    outside = 0
+    for k in range(len(deviations)):
+        c, s = tangent_plane(side[k])
+        distance = (far[k, :, 0] - c + s * far[k, :, 1]) - 60
+        outside += np.abs(distance).max() > width / 2 + 1e-6
+    return outside / len(deviations)
+
+
+def test_what_is_located_from_a_leaning_side_lies_in_its_zone_from_the_tangent_outside_the_material():
+    assert outside_share("outside") < 0.01
+
+
+def test_a_datum_by_least_squares_leaves_many_outside_of_that_zone():
+    assert outside_share("least squares") > 0.4
+
+
+def test_the_shift_of_the_datum_follows_from_the_tilt_and_is_measured_back():
+    program = tc.build(plate("outside", corner=(5.0, -3.0, 2.0)), solver="daqp")
+    labels = list(program.nominal.contributors)
+    deviations = program.draws(seed=5, start=0, stop=200)
+    shift = deviations[:, labels.index("plate.far.datum B of A|B|C")]
+    assert shift == pytest.approx(np.abs(deviations[:, labels.index("plate.side.tilt z")]))
+    assert not [label for label in labels if "datum" in label and "far" not in label]  # others do not follow it
+    for association in ("outside", "least squares"):
+        inside = tc.check_population(plate(association), samples=2000)["share_inside"].sel(interval="estimate")
+        assert float(inside[-1]) > 0.99
+    assert [tolerance for tolerance in program.draws.varying if "datum" in tolerance] == []
+
+
+def test_the_association_is_in_the_model_and_its_json(tmp_path):
+    model = plate("least squares")
+    path = tmp_path / "plate.json"
+    tc.write_model(model, path)
+    again = load_model(path)
+    assert [feature.association for feature in again.features] == ["outside", "least squares", "least squares", "outside"]
+    with pytest.raises(tc.ModelError, match="its association is 'best'; expected one of: outside, least squares"):
+        tc.build(plate("best"))
+
+
+def test_worst_cases_shift_the_datum_too():
+    model = plate("outside")
+    found = tc.worst_case(model, samples=256)
+    # Half of the zone both ways, and half of the side's zone, by which its datum lies farther out.
+    for name in ("worst", "bound"):
+        assert found[name].sel(measure="far", state="corrected").values == pytest.approx([-0.2, 0.05], abs=1e-6)
