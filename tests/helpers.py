@@ -30,6 +30,7 @@ FIXED = tc.Method(search="fixed")  # planes of the contact points do not end
 EXACT = tc.Method(resolution="exact")
 ALL_POINTS = tc.Method(resolution="exact", objective="all points")
 SEATED = tc.Method(resolution="exact", objective="seating")
+SEATED_ON_POINTS = tc.Method(objective="seating", search="fixed")
 
 
 def nightly(*values):

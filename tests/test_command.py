@@ -97,11 +97,11 @@ def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
 def test_a_run_with_too_many_failures_exits_with_1(tmp_path):
     """A tab wider than its slot."""
     model = SCRIPTS / "model_tab.py"
-    done = call(tmp_path, "run", model, "--samples", "50")
+    done = call(tmp_path, "run", model, "--samples", "50", "--resolution", "linearized")
     assert done.returncode == 1
     assert "50 realizations" in done.stderr
     assert "use --resolution exact" in " ".join(done.stdout.split())
-    done = call(tmp_path, "run", model, "--samples", "50", "--resolution", "exact")
+    done = call(tmp_path, "run", model, "--samples", "50")
     assert done.returncode == 1
     told = " ".join(done.stdout.split())
     for words in ("50 not_assemblable", "pairs in conflict there: left side (50), right side (50)", "resolution: exact"):

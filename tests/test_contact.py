@@ -18,7 +18,7 @@ from tolcontact.vocabulary import CORRECTED, RAW, Status
 @pytest.mark.parametrize("active_set", ["closed", "initial"])
 def test_poses_agree_with_a_plain_qp_of_all_rows_in_another_library(case, regularization, active_set):
     eta = 1e-4  # Clarabel loses digits faster than active-set solvers do where only eta holds a freedom
-    method = tc.Method(regularization=regularization, active_set=active_set, eta=eta)
+    method = replace(PAPER, regularization=regularization, active_set=active_set, eta=eta)
     program, run = simulate(case(), samples=40, solver="daqp", method=method)
     R, t = R_t(run["poses"])
     for k in range(40):

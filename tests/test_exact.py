@@ -26,7 +26,7 @@ JUDGED = {
 def test_no_nonlinear_solver_does_better(name, samples):
     """Objective within 1e-6 of ipopt's or lower, no gap, and a KKT residual found without our multipliers."""
     make, objective = JUDGED[name]
-    program, run = simulate(make(), samples=samples, solver="daqp", method=tc.Method(resolution="exact", objective=objective))
+    program, run = simulate(make(), samples=samples, solver="daqp", method=tc.Method(search="fixed", objective=objective))
     problem = TrueProblem(program.nominal, objective)
     content = 0
     for k in np.flatnonzero(run["status"] != Status.UNTOUCHED):
@@ -55,7 +55,7 @@ def certified(program, run):
 @pytest.mark.parametrize("objective", ["all points", *nightly("active points", "locator stiffness")])
 @pytest.mark.parametrize("make", [lambda: cases.model("tower"), cases.ring, cases.jaws], ids=["tower", "ring", "jaws"])
 def test_many_bodies_are_resolved(make, objective):
-    program, run = simulate(make(), samples=500, solver="daqp", method=tc.Method(resolution="exact", objective=objective))
+    program, run = simulate(make(), samples=500, solver="daqp", method=tc.Method(search="fixed", objective=objective))
     assert (run["gap_min"][:, RAW].min(axis=1) < -0.01).all()
     far = run["status"] == Status.DOUBTFUL
     assert (run["status"][~far] == Status.RESOLVED).all()
@@ -80,7 +80,7 @@ def test_opposed_faces_without_clearance(solver):
     R, t = R_t(run["poses"][:, CORRECTED, program.nominal.assembly.parts.index(program.nominal.parts[1].part)])
     assert np.abs(t[:, 0]).max() < 1e-6
     assert np.abs(R[:, 0, 1]).max() < 1e-6
-    _, linear = simulate(cases.model("channel"), samples=1000, solver=solver, method=tc.Method())
+    _, linear = simulate(cases.model("channel"), samples=1000, solver=solver, method=PAPER)
     assert (linear["status"] == Status.NOT_CONVERGED).mean() > 0.4
     assert linear["gap_min"][:, CORRECTED].min() < -0.1
 

@@ -66,7 +66,7 @@ def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tm
     assert model.method == ALL_POINTS
     for given, expected, whose in (
         (None, ALL_POINTS, "model"),
-        ({"resolution": "linearized"}, tc.Method(objective="all points"), "options"),
+        ({"resolution": "linearized"}, tc.Method(resolution="linearized", objective="all points"), "options"),
         (tc.Method(), tc.Method(), "options"),
     ):
         with tc.run(model, samples=20, solver="daqp", method=given) as run:

@@ -6,7 +6,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import EXACT, contents, nightly
+from tests.helpers import PAPER, contents, nightly
 from tolcontact import vocabulary
 from tolcontact.archive import Run
 from tolcontact.checksums import crc32
@@ -59,8 +59,8 @@ def test_resuming_another_run_or_model_is_refused_and_leaves_the_file_alone(arch
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive, resume=True, overwrite=True)
     with pytest.raises(ArchiveError, match="another model"):
         tc.run(cases.ra1(), samples=300, seed=3, solver="daqp", out=archive, resume=True)
-    with pytest.raises(ArchiveError, match="resolution = linearized, now it is exact"):
-        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=EXACT, out=archive, resume=True)
+    with pytest.raises(ArchiveError, match="resolution = exact, now it is linearized"):
+        tc.run(cases.stack(), samples=300, seed=3, solver="daqp", method=PAPER, out=archive, resume=True)
     with pytest.raises(ArchiveError, match="exists"):
         tc.run(cases.stack(), samples=300, seed=3, solver="daqp", out=archive)
     assert archive.read_bytes() == before

@@ -7,6 +7,8 @@ import xarray as xr
 
 root, contact, sample = (xr.load_dataset(sys.argv[1], group=group) for group in (None, "contact", "sample"))
 for pair in range(root.sizes["pair"]):
+    if "bounded" in contact and contact.bounded[pair]:  # its gaps are those of the bodies, not of contact points
+        continue
     points = contact.isel(point=np.flatnonzero(contact.pair_of_point == pair))
     places, normal = {}, points.reference_normal.values.T
     for side in ("moving", "reference"):

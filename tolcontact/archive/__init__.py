@@ -15,7 +15,8 @@ The file is netCDF-4 with CF attributes. It can be read without tolcontact: with
 >>> height = stand.measure("height", block.point(50, 0, 10), along="z", tolerance=1)
 >>> folder = tempfile.TemporaryDirectory()
 >>> path = Path(folder.name) / "stand.nc"
->>> tc.run(stand, samples=200, seed=1, out=path, surfaces=16).close()
+>>> linear = tc.Method(resolution="linearized")
+>>> tc.run(stand, samples=200, seed=1, method=linear, out=path, surfaces=16).close()
 
 ## Layout
 
@@ -52,7 +53,9 @@ number, the versions, the seed, the solver with its options, and the method with
 0.88
 >>> field = run["field/block"].six_sigma.sel(state="corrected", component="magnitude")
 
-Gaps can be recomputed from poses and contact points, except where `searched` is 1: those points are not archived.
+Gaps can be recomputed from poses and contact points, except where `searched` is 1, and of pairs whose `bounded` is 1: those
+places are not archived. The gaps of a bounded pair are those of both bodies as they end, which poses and shapes determine
+(`tolcontact.testing` finds them again).
 
 >>> def gaps(run, state):
 ...     '''Gaps (realization, point) [mm].'''

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.errors import ContactWarning, shown
 from tolcontact.geometry.meeting import Meeting, meeting
 
@@ -31,12 +31,33 @@ class Trial(NamedTuple):
     allowed: float
 
 
+def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
+    """Return how far [mm] contact of a pair may push its parts, from raw trial poses X_RM (n, 12).
+
+    deviations   (n, contributor)
+    presses      whether forces close the gaps, too
+    """
+    if pair.round is not None:
+        depth = _travel(pair, X_RM)
+    else:
+        depth = max(-float(pair.least_gap(X_RM, pair.heights(deviations)).min()), 0.0)
+    return depth + (clearance(pair) if presses else 0.0)
+
+
 def bounded_pair(
-    nominal: Nominal, index: int, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"]
+    nominal: Nominal,
+    index: int,
+    X_RM: Float[Array, "n 12"],
+    deviations: Float[Array, "n contributor"],
+    *,
+    pushed: float,
+    presses: bool,
 ) -> tuple[Meeting | None, Trial]:
     """Return where the faces of a pair can touch as they end, or None if fixed planes represent its reference face well.
 
-    X_RM   (n, 12), raw, at trial poses, for `deviations` (n, contributor)
+    X_RM      (n, 12), raw, at trial poses, for `deviations` (n, contributor)
+    pushed    [mm]: how far all contact together may push its parts
+    presses   whether forces close the gaps: then gaps are compared, not depths
     """
     pair = nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
@@ -45,16 +66,14 @@ def bounded_pair(
         return nothing
     if not np.isfinite(smallest):
         return nothing
-    difference = X_RM - pose.AT_REST
-    corners = np.array(np.meshgrid(*np.array(pair.moving_face.mesh.bounds).T)).reshape(3, -1).T
-    travel = float(np.linalg.norm(pose.apply(difference, corners), axis=2).max())
+    heights = pair.heights(deviations)
+    travel = _travel(pair, X_RM) + float(np.abs(heights).max())
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
-    distances = np.linalg.norm(pair.P_m - pair.P_r, axis=1)
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
     places = meeting(
         (pair.moving_face, pair.reference_face), bodies,
-        travel=TRAVEL_FACTOR * travel + MIN_TRAVEL_SHARE * size, tilt=tilt, height=float(distances.min()),
+        travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size, tilt=tilt + pushed / size, height=clearance(pair),
     )  # fmt: skip
     if places is None:
         warnings.warn(
@@ -67,13 +86,22 @@ def bounded_pair(
     error = 0.0
     for k in range(0, len(X_RM), POSES_AT_ONCE):
         rows = slice(k, k + POSES_AT_ONCE)
-        heights = pair.heights(deviations[rows])
-        bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights
-        error = max(error, float(np.abs(_depth(bounded) - _depth(pair.least_gap(X_RM[rows], heights))).max(initial=0)))
+        bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights[rows]
+        fixed = pair.least_gap(X_RM[rows], heights[rows])
+        differences = bounded - fixed if presses else np.minimum(bounded, 0) - np.minimum(fixed, 0)
+        error = max(error, float(np.abs(differences).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)))
     return (places if trial.error > trial.allowed else None), trial
 
 
-def _depth(gap: np.ndarray) -> np.ndarray:
-    return -np.minimum(gap, 0)
+def _travel(pair: ContactPoints, X_RM: np.ndarray) -> float:
+    """Return how far [mm] the moving face, or the contact points of a pair without one, travel from their nominal places."""
+    bounds = pair.moving_face.mesh.bounds if pair.moving_face is not None else [pair.P_m.min(axis=0), pair.P_m.max(axis=0)]
+    corners = np.array(np.meshgrid(*np.array(bounds).T)).reshape(3, -1).T
+    return float(np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max())
+
+
+def clearance(pair: ContactPoints) -> float:
+    """Return the least nominal distance [mm] of contact points from their feet."""
+    return float(np.linalg.norm(pair.P_m - pair.P_r, axis=1).min())

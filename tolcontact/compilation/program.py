@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
-from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair
+from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair, push
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
@@ -119,7 +119,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             _check_forces(nominal, groups)
         place = NamedFunction.dense(ca.Function("place", [d], [raw], ["deviations"], ["poses"]))
         observed = NamedFunction.dense(observe)
-        meetings, trials = _meetings(nominal, draws, place, observed) if method.is_bounded else ({}, {})
+        meetings, trials = _meetings(nominal, groups, draws, place, observed, method) if method.is_bounded else ({}, {})
         log.info("compiling %d parts, %d of them coupled by contact", len(nominal.parts), sum(len(g.free) for g in groups))
         return Program(
             nominal=nominal,
@@ -149,7 +149,7 @@ def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca
 
 
 def _meetings(
-    nominal: Nominal, draws: Draws, place: NamedFunction, observe: NamedFunction
+    nominal: Nominal, groups: Sequence[Group], draws: Draws, place: NamedFunction, observe: NamedFunction, method: Method
 ) -> tuple[dict[int, Meeting], dict[int, Trial]]:
     """Return the meetings of the pairs that need them, and the trials of all pairs of faces."""
     if not nominal.pairs:
@@ -158,7 +158,13 @@ def _meetings(
     poses = place(deviations=deviations)["poses"]
     relative = observe(poses=poses, deviations=deviations)["relative"].reshape(len(poses), len(nominal.pairs), ENTRIES)
     known = np.isfinite(relative).all(axis=(1, 2))
-    decisions = {k: bounded_pair(nominal, k, relative[known, k], deviations[known]) for k in range(len(nominal.pairs))}
+    relative, deviations, presses = relative[known], deviations[known], method.minimizes.presses
+    pushes = [push(pair, relative[:, k], deviations, presses=presses) for k, pair in enumerate(nominal.pairs)]
+    pushed = {k: sum(pushes[j] for j in group.pairs) for group in groups for k in group.pairs}
+    decisions = {
+        k: bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed.get(k, 0.0), presses=presses)
+        for k in range(len(nominal.pairs))
+    }
     meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 

@@ -58,11 +58,14 @@ class Limits:
     def is_doubtful(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
         """Return whether an answer remains doubtful once the faces themselves are checked (n,).
 
-        It does if a part turned too far. If parts only travelled, the faces must be free of penetration, and hold the points
-        that carry.
+        It does if a part turned too far. If parts only travelled, or so far that places of contact may have been missed, the
+        faces must be free of penetration, and hold the points that carry.
         """
         doubtful = self._is_turned(task, state)
-        rows = np.flatnonzero(self._is_far(task, state) & ~doubtful & state.solved & ~state.in_conflict)
+        far = self._is_far(task, state)
+        for k, places in candidates.bounded.items():
+            far |= ~places.covers(state.relative[:, k])
+        rows = np.flatnonzero(far & ~doubtful & state.solved & ~state.in_conflict)
         travelled = state.take(rows)
         for k, index in enumerate(self._pairs):
             faces, X_RM = self._nominal.face_pair(index) if rows.size else None, travelled.relative[:, k]

@@ -10,11 +10,13 @@ plane, since the common normal of two rims leans without limit as they become pa
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Int
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.geometry import kernel
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
@@ -26,6 +28,7 @@ MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
 MAX_PLACES = 32  # that are returned of one pose
 DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
+CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
 ARC = np.linspace(0, 1, 17)  # shares at which the normals between two facets are compared
 ARC_SPACING = np.pi / 16  # rad: the largest angle between two of them
 TINY = 1e-300
@@ -53,7 +56,8 @@ class Meeting:
     kinds, firsts, seconds   (candidate,): the kind, and the numbers of the moving and the reference body's part
     planes   (candidate,): for corners of facing planes the number of these planes, else -1
     facing   (plane, 2): a facet of the moving and of the reference plane
-    depth, height   [mm]: the largest depth and gap at which a place counts
+    depth, height   [mm]: the largest depth and gap at which a place counts; `depth` is also how far the moving body may travel
+    tilt     [rad] by which it may turn
     """
 
     moving: Polyhedron
@@ -66,9 +70,21 @@ class Meeting:
     depth: float
     height: float
     size: float
+    tilt: float
 
     def __len__(self) -> int:
         return len(self.kinds)
+
+    def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
+        """Return whether the bodies stay so near to their nominal places that no place is missed (n,)."""
+        corners = self.moving.vertices[self._extremes]
+        moved = np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max(axis=1)
+        return (moved <= self.depth) & (pose.turn(X_RM, pose.AT_REST[None]).reshape(-1) <= self.tilt + SPARE_LEANING)
+
+    @cached_property
+    def _extremes(self) -> np.ndarray:
+        """Numbers of the vertices of the moving body that are outermost in some directions."""
+        return np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
 
     def at(self, X_RM: Float[Array, "n 12"], kept: Int[Array, "n k"] | None = None, error: float = 0.0) -> Places:
         """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `kept` (n, k), -1 for none.
@@ -119,7 +135,7 @@ def meeting(faces: tuple[Surface, Surface], bodies: tuple, travel: float, tilt: 
     kinds = np.repeat([CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE], [len(part) for part in parts])
     firsts, seconds, planes = (np.ascontiguousarray(column) for column in np.concatenate(parts).T)
     size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
-    return Meeting(A, B, kinds, firsts, seconds, planes, facets, depth=travel, height=height + travel, size=size)
+    return Meeting(A, B, kinds, firsts, seconds, planes, facets, depth=travel, height=height + travel, size=size, tilt=tilt)
 
 
 def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:

@@ -16,7 +16,7 @@ from tolcontact.archive import check_rows, open_archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
-from tolcontact.method import Method
+from tolcontact.method import USUAL_SEARCH, Method
 from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, Workers, mapping
 from tolcontact.statistics import compare_runs as compare_results
@@ -114,12 +114,14 @@ def _compared(block: Block) -> tuple[np.ndarray, ...]:
 
 
 def distinctions(method: Method, methods: Sequence[Method]) -> list[str]:
-    """Return the choices of a method in which `methods` differ, in words."""
+    """Return the choices of a method in which `methods` differ, in words; without searches that follow from the resolution."""
     values = {
         field.name: getattr(method, field.name)
         for field in fields(Method)
         if len({getattr(alternative, field.name) for alternative in methods}) > 1
     }
+    if all(alternative.search == USUAL_SEARCH[alternative.resolution] for alternative in methods):
+        values.pop("search", None)
     return [value if name in SELF_EXPLANATORY else f"{name} {value}" for name, value in values.items()]
 
 
