@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from studies.certificates.ends import METHOD, Convex, judged, piece, scene, separation
 from tests.cases.ends import CASES, case
+from tests.helpers import PAPER
 from tolcontact.geometry.meeting import meeting
 from tolcontact.geometry.surface import Surface
 from tolcontact.report import summary_text
@@ -118,14 +119,19 @@ def test_a_bounded_search_needs_the_exact_resolution():
 
 def test_contact_of_planes_where_bodies_are_apart_is_measured_and_the_advice_helps():
     """The check after a run looks both ways: a plate held beside a chamfer is found, and is free once faces end."""
-    fixed, bounded = (
-        tc.run(case("chamfer", method=replace(METHOD, search=search))[0], samples=200, seed=1)
-        for search in ("fixed", "bounded")
-    )
-    summary = tc.summarize(fixed)
-    assert 0.05 < float(summary.false_contact.max()) < 0.4
-    assert 'contact pair "contact": points lie up to' in printed(summary)
-    assert 'use Method(resolution="exact", search="bounded")' in printed(summary)
+    for method, advice in ((replace(METHOD, search="fixed"), 'leave out search="fixed"'), (PAPER, "use --resolution exact")):
+        with pytest.warns(tc.ContactWarning, match=f'contact pair "contact": contact was resolved where .* apart.*; .*{advice}'):
+            fixed = tc.run(case("chamfer", method=method)[0], samples=200, seed=1)
+        summary, told = tc.summarize(fixed), printed(tc.summarize(fixed))
+        assert 0.05 < float(summary.false_contact.max()) < 0.4
+        assert 'contact pair "contact": points lie up to' in told and advice in told
+        at_random = fixed["surface"].at_random.values == 1
+        share, lower, upper = summary.false_contact_share.values
+        assert 21 < at_random.sum() < 64 and lower < share < upper
+        assert share == (fixed["surface"].false_contact.values[at_random] > 0.006).mean()
+        assert 0 < float(summary.contacts_ended) <= float(summary.contacts)
+        assert f"{float(summary.contacts_ended):.0f} of {float(summary.contacts):.0f} touching contact points" in told
+    bounded = tc.run(case("chamfer")[0], samples=200, seed=1)
     assert np.isnan(tc.summarize(bounded).false_contact).all()
     assert "apart" not in printed(tc.summarize(bounded))
 

@@ -111,7 +111,7 @@ recent one. (This covers a killed process. Writes are not flushed to the physica
 `resume=True`, `--resume` continues the run and gives the same data as an uninterrupted run, up to the original number of
 realizations or `samples`, whichever is larger.
 
->>> with tc.run(stand, samples=300, seed=1, out=path, surfaces=16, resume=True) as results:
+>>> with tc.run(stand, samples=300, seed=1, method=linear, out=path, surfaces=16, resume=True) as results:
 ...     print(results.sizes["realization"], results.attrs["history"])
 300 ... created
 ... resumed after 0 realizations
