@@ -33,7 +33,7 @@ FIRM_STEPS = (*[StepKind(1e4, newton=True)] * 6, *[StepKind(1e2, newton=True)] *
 STEPS = (*[StepKind(1.0, newton=False)] * 8, *FIRM_STEPS, *[StepKind(1.0, newton=True)] * 80)
 # Where faces end, places come and go. Newton's curvature is that of places that stay, so steps like the paper's come first and,
 # held back, again later, with places that stay longer: they do not jump to and fro between places.
-WIDE = 4.0
+WIDE = 32.0
 STEPS_WHERE_FACES_END = (
     *[StepKind(1.0, newton=False)] * 24,
     *(kind._replace(width=WIDE) for kind in FIRM_STEPS),
