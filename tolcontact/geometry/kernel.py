@@ -1,4 +1,4 @@
-"""Compiled search for the places at which two bodies can touch, at given relative poses."""
+"""Compiled gaps of the places at which two bodies can touch: corners on facets, and edges across edges."""
 
 import math
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compiled import compiled
-from tolcontact.geometry.vector_kernel import cross, dot, inlined, is_beside, is_inside, is_over, move_back, turn, turn_back
+from tolcontact.geometry.vector_kernel import cross, dot, inlined, is_inside, is_over, move_back, turn, turn_back
 
 CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE = 0, 1, 2  # the moving body's part first
 MARGIN = 1e-9  # of the size: places that lie no farther beside an edge still count
@@ -16,7 +16,6 @@ PARALLEL = 1e-6  # rad: edges at a smaller angle have no common normal
 MIN_SLANT, MAX_SLANT = 1.02, 1.5  # lengths between which the slope of a gap between rims counts, not the plane's normal
 INSIDE = 1e-9  # mm: places that are no deeper touch
 TINY = 1e-300
-MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
 
 
 class Body(NamedTuple):
@@ -34,16 +33,6 @@ class Body(NamedTuple):
     triangles: np.ndarray
 
 
-class Candidates(NamedTuple):
-    """The places at which two bodies can touch (see Meeting), those of a corner one after the other."""
-
-    kinds: np.ndarray
-    firsts: np.ndarray
-    seconds: np.ndarray
-    planes: np.ndarray
-    facing: np.ndarray
-
-
 @inlined
 def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
     """Return the sine of the angle by which edges at a corner rise above the plane across n (3,)."""
@@ -54,14 +43,16 @@ def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _corner_on_facet(A, B, first, second, plane, spare, reach, X, x, v, place, foot, n):  # type: ignore[no-untyped-def]
+def corner_on_facet(A, B, first, second, plane, spare, reach, X, x, v, place, foot, n):  # type: ignore[no-untyped-def]
     """Write place, foot and normal of a corner x of the moving body on a facet of the reference body; return the gap."""
     d = v[0]
     height = 0.0
     for i in range(3):
         n[i] = B.normals[second, i]
         height += n[i] * (x[i] - B.facets[second, 0, i])
-    if not (-reach[0] <= height <= reach[1]) or not is_over(B.facets[second], B.inward[second], x, spare):
+    if not (-reach[0] <= height <= reach[1]):
+        return np.inf
+    if plane < 0 and not is_over(B.facets[second], B.inward[second], x, spare):
         return np.inf
     turn_back(X, n, d)
     for i in range(3):
@@ -73,7 +64,7 @@ def _corner_on_facet(A, B, first, second, plane, spare, reach, X, x, v, place, f
 
 
 @compiled
-def _facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place, foot, n):  # type: ignore[no-untyped-def]
+def facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place, foot, n):  # type: ignore[no-untyped-def]
     """Write place, foot and normal of a facet of the moving body on a corner of the reference body; return the gap.
 
     flat   the facet of the reference body along whose normal facing planes touch
@@ -93,7 +84,9 @@ def _facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place
         return np.inf
     for i in range(3):
         place[i], foot[i] = y[i] + height * d[i], B.vertices[second, i]
-    if not is_over(A.facets[first], A.inward[first], place, spare) or _leaning(B, second, n) > LEANING:
+    if plane < 0 and not is_over(A.facets[first], A.inward[first], place, spare):
+        return np.inf
+    if _leaning(B, second, n) > LEANING:
         return np.inf
     return np.inf if plane < 0 and height < -INSIDE and not is_inside(A.triangles, y) else height
 
@@ -126,7 +119,7 @@ def _pass_through(x, along, d, n, height, normals, out):  # type: ignore[no-unty
 
 
 @compiled
-def _edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, line, v, place, foot, n):  # type: ignore
+def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, line, v, place, foot, n):  # type: ignore
     """Write place, foot and normal of an edge of the moving body across one of the reference body; return the gap.
 
     The edge at x + s d, on `line` (2, 3), meets q + u e where s = (q - x) x e . m / c . m and u = (q - x) x d . m / c . m, with
@@ -174,8 +167,8 @@ def _edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, line, v, pl
 
 
 @inlined
-def _pass_by(lines, first, edges, second, normals, flat, plane, spare):  # type: ignore[no-untyped-def]
-    """Return whether two edges do not cross, seen along their common normal or along a facet's normal (see _edge_on_edge).
+def pass_by(lines, first, edges, second, normals, flat, plane, spare):  # type: ignore[no-untyped-def]
+    """Return whether two edges do not cross, seen along their common normal or along a facet's normal (see edge_on_edge).
 
     This and is_beside reject most candidates without a view of an array, which costs more than they do.
     """
@@ -196,154 +189,3 @@ def _pass_by(lines, first, edges, second, normals, flat, plane, spare):  # type:
     beyond_d, beyond_e = max(-along_d, along_d - 1), max(-along_e, along_e - 1)
     far_d = beyond_d > 0 and beyond_d * beyond_d * (d0 * d0 + d1 * d1 + d2 * d2) > spare * spare
     return far_d or (beyond_e > 0 and beyond_e * beyond_e * (e0 * e0 + e1 * e1 + e2 * e2) > spare * spare)
-
-
-@compiled
-def _keep_shallowest(candidates, gaps):  # type: ignore[no-untyped-def]
-    """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners."""
-    best, owner_of_best = -1, -1
-    for s in range(gaps.size):
-        kind = candidates.kinds[s]
-        if kind == EDGE_ON_EDGE or not gaps[s] < -INSIDE:
-            continue
-        owner = 2 * candidates.firsts[s] if kind == CORNER_ON_FACET else 2 * candidates.seconds[s] + 1
-        if owner != owner_of_best:
-            best, owner_of_best = s, owner
-        elif gaps[s] <= gaps[best]:
-            if candidates.planes[s] < 0 and gaps[s] < gaps[best]:
-                gaps[s] = np.inf
-        else:
-            if candidates.planes[best] < 0:
-                gaps[best] = np.inf
-            best = s
-
-
-@compiled
-def _find_at(A, B, candidates, reach, margin, margins, X, moved, v, gaps, places, feet, normals):  # type: ignore
-    """Write gap, places and normal of every candidate at one pose X_RM (12,); the gap is infinite where it cannot touch.
-
-    margins       (p,) [mm]: margin of each two facing planes
-    moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
-                  corners of the reference body in the moving frame
-    v             scratch (5, 3)
-    gaps          (c,) [mm]
-    places        (c, 3), feet (c, 3), normals (c, 3): P^m, P^r, n^r of the paper
-    """
-    corners, lines, back = moved
-    placed, placed_plane = -1, -1  # the corner that was found over a facet of a plane: it lies over one of them only
-    for s in range(candidates.kinds.size):
-        kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
-        spare, flat, slope = (margin, 0, 0.0) if plane < 0 else (margins[plane], candidates.facing[plane, 1], MAX_SHEAR)
-        gaps[s] = np.inf
-        if kind == EDGE_ON_EDGE:
-            if not _pass_by(lines, first, B.edges, second, B.normals, flat, plane, spare):
-                gaps[s] = _edge_on_edge(
-                    A, B, first, second, flat, plane, spare, reach, X, lines[first], v, places[s], feet[s], normals[s]
-                )
-            continue
-        corner = 2 * first if kind == CORNER_ON_FACET else 2 * second + 1
-        if plane >= 0 and corner == placed and plane == placed_plane:
-            continue
-        if kind == CORNER_ON_FACET:
-            if not is_beside(B.facets, B.inward, B.normals, second, corners, first, spare, 0.0):
-                gaps[s] = _corner_on_facet(
-                    A, B, first, second, plane, spare, reach, X, corners[first], v, places[s], feet[s], normals[s]
-                )
-        elif not is_beside(A.facets, A.inward, A.normals, first, back, second, spare, slope):
-            gaps[s] = _facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, places[s], feet[s], normals[s])
-        if plane >= 0 and gaps[s] < np.inf:
-            placed, placed_plane = corner, plane
-    _keep_shallowest(candidates, gaps)
-
-
-@compiled
-def _choose(gaps, feet, kept, directions, touching, taken, labels):  # type: ignore[no-untyped-def]
-    """Write the labels (p,) of places that may matter: those kept, those of the least gaps, and the outermost; -1 for none."""
-    number, count = 0, 0
-    for s in range(gaps.size):
-        taken[s] = False
-        if gaps[s] < np.inf:
-            touching[count], count = s, count + 1
-    for s in kept:
-        if s >= 0 and gaps[s] < np.inf and not taken[s]:
-            labels[number], taken[s], number = s, True, number + 1
-    while number < labels.size - directions.shape[0]:
-        least, gap = -1, np.inf
-        for s in touching[:count]:
-            if gaps[s] < gap and not taken[s]:
-                least, gap = s, gaps[s]
-        if least < 0:
-            break
-        labels[number], taken[least], number = least, True, number + 1
-    for direction in directions:
-        outermost, farthest = -1, -np.inf
-        for s in touching[:count]:
-            along = dot(direction, feet[s])
-            if along > farthest:
-                outermost, farthest = s, along
-        if outermost >= 0 and not taken[outermost]:
-            labels[number], taken[outermost], number = outermost, True, number + 1
-    labels[number:] = -1
-
-
-@compiled
-def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels, gaps, places, feet, normals):  # type: ignore
-    """Write the places at which bodies can touch, at poses X_RM (n, 12): of all candidates those that may matter.
-
-    These are first those in `kept` (n, k), then the ones with the least gaps, then the outermost in each of the `directions`
-    (direction, 3). All are written if there is room for them.
-
-    A, B          Body, the moving and the reference one
-    candidates    Candidates
-    reach         (2,) [mm]: the largest depth, and the largest gap, that a place may have
-    margin        [mm] by which places may lie beside edges
-    error         (2,) [mm] that facing planes may make beside their edges, and the margin in which they may make it
-    labels        (n, p): numbers of the candidates, -1 where there is none
-    gaps          (n, p) [mm], infinite where there is none
-    places, feet, normals   (n, p, 3)
-    """
-    count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
-    corners, lines, v, back = np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty((5, 3)), np.empty(B.vertices.shape)
-    all_gaps, all_places = np.empty(count), np.zeros((3, count, 3))
-    taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0])
-    for k in range(poses.shape[0]):
-        X = poses[k]
-        for j in range(corners.shape[0]):
-            turn(X, A.vertices[j], corners[j])
-            corners[j] += X[9:]
-        for j in range(lines.shape[0]):
-            turn(X, A.edges[j, 0], lines[j, 0])
-            turn(X, A.edges[j, 1] - A.edges[j, 0], lines[j, 1])
-            lines[j, 0] += X[9:]
-        for j in range(facing.shape[0]):
-            turn(X, A.normals[facing[j, 0]], v[0])
-            cross(v[0], B.normals[facing[j, 1]], v[1])
-            margins[j] = max(margin, min(error[0] / max(math.sqrt(dot(v[1], v[1])), TINY), error[1]))
-        for j in range(back.shape[0]):
-            move_back(X, B.vertices[j], v[0], back[j])
-        places_there, feet_there, normals_there = all_places
-        _find_at(
-            A,
-            B,
-            candidates,
-            reach,
-            margin,
-            margins,
-            X,
-            (corners, lines, back),
-            v,
-            all_gaps,
-            places_there,
-            feet_there,
-            normals_there,
-        )
-        if count <= room:
-            labels[k] = -1
-            labels[k, :count] = np.arange(count)
-        else:
-            _choose(all_gaps, feet_there, kept[k], directions, touching, taken, labels[k])
-        for p in range(room):
-            s = labels[k, p]
-            gaps[k, p] = np.inf if s < 0 else all_gaps[s]
-            if s >= 0:
-                places[k, p], feet[k, p], normals[k, p] = places_there[s], feet_there[s], normals_there[s]

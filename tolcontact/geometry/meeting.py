@@ -17,9 +17,10 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.geometry import kernel
+from tolcontact.geometry import kernel, places_kernel
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.polyhedron import Polyhedron, polyhedron
+from tolcontact.geometry.sorted_candidates import sorted_candidates
 from tolcontact.geometry.surface import Surface
 
 FACING = -0.99  # cosine of the angle between the normals of planes that face each other
@@ -53,20 +54,16 @@ class Places(NamedTuple):
 class Meeting:
     """The places at which two faces can touch as long as they stay near their nominal places.
 
-    kinds, firsts, seconds   (candidate,): the kind, and the numbers of the moving and the reference body's part
-    planes   (candidate,): for corners of facing planes the number of these planes, else -1
-    facing   (plane, 2): a facet of the moving and of the reference plane
+    candidates   kinds, firsts, seconds (candidate,): the kind, and the numbers of the moving and the reference body's part;
+             planes (candidate,): for corners of facing planes the number of these planes, else -1; facing (plane, 2): a facet
+             of the moving and of the reference plane
     depth, height   [mm]: the largest depth and gap at which a place counts; `depth` is also how far the moving body may travel
     tilt     [rad] by which it may turn
     """
 
     moving: Polyhedron
     reference: Polyhedron
-    kinds: Int[Array, " c"]
-    firsts: Int[Array, " c"]
-    seconds: Int[Array, " c"]
-    planes: Int[Array, " c"]
-    facing: Int[Array, "p 2"]
+    candidates: places_kernel.Candidates
     depth: float
     height: float
     size: float
@@ -74,6 +71,11 @@ class Meeting:
 
     def __len__(self) -> int:
         return len(self.kinds)
+
+    @property
+    def kinds(self) -> Int[Array, " c"]:
+        """The kinds of the candidates."""
+        return self.candidates.kinds
 
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether the bodies stay so near to their nominal places that no place is missed (n,)."""
@@ -96,9 +98,8 @@ class Meeting:
         shape = (len(X_RM), room)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
         kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.ascontiguousarray(kept)
-        kernel.find(
-            _touching_parts(self.moving), _touching_parts(self.reference),
-            kernel.Candidates(self.kinds, self.firsts, self.seconds, self.planes, self.facing),
+        places_kernel.find(
+            _touching_parts(self.moving), _touching_parts(self.reference), self.candidates,
             np.array([self.depth, self.height]), kernel.MARGIN * self.size, np.array([error, self.depth]),
             np.ascontiguousarray(X_RM), kept, DIRECTIONS, *places,
         )  # fmt: skip
@@ -133,9 +134,9 @@ def meeting(faces: tuple[Surface, Surface], bodies: tuple, travel: float, tilt: 
     if sum(len(part) for part in parts) > MAX_CANDIDATES:
         return None
     kinds = np.repeat([CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE], [len(part) for part in parts])
-    firsts, seconds, planes = (np.ascontiguousarray(column) for column in np.concatenate(parts).T)
+    candidates = sorted_candidates(A, B, np.column_stack([kinds, np.concatenate(parts)]), facets)
     size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
-    return Meeting(A, B, kinds, firsts, seconds, planes, facets, depth=travel, height=height + travel, size=size, tilt=tilt)
+    return Meeting(A, B, candidates, depth=travel, height=height + travel, size=size, tilt=tilt)
 
 
 def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:
@@ -173,6 +174,9 @@ def _on_facets(
         directions = corners.directions[corners.cones[corner] : corners.cones[corner + 1]]
         near = near[(directions @ facets.normals[near].T).min(axis=0, initial=0) >= -leaning]
         plane = facing[corners.vertex_planes[corner]][:, facets.facet_planes[near]].max(axis=0, initial=-1)
+        # Facets of facing planes count together.
+        _, one = np.unique(np.where(plane >= 0, plane, -1 - near), return_index=True)
+        near, plane = near[one], plane[one]
         pair = (np.full(len(near), corner), near)
         first, second = pair if kind == CORNER_ON_FACET else pair[::-1]
         candidates.append(np.stack([first, second, plane], axis=1))

@@ -74,6 +74,28 @@ def is_beside(facets, inward, normals, facet, points, point, spare, slope):  # t
 
 
 @compiled
+def is_within(outline, x, y, spare):  # type: ignore[no-untyped-def]
+    """Return whether (x, y) lies inside an outline of segments (segment, 4), or no farther than `spare` beside one."""
+    inside = False
+    for k in range(outline.shape[0]):
+        x0, y0, x1, y1 = outline[k, 0], outline[k, 1], outline[k, 2], outline[k, 3]
+        if (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
+            inside = not inside
+    if inside:
+        return True
+    for k in range(outline.shape[0]):
+        x0, y0, x1, y1 = outline[k, 0], outline[k, 1], outline[k, 2], outline[k, 3]
+        if min(x0, x1) > x + spare or max(x0, x1) < x - spare or min(y0, y1) > y + spare or max(y0, y1) < y - spare:
+            continue
+        dx, dy = x1 - x0, y1 - y0
+        share = min(max(((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+        aside_x, aside_y = x - x0 - share * dx, y - y0 - share * dy
+        if aside_x * aside_x + aside_y * aside_y <= spare * spare:
+            return True
+    return False
+
+
+@compiled
 def is_inside(triangles, x):  # type: ignore[no-untyped-def]
     """Return whether x lies in a closed body: its triangles fill half of all solid angles or more. No triangles hold all.
 
