@@ -95,10 +95,12 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
 
 
 @compiled
-def _find_at(A, B, candidates, reach, margin, margins, X, moved, v, box, touching, gaps, places, feet, normals):  # type: ignore
+def _find_at(A, B, candidates, reach, margin, margins, stays, X, moved, v, box, touching, gaps, places, feet, normals):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
-    margins       (p,) [mm]: margin of each two facing planes
+    margin        [mm] by which places may lie beside edges
+    margins       (p,) [mm]: that of places that stay, of each two facing planes
+    stays         (c,): whether a candidate is one of those that stay
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
     v, box        scratch (5, 3) and (4,)
@@ -111,13 +113,14 @@ def _find_at(A, B, candidates, reach, margin, margins, X, moved, v, box, touchin
     bounded, bounded_plane, boxes = -1, -1, candidates.boxes  # the corner or edge, and the plane, that the box is of
     for s in range(candidates.kinds.size):
         kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
-        spare, flat = (margin, 0) if plane < 0 else (margins[plane], candidates.facing[plane, 1])
+        flat, spare = 0 if plane < 0 else candidates.facing[plane, 1], margins[plane] if stays[s] else margin
         if plane >= 0:
             owner = 3 * (second if kind == FACET_ON_CORNER else first) + kind
             if owner != bounded or plane != bounded_plane:
-                _bound(A, candidates, s, moved, spare, box)
+                _bound(A, candidates, s, moved, margin, box)
                 bounded, bounded_plane = owner, plane
-            if box[2] < boxes[s, 0] or box[3] < boxes[s, 1] or box[0] > boxes[s, 2] or box[1] > boxes[s, 3]:
+            apart = box[2] < boxes[s, 0] or box[3] < boxes[s, 1] or box[0] > boxes[s, 2] or box[1] > boxes[s, 3]
+            if apart and not stays[s]:
                 continue
         if kind == EDGE_ON_EDGE:
             if not pass_by(lines, first, B.edges, second, B.normals, flat, plane, spare):
@@ -189,6 +192,7 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
     corners, lines, v, back = np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty((5, 3)), np.empty(B.vertices.shape)
     all_gaps, all_places, box = np.full(count, np.inf), np.zeros((3, count, 3)), np.empty(4)
+    stays = np.zeros(count, dtype=np.bool_)
     taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0])
     places_at, feet_at, normals_at = all_places
     for k in range(poses.shape[0]):
@@ -206,6 +210,9 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
             margins[j] = max(margin, min(error[0] / max(math.sqrt(dot(v[1], v[1])), TINY), error[1]))
         for j in range(back.shape[0]):
             move_back(X, B.vertices[j], v[0], back[j])
+        for s in kept[k]:
+            if s >= 0:
+                stays[s] = candidates.planes[s] >= 0
         moved = (corners, lines, back)
         number = _find_at(
             A,
@@ -214,6 +221,7 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
             reach,
             margin,
             margins,
+            stays,
             X,
             moved,
             v,
@@ -236,3 +244,6 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
                 places[k, p], feet[k, p], normals[k, p] = places_at[s], feet_at[s], normals_at[s]
         for s in touching[:number]:
             all_gaps[s] = np.inf
+        for s in kept[k]:
+            if s >= 0:
+                stays[s] = False
