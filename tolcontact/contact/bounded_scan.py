@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.contact import bounded_kernel
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.geometry.kernel import CORNER_ON_FACET
 from tolcontact.geometry.meeting import Meeting
+
+MAX_DEEPEST = 8  # places of a pair that get a row in one round
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,24 +37,29 @@ class BoundedScan(SlotScan):
         )  # fmt: skip
 
     def gaps(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        x = np.einsum("kij,kpj->kpi", pose.rotation(relative), self.places) + relative[:, None, 9:]
-        gaps = ((x - self.feet) * self.normals).sum(axis=2) - self.heights[:, None]
-        return np.where(self.valid, gaps, np.inf)
+        gaps = np.where(self.valid, 0.0, np.inf)
+        relative = np.ascontiguousarray(relative)
+        bounded_kernel.gaps(relative, self.places, self.feet, self.normals, self.heights, gaps)
+        return gaps
 
     def min_gap(self, relative: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         return self.gaps(relative, deviations).min(axis=1, initial=np.inf)
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
-        # Each place is a cluster of its own.
-        return Deepest(np.maximum(self.labels, 0), -np.minimum(self.gaps(relative, deviations), 0))
+        shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
+        deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
+        bounded_kernel.deepest(self.labels, self.gaps(relative, deviations), *deepest)
+        return deepest
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        column = (points[:, :, None] == self.labels[:, None, :]).argmax(axis=2)[..., None]
-        P_m, P_r, n_r = (np.take_along_axis(array, column, axis=1) for array in (self.places, self.feet, self.normals))
-        return P_m, P_r + self.heights[:, None, None] * n_r, n_r
+        P_m, P_r, n_r = np.empty((3, *points.shape, 3))
+        bounded_kernel.gather(points, self.labels, self.places, self.feet, self.normals, self.heights, P_m, P_r, n_r)
+        return P_m, P_r, n_r
 
     def holds(self, points: Int[Array, "realization slot"]) -> Bool[Array, "realization slot"]:
-        return ((points[:, :, None] == self.labels[:, None, :]) & self.valid[:, None, :]).any(axis=2)
+        found = np.empty(points.shape, dtype=bool)
+        bounded_kernel.contains(points, self.labels, self.valid, found)
+        return found
 
     def moves(self, points: np.ndarray) -> np.ndarray:
         return self.meeting.kinds[points] == CORNER_ON_FACET

@@ -174,6 +174,24 @@ def _choose(touching, gaps, feet, kept, directions, taken, labels):  # type: ign
 
 
 @compiled
+def _move(A, B, facing, X, v, corners, lines, back, sines):  # type: ignore[no-untyped-def]
+    """Write what moves at a pose X_RM (12,): see `moved` in _find_at; and sines of the angles between facing planes."""
+    for j in range(corners.shape[0]):
+        turn(X, A.vertices[j], corners[j])
+        corners[j] += X[9:]
+    for j in range(lines.shape[0]):
+        turn(X, A.edges[j, 0], lines[j, 0])
+        turn(X, A.edges[j, 1] - A.edges[j, 0], lines[j, 1])
+        lines[j, 0] += X[9:]
+    for j in range(back.shape[0]):
+        move_back(X, B.vertices[j], v[0], back[j])
+    for j in range(facing.shape[0]):
+        turn(X, A.normals[facing[j, 0]], v[0])
+        cross(v[0], B.normals[facing[j, 1]], v[1])
+        sines[j] = math.sqrt(dot(v[1], v[1]))
+
+
+@compiled
 def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels, gaps, places, feet, normals):  # type: ignore
     """Write the places at which bodies can touch, at poses X_RM (n, 12): of all candidates those that may matter.
 
@@ -197,19 +215,9 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
     places_at, feet_at, normals_at = all_places
     for k in range(poses.shape[0]):
         X = poses[k]
-        for j in range(corners.shape[0]):
-            turn(X, A.vertices[j], corners[j])
-            corners[j] += X[9:]
-        for j in range(lines.shape[0]):
-            turn(X, A.edges[j, 0], lines[j, 0])
-            turn(X, A.edges[j, 1] - A.edges[j, 0], lines[j, 1])
-            lines[j, 0] += X[9:]
+        _move(A, B, facing, X, v, corners, lines, back, margins)
         for j in range(facing.shape[0]):
-            turn(X, A.normals[facing[j, 0]], v[0])
-            cross(v[0], B.normals[facing[j, 1]], v[1])
-            margins[j] = max(margin, min(error[0] / max(math.sqrt(dot(v[1], v[1])), TINY), error[1]))
-        for j in range(back.shape[0]):
-            move_back(X, B.vertices[j], v[0], back[j])
+            margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         for s in kept[k]:
             if s >= 0:
                 stays[s] = candidates.planes[s] >= 0

@@ -1,0 +1,69 @@
+"""Compiled passes over places that are found at every pose, of every realization its own."""
+
+import numpy as np
+
+from tolcontact.compiled import compiled
+
+
+@compiled
+def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-untyped-def]
+    """Add to values (n, place), 0 or infinite before, the gaps at X_RM (n, 12), above planes grown by heights (n,)."""
+    for k in range(relative.shape[0]):
+        X = relative[k]
+        for p in range(places.shape[1]):
+            if values[k, p] == np.inf:
+                continue
+            gap = -heights[k]
+            for i in range(3):
+                x = X[9 + i] - feet[k, p, i]
+                for j in range(3):
+                    x += X[3 * i + j] * places[k, p, j]
+                gap += x * normals[k, p, i]
+            values[k, p] = gap
+
+
+@compiled
+def deepest(labels, values, numbers, depths):  # type: ignore[no-untyped-def]
+    """Write labels and depths of the deepest places (n, m), deepest first; the first label, and 0, where there are fewer."""
+    for k in range(values.shape[0]):
+        count = 0
+        for p in range(values.shape[1]):
+            depth = -values[k, p]
+            if not depth > 0:
+                continue
+            j = min(count, numbers.shape[1] - 1)
+            if count == numbers.shape[1] and depth <= depths[k, j]:
+                continue
+            while j > 0 and depths[k, j - 1] < depth:
+                numbers[k, j], depths[k, j], j = numbers[k, j - 1], depths[k, j - 1], j - 1
+            numbers[k, j], depths[k, j] = labels[k, p], depth
+            count = min(count + 1, numbers.shape[1])
+        for j in range(count, numbers.shape[1]):
+            numbers[k, j], depths[k, j] = max(labels[k, 0], 0), 0.0
+
+
+@compiled
+def gather(points, labels, places, feet, normals, heights, P_m, P_r, n_r):  # type: ignore[no-untyped-def]
+    """Write P_m, P_r, n_r (n, slot, 3) of the places with labels `points` (n, slot); of the first place if there is none."""
+    for k in range(points.shape[0]):
+        for s in range(points.shape[1]):
+            column = 0
+            for p in range(labels.shape[1]):
+                if labels[k, p] == points[k, s]:
+                    column = p
+                    break
+            for i in range(3):
+                P_m[k, s, i], n_r[k, s, i] = places[k, column, i], normals[k, column, i]
+                P_r[k, s, i] = feet[k, column, i] + heights[k] * normals[k, column, i]
+
+
+@compiled
+def contains(points, labels, valid, found):  # type: ignore[no-untyped-def]
+    """Write whether each of the `points` (n, slot) is among the labels (n, place) of valid places."""
+    for k in range(points.shape[0]):
+        for s in range(points.shape[1]):
+            found[k, s] = False
+            for p in range(labels.shape[1]):
+                if labels[k, p] == points[k, s]:
+                    found[k, s] = valid[k, p]
+                    break
