@@ -17,7 +17,8 @@ CHECKED = [
     ".".join(file.relative_to(PACKAGE.parent).with_suffix("").parts)
     for room in ROOMS
     for file in sorted((PACKAGE / room).rglob("*.py"))
-    if file.name not in ("__init__.py", "kernel.py")  # Numba compiles no function that something is wrapped around
+    # Numba compiles no function that something is wrapped around.
+    if file.name != "__init__.py" and not file.name.endswith("kernel.py")
 ]
 install_import_hook(CHECKED, "beartype.beartype(conf=beartype.BeartypeConf(is_pep484_tower=True))")
 
