@@ -10,7 +10,9 @@ RESOLUTIONS = ("linearized", "exact")
 REGULARIZATIONS = ("points", "identity")
 ACTIVE_SETS = ("closed", "initial")
 SEARCHES = ("fixed", "iterated", "bounded")
-USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}  # by resolution
+# By resolution: of one linear step the paper's.
+USUAL_SEARCH = {"linearized": "fixed", "exact": "bounded"}
+USUAL_OBJECTIVE = {"linearized": "active points", "exact": "all points"}
 
 
 @dataclass(frozen=True)
@@ -47,10 +49,12 @@ class Method:
 
         resolution      "exact": steps are repeated, with proper rotations, until the true gaps (5) are open and the
                         objective is least; "linearized": one linear step (12), as in the paper
-        objective       what the corrected pose minimizes. "active points": half the sum of squared displacements, from the
-                        raw state, of the contact points that are active there (the paper's); "all points": of all contact
-                        points; "locator stiffness": the energy of the two-sided locators as springs; "seating": the
-                        potential energy of the declared forces, with two-sided locators exact
+        objective       what the corrected pose minimizes. "all points": half the sum of squared displacements, from the raw
+                        state, of all contact points; "active points": of those that are active in the raw state (the
+                        paper's); "locator stiffness": the energy of the two-sided locators as springs; "seating": the
+                        potential energy of the declared forces, with two-sided locators exact. If it is not given, "all
+                        points" with "exact", and "active points" with "linearized": a single active point holds hardly
+                        any turn of its part
         regularization  what holds the degrees of freedom that the objective leaves open. "points": eta times the squared
                         displacements of all contact points, the same in every frame; "identity": the paper's eta I, which
                         mixes mm and rad and so depends on the origin
@@ -71,7 +75,7 @@ class Method:
     """
 
     resolution: str = "exact"
-    objective: str = "active points"
+    objective: str = ""
     regularization: str = "points"
     eta: float = 1e-6
     active_set: str = "closed"
@@ -81,8 +85,9 @@ class Method:
     near_travel: float = 0.5
 
     def __post_init__(self) -> None:
-        if not self.search:
-            object.__setattr__(self, "search", USUAL_SEARCH.get(self.resolution, "fixed"))
+        for choice, usual in (("search", USUAL_SEARCH), ("objective", USUAL_OBJECTIVE)):
+            if not getattr(self, choice):
+                object.__setattr__(self, choice, usual.get(self.resolution, usual["linearized"]))
         choices = {
             "resolution": RESOLUTIONS,
             "objective": tuple(OBJECTIVES),
@@ -105,9 +110,16 @@ class Method:
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
     def with_choices(self, **choices: Any) -> "Method":
-        """Return this method with other choices; another resolution comes with its usual search, unless one is given."""
-        other = choices.get("resolution", self.resolution) != self.resolution
-        return replace(self, **({"search": ""} if other else {}) | choices)
+        """Return this method with other choices.
+
+        Another resolution comes with its usual search, and with its usual objective if this one has that of its own resolution;
+        unless they are given.
+        """
+        usual = {}
+        if choices.get("resolution", self.resolution) != self.resolution:
+            has_usual = self.objective == USUAL_OBJECTIVE[self.resolution]
+            usual = {"search": "", "objective": "" if has_usual else self.objective}
+        return replace(self, **usual | choices)
 
     @property
     def minimizes(self) -> Objective:

@@ -206,10 +206,9 @@ def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:
     if not program.method.is_bounded:
         return {}
     numbers = range(len(program.nominal.pairs))
-    trials = [program.trials[k] for k in numbers]
     return {
         terms.BOUNDED: [k in program.meetings for k in numbers],
-        terms.PLANE_ERROR: [trial.error for trial in trials],
+        terms.PLANE_ERROR: [program.trials[k].error if k in program.trials else np.nan for k in numbers],
     }
 
 

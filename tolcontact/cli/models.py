@@ -70,8 +70,8 @@ def check(
     for part in program.nominal.parts:
         size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
         typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
-    for pair in program.nominal.pairs:
-        typer.echo(f"  contact {pair.name}: {pair.in_words}")
+    for k, pair in enumerate(program.nominal.pairs):
+        typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     typer.echo("no faults found")
     if population is not None:
         console().print(population_text(check_population(assembly, samples=population, seed=seed)))

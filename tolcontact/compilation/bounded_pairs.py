@@ -51,13 +51,13 @@ def bounded_pair(
     deviations: Float[Array, "n contributor"],
     *,
     pushed: float,
-    presses: bool,
+    room: float,
 ) -> tuple[Meeting | None, Trial]:
     """Return where the faces of a pair can touch as they end, or None if fixed planes represent its reference face well.
 
     X_RM      (n, 12), raw, at trial poses, for `deviations` (n, contributor)
     pushed    [mm]: how far all contact together may push its parts
-    presses   whether forces close the gaps: then gaps are compared, not depths
+    room      [mm]: how far other contact, or forces, may: gaps below it are compared, too
     """
     pair = nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
@@ -88,7 +88,7 @@ def bounded_pair(
         rows = slice(k, k + POSES_AT_ONCE)
         bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights[rows]
         fixed = pair.least_gap(X_RM[rows], heights[rows])
-        differences = bounded - fixed if presses else np.minimum(bounded, 0) - np.minimum(fixed, 0)
+        differences = np.minimum(bounded, room) - np.minimum(fixed, room)
         error = max(error, float(np.abs(differences).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
     trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)))

@@ -1,6 +1,7 @@
 """The compiled model: it is built once, and evaluated by name for blocks of realizations."""
 
 import logging
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -76,12 +77,21 @@ class Program(Pictured):
         nominal, method = self.nominal, self.method
         rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
         rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
-        rows += [f"  contact {pair.name}: {pair.in_words}" for pair in nominal.pairs]
+        rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [
             f"  measure {measure.name}: nominally {value:.6g} {measure.units}"
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)
+
+    def contact_in_words(self, k: int) -> str:
+        """Return the contact of pair k in a few words: its points, and whether places are found where its faces end."""
+        words, trial = self.nominal.pairs[k].in_words, self.trials.get(k)
+        if trial is None or math.isnan(trial.error):
+            return words
+        if k in self.meetings:
+            return f"{words}; found anew at every pose, since fixed points would err by {trial.error:.2g} mm"
+        return f"{words}; they are fixed, and err by {trial.error:.2g} mm at most"
 
 
 def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
@@ -160,11 +170,12 @@ def _meetings(
     known = np.isfinite(relative).all(axis=(1, 2))
     relative, deviations, presses = relative[known], deviations[known], method.minimizes.presses
     pushes = [push(pair, relative[:, k], deviations, presses=presses) for k, pair in enumerate(nominal.pairs)]
-    pushed = {k: sum(pushes[j] for j in group.pairs) for group in groups for k in group.pairs}
-    decisions = {
-        k: bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed.get(k, 0.0), presses=presses)
-        for k in range(len(nominal.pairs))
-    }
+    decisions = {}
+    for group in groups:
+        pushed = sum(pushes[k] for k in group.pairs)
+        for k in group.pairs:
+            room = pushed if presses else pushed - pushes[k]
+            decisions[k] = bounded_pair(nominal, k, relative[:, k], deviations, pushed=pushed, room=room)
     meetings = {k: places for k, (places, _) in decisions.items() if places is not None}
     return meetings, {k: trial for k, (_, trial) in decisions.items()}
 

@@ -51,8 +51,8 @@ at a corner of one on a facet of the other, from both sides, or at an edge acros
 at the corners of their overlap. These places are found at every pose, and a place counts only while it lies on both bodies.
 
 When the model is compiled, 1024 raw poses decide for each pair: if fixed planes miss the depth of contact by no more than a
-two-thousandth of the smallest tolerance range, the pair keeps its fixed points and costs no more than with them (`check
---verbose` says which pairs do, and so do `bounded` and `plane_error` in the archive). Balls and shafts beside walls are exact
+two-thousandth of the smallest tolerance range, the pair keeps its fixed points and costs no more than with them (`tolcontact
+check` says which pairs do, and so do `bounded` and `plane_error` in the archive). Balls and shafts beside walls are exact
 anyway.
 
 >>> plate, wedge = tc.Box(60, 50, 3), tc.Mesh(trimesh.creation.cone(8, 6, sections=24))

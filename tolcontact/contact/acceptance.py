@@ -15,6 +15,7 @@ from tolcontact.mechanics import Group, curved_pairs
 from tolcontact.method import Method
 
 ADRIFT_SIZES = 10  # a part that travelled by more sizes has nothing to rest on
+TURN_FACTOR = 2  # times the turn that lifts the end of a face as far as contact may push
 LOST_SIZES = 1e5  # no step will bring a part back from there
 # Faces may lie in each other, beside what their triangles leave open, by the smaller of these two:
 DEPTH_SIZES = 1e-4  # sizes of the parts
@@ -58,10 +59,14 @@ class Limits:
     def is_doubtful(self, task: Task, state: State, candidates: Candidates) -> Bool[Array, " n"]:
         """Return whether an answer remains doubtful once the faces themselves are checked (n,).
 
-        It does if a part turned too far. If parts only travelled, or so far that places of contact may have been missed, the
+        It does if a part turned too far, also beside what its tolerances allow: unless forces do so, contact has no reason to
+        turn a part farther than gaps are deep, over the size of its face. If parts only travelled, or so far that places of contact may have been missed, the
         faces must be free of penetration, and hold the points that carry.
         """
         doubtful = self._is_turned(task, state)
+        if not self._presses:
+            for k, places in candidates.bounded.items():
+                doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * places.turn
         far = self._is_far(task, state)
         for k, places in candidates.bounded.items():
             far |= ~places.covers(state.relative[:, k])

@@ -77,6 +77,11 @@ class Meeting:
         """The kinds of the candidates."""
         return self.candidates.kinds
 
+    @property
+    def turn(self) -> float:
+        """The turn [rad] that moves the ends of the moving face about its middle as far as the body may travel."""
+        return 2 * self.depth / float(np.ptp(self.moving.vertices, axis=0).max())
+
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
         """Return whether the bodies stay so near to their nominal places that no place is missed (n,)."""
         corners = self.moving.vertices[self._extremes]
