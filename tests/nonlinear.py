@@ -73,7 +73,7 @@ class TrueProblem:
                     motion += ca.dot(weight, squares) / 2
                     count += ca.sum2(weight)
                     turn = ca.sumsqr(turned(new, part) - turned(raw, part))
-                    held += ca.sum2(squares) / 2 + len(P) * (BALL * self.length) ** 2 * turn / 2
+                    held += ca.dot(ca.DM(pair.weights[None]), squares) / 2 + len(P) * (BALL * self.length) ** 2 * turn / 2
                     points += len(P)
         return motion, held, count, points
 
@@ -111,14 +111,16 @@ class TrueProblem:
         return moved
 
     def weights(self, raw, deviations):
-        """Which points (point,) of each pair count in the objective."""
+        """How much the points (point,) of each pair count in the objective: by the areas that they stand for."""
         pairs = self.nominal.pairs
-        every = [np.ones(len(pair.P_m)) for pair in pairs]
+        every = [pair.weights for pair in pairs]
         raw_gaps = np.array(self.gaps(raw.T, raw.T, deviations, *(w[None] for w in every))).ravel()
         split = np.split(raw_gaps, np.cumsum([len(pair.P_m) for pair in pairs])[:-1])
         if self.objective != "active points":
             return every
-        return [np.where(gap < 1e-9, 1.0, 0.0) * (not pair.is_supports) for gap, pair in zip(split, pairs, strict=True)]
+        return [
+            np.where(gap < 1e-9, pair.weights, 0.0) * (not pair.is_supports) for gap, pair in zip(split, pairs, strict=True)
+        ]
 
     def solve(self, raw, deviations, weights) -> tuple[float, bool]:
         """Least energy from the raw poses (part, 12), and whether ipopt is content."""

@@ -83,3 +83,25 @@ def test_halving_the_spacing_moves_measures_on_curved_faces_by_less_than_their_i
         for estimate in (intervals.mean, intervals.standard_deviation):
             _, lower, upper = estimate(coarse[:, k])
             assert lower < estimate(fine[:, k])[0] < upper
+
+
+@pytest.mark.parametrize("size", [(20, 20, 10), (50, 8, 10), (7, 90, 3)])
+@pytest.mark.parametrize("points", [None, 12, 200])
+def test_weighted_points_have_the_centroid_of_the_face(size, points):
+    """In the exact resolution points count by the area that they stand for: a push alone does not tilt a plate."""
+    a = tc.Assembly("plates")
+    lower = a.part("lower", tc.Box(*size), fixed=True)
+    upper = a.part("upper", tc.Box(*size), at=(0, 0, size[2]))
+    locators = [tc.Locator(f"Z{k}", (x, y, 0), "z", 0) for k, (x, y) in enumerate([(1, 1), (6, 1), (3, 7)])]
+    sides = [tc.Locator("Y1", (1, 0, 1), "y", 0), tc.Locator("Y2", (6, 0, 1), "y", 0), tc.Locator("X", (0, 3, 1), "x", 0)]
+    a.locate(upper, [*locators, *sides])
+    a.variable("lift", tc.Tolerance(1), drives={f"upper.Z{k}": 1 for k in range(3)})
+    a.contact("seat", moving=upper.face("-z"), reference=lower.face("+z"), points=points)
+    a.measure("height", upper.point(0, 0, 0), along="z", tolerance=1)
+    program, run = simulate(a, samples=20, solver="daqp", method=tc.Method(search="fixed"))
+    (pair,) = program.nominal.pairs
+    spacing = np.sqrt(size[0] * size[1] / len(pair.P_m))
+    centroid = pair.weights @ pair.P_m / pair.weights.sum()
+    assert np.abs(centroid - [size[0] / 2, size[1] / 2, size[2]]).max() < 1e-9 * spacing and (pair.weights > 0).all()
+    R = run["poses"][:, 1, 1, :9].reshape(-1, 3, 3)
+    assert run["gap_min"][:, 0].min() < -0.1 and np.abs(R - np.eye(3)).max() < 1e-9

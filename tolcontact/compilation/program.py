@@ -122,7 +122,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             ["poses", "deviations"],
             ["measured", "relative"],
         )
-        groups = contact_groups(nominal)
+        groups = contact_groups(nominal, weighs_areas=method.is_exact)
         gaps = tuple(None if pair.round else gap_map(gap_matrix(pair), pair.offsets) for pair in nominal.pairs)
         round_functions = {k: _round_gap_function(pair, pair.round, d) for k, pair in enumerate(nominal.pairs) if pair.round}
         if method.minimizes.presses:

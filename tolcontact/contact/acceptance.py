@@ -60,8 +60,8 @@ class Limits:
         """Return whether an answer remains doubtful once the faces themselves are checked (n,).
 
         It does if a part turned too far, also beside what its tolerances allow: unless forces do so, contact has no reason to
-        turn a part farther than gaps are deep, over the size of its face. If parts only travelled, or so far that places of contact may have been missed, the
-        faces must be free of penetration, and hold the points that carry.
+        turn a part farther than gaps are deep, over the size of its face. If parts only travelled, or so far that places of
+        contact may have been missed, the faces must be free of penetration, and hold the points that carry.
         """
         doubtful = self._is_turned(task, state)
         if not self._presses:

@@ -8,8 +8,10 @@ import numpy as np
 import trimesh
 
 from tolcontact import poses as pose
+from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import FaceDeviation, Features, NominalFeature
 from tolcontact.geometry.curvature import chord_height
@@ -134,6 +136,14 @@ class ContactPoints:
     def least_gap(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12), above planes grown by `heights` (row,) [mm]."""
         return ((pose.apply(X_RM, self.P_m) - self.P_r) * self.n_r).sum(axis=2).min(axis=1) - heights
+
+    @cached_property
+    def weights(self) -> Float[Array, " point"]:
+        """The weights of the points (point,), by the areas that they stand for; equal ones without sampled faces."""
+        if self.moving_face is None or self.reference_face is None or self.round is not None:
+            return np.ones(len(self.P_m))
+        distance = float(np.linalg.norm(self.P_m - self.P_r, axis=1).max())
+        return point_weights(self.P_m, distance, self.moving_face, self.reference_face)
 
     @cached_property
     def bulge(self) -> float:

@@ -20,17 +20,18 @@ class Side:
     pair: int
     part: int
     points: np.ndarray
+    weights: np.ndarray
     centre: np.ndarray
 
     @property
     def table(self) -> np.ndarray:
-        """The moments of each point, shape (moment, point)."""
-        return moment_table(self.points, self.centre)
+        """The moments of each point, shape (moment, point), times its weight."""
+        return moment_table(self.points, self.centre) * self.weights
 
     def ball_moments(self, radius: float) -> np.ndarray:
         """Return the moments of all points as small balls, so that points on a line hold all rotations, too."""
         moments = self.table.sum(axis=1)
-        moments[[4, 7, 9]] += len(self.points) * radius**2
+        moments[[4, 7, 9]] += self.weights.sum() * radius**2
         return np.asarray(moments)
 
 
@@ -72,8 +73,11 @@ def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
     ]
 
 
-def contact_groups(nominal: Nominal) -> list[Group]:
-    """Return the groups of parts that contact couples. Parts that share only a fixed neighbour are in different groups."""
+def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
+    """Return the groups of parts that contact couples. Parts that share only a fixed neighbour are in different groups.
+
+    Contact points count by the areas that they stand for if `weighs_areas`; in the paper each counts once.
+    """
     chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
@@ -82,14 +86,14 @@ def contact_groups(nominal: Nominal) -> list[Group]:
             clusters.remove(cluster)
             joined |= cluster
         clusters.append(joined)
-    return [_group(nominal, chains, tuple(sorted(cluster))) for cluster in clusters]
+    return [_group(nominal, chains, tuple(sorted(cluster)), weighs_areas) for cluster in clusters]
 
 
 def _movers_of(part: int | None, chains: Sequence[tuple[int, ...]]) -> set[int]:
     return set() if part is None else set(chains[part])
 
 
-def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...]) -> Group:
+def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int, ...], weighs_areas: bool) -> Group:
     members = [
         (index, pair)
         for index, pair in enumerate(nominal.pairs)
@@ -110,7 +114,7 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     centre = {part: np.vstack(points[part] or points[(chains[part] or free)[-1]]).mean(axis=0) for part in parts}
     references = {pair.reference for _, pair in members}
     sides = [
-        Side(position, parts.index(part), P, centre[part])
+        Side(position, parts.index(part), P, pair.weights if weighs_areas else np.ones(len(P)), centre[part])
         for position, (_, pair) in enumerate(members)
         for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
         if part is not None and chains[part]
