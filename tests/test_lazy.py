@@ -10,7 +10,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import nightly
+from tests.helpers import PAPER, nightly
 from tolcontact.simulation.cluster import local_cluster
 from tolcontact.simulation.lazy import CHUNK_BLOCKS
 from tolcontact.simulation.packing import pack_model, packed_program
@@ -114,7 +114,7 @@ def test_without_dask_the_message_says_what_to_install(monkeypatch):
 @pytest.mark.slow
 def test_what_is_written_is_streamed(tmp_path):
     """Netcdf and zarr hold what a run gives, and memory does not grow with their size."""
-    program, own = tc.build(cases.ra1(), solver="daqp"), psutil.Process()
+    program, own = tc.build(cases.ra1(), solver="daqp", method=PAPER), psutil.Process()
     some = tc.simulate(program, 40_000, seed=2)[["measured", "status"]]
     some.to_netcdf(tmp_path / "some.nc")
     some.to_zarr(tmp_path / "some.zarr")

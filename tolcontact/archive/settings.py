@@ -47,7 +47,7 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "solver_accuracy": ACCURACY,
         "resolution": method.resolution,
         "objective": method.objective,
-        "weighting": method.objective if method.minimizes.counts_points else "none",
+        "weighting": _weighting(method),
         "regularization": method.regularization,
         "eta": method.eta,
         "active_set": method.active_set,
@@ -63,6 +63,13 @@ def run_settings(program: Program, run: Run) -> dict[str, Any]:
         "fields": run.fields,
         "block_rows": np.int64(block_rows(program)),
     }
+
+
+def _weighting(method: Method) -> str:
+    """Return which contact points count in the objective, and how."""
+    if not method.minimizes.counts_points:
+        return "none"
+    return f"{method.objective}, by area" if method.is_exact else method.objective
 
 
 def _method_origin(program: Program) -> str:

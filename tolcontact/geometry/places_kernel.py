@@ -95,19 +95,19 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
 
 
 @compiled
-def _find_at(A, B, candidates, reach, margin, margins, stays, X, moved, v, box, touching, gaps, places, feet, normals):  # type: ignore
+def _find_at(A, B, candidates, reach, margins, stays, X, moved, v, touching, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
-    margin        [mm] by which places may lie beside edges
-    margins       (p,) [mm]: that of places that stay, of each two facing planes
+    margins       (p + 1,) [mm] by which places may lie beside edges: those that stay, of each two facing planes; all others
     stays         (c,): whether a candidate is one of those that stay
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
-    v, box        scratch (5, 3) and (4,)
+    v             scratch (5, 3)
     touching      (c,): numbers of the candidates that touch
     gaps          (c,) [mm], infinite before
-    places        (c, 3), feet (c, 3), normals (c, 3): P^m, P^r, n^r of the paper
+    all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
+    (places, feet, normals), margin, box = all_places, margins[-1], np.empty(4)
     corners, lines, back = moved
     count = 0
     bounded, bounded_plane, boxes = -1, -1, candidates.boxes  # the corner or edge, and the plane, that the box is of
@@ -209,37 +209,21 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
     """
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
     corners, lines, v, back = np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty((5, 3)), np.empty(B.vertices.shape)
-    all_gaps, all_places, box = np.full(count, np.inf), np.zeros((3, count, 3)), np.empty(4)
+    all_gaps, all_places = np.full(count, np.inf), np.zeros((3, count, 3))
     stays = np.zeros(count, dtype=np.bool_)
-    taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0])
+    taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0] + 1)
     places_at, feet_at, normals_at = all_places
     for k in range(poses.shape[0]):
         X = poses[k]
         _move(A, B, facing, X, v, corners, lines, back, margins)
+        margins[-1] = margin
         for j in range(facing.shape[0]):
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         for s in kept[k]:
             if s >= 0:
                 stays[s] = candidates.planes[s] >= 0
         moved = (corners, lines, back)
-        number = _find_at(
-            A,
-            B,
-            candidates,
-            reach,
-            margin,
-            margins,
-            stays,
-            X,
-            moved,
-            v,
-            box,
-            touching,
-            all_gaps,
-            places_at,
-            feet_at,
-            normals_at,
-        )
+        number = _find_at(A, B, candidates, reach, margins, stays, X, moved, v, touching, all_gaps, all_places)
         if count <= room:
             labels[k] = -1
             labels[k, :count] = np.arange(count)

@@ -5,4 +5,5 @@ from tolcontact.vocabulary.archive import *  # noqa: F403 (one namespace, of whi
 from tolcontact.vocabulary.labels import *  # noqa: F403
 from tolcontact.vocabulary.labels import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.summary import *  # noqa: F403
+from tolcontact.vocabulary.surface import *  # noqa: F403
 from tolcontact.vocabulary.variation import *  # noqa: F403
