@@ -58,8 +58,8 @@ def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
     with tc.open_archive(stored) as then:
         now = tc.run(model, samples=8, seed=1, solver="daqp", method=AS_THEN, surfaces=4)
         apart = abs(now["measured"] - then["measured"]).max(["realization", "measure"]).values
-        # Contact points then counted once each, and count now by the areas that they stand for.
-        assert apart[0] < 1e-9 and apart[1] < 1e-3
+        # Of the corrected state gaps alone: contact points counted once each, and count now by the areas that they stand for.
+        assert apart[0] < 1e-9 < apart[1] and (now["gap_min"].sel(state="corrected") > -1e-9).all()
         assert (now["status"].values == then["status"].values).all()
 
 

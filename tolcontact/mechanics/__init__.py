@@ -65,17 +65,20 @@ measured from the raw state.
 
 | objective | minimizes |
 |---|---|
-| "active points" (default) | 1/2 sum of squared displacements of the contact points that penetrated |
-| "all points" | the same sum over all contact points |
+| "all points" (default if exact) | 1/2 sum of squared displacements of all contact points |
+| "active points" (default if linearized) | the same sum over the contact points that penetrated |
 | "locator stiffness" | energy 1/2 sum k e^2 of the two-sided locators as springs |
 | "seating" | potential energy of the declared forces, with two-sided locators exact |
 
 | objective | choose it if |
 |---|---|
+| "all points" | nothing else is asked: this also holds parts that barely penetrate |
 | "active points" | you compare with the paper |
-| "all points" | several bodies are free: this also holds parts that barely penetrate |
 | "locator stiffness" | parts are clamped to their locators |
 | "seating" | parts are pressed onto supports and neighbours; reactions are in N |
+
+In the exact resolution points count by the areas of the moving face that they stand for, with its centroid, so that results
+hardly depend on their number; in a linearized one each counts once, as in the paper (`weighting` in the archive).
 
 The objective determines the result, so every archive states it. For "seating" a small multiple (1e-3) of the displacement of
 all contact points keeps the problem convex. This term takes over part of the load: about 0.1 % times (travel / size of the
