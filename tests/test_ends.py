@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from studies.certificates.ends import METHOD, Convex, judged, piece, scene, separation
-from tests.cases.ends import CASES, case
+from tests.cases.ends import CASES, WHOLE, case, whole_case
 from tests.helpers import PAPER, simulate
 from tolcontact import poses as pose
 from tolcontact.geometry.meeting import meeting
@@ -37,6 +37,14 @@ def assert_right(assembly, bodies, samples, seed=1, solver="daqp", doubted=0):
 @pytest.mark.parametrize("name", CASES)
 def test_every_certificate_holds_for_the_bodies(name):
     assert_right(*case(name), samples=60)
+
+
+@pytest.mark.parametrize("name", WHOLE)
+def test_no_certificate_of_whole_bodies_is_wrong(name):
+    """A nut over a washer's rim, a key in a dovetail, a pin that leaves its hole: some come to no rest, and say so."""
+    counts, _ = judged(*whole_case(name), 60, 1, "daqp")
+    assert {fault: counts[fault] for fault in FAULTS} == dict.fromkeys(FAULTS, 0)
+    assert counts["certified"] >= (60 if name == "dovetail" else 36)
 
 
 @pytest.mark.slow

@@ -72,3 +72,62 @@ def case(name, method=METHOD, turn=(0.0, 0.0, 0.0), shift=(0.0, 0.0, 0.0), **con
     for along in "xyz":
         a.measure(along, m.point(20, 20, 0), along=along, tolerance=1)
     return a, [reference, moving]
+
+
+def ring(inner, outer, sections, low, high, turn=0.0):
+    """A ring of flat sections: its mesh, and its convex pieces."""
+    angles = np.linspace(0, 2 * np.pi, sections, endpoint=False) + turn
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    corners = np.concatenate([np.column_stack([r * circle, np.full(sections, z)]) for z in (low, high) for r in (inner, outer)])
+    here, there = np.arange(sections), np.roll(np.arange(sections), -1)
+    inner_low, outer_low, inner_high, outer_high = (k * sections + np.stack([here, there]) for k in range(4))
+    sides = ((outer_low, outer_high), (outer_high, inner_high), (inner_high, inner_low), (inner_low, outer_low))
+    faces = [np.stack([a[0], a[1], b[1]], axis=1) for a, b in sides] + [np.stack([a[0], b[1], b[0]], axis=1) for a, b in sides]
+    pieces = [corners[np.concatenate([of[:, k] for of in (inner_low, outer_low, inner_high, outer_high)])] for k in here]
+    return trimesh.Trimesh(corners, np.concatenate(faces), process=False), pieces
+
+
+def prism(outline, low, high):
+    """A prism along y over an outline (corner, 2) in x and z: its points."""
+    return np.array([(x, y, z) for x, z in outline for y in (low, high)], dtype=float)
+
+
+def nut_over_washer():
+    """A hexagonal nut with a hexagonal hole, whose corners hang over the rim of a washer."""
+    return ring(3.0, 9.0, 6, 0.0, 6.0, 0.1), ring(4.0, 8.4, 24, -2.0, 0.0), 0.0, (0.8, 1.5)
+
+
+def dovetail():
+    """A key in a dovetail groove, 0.1 mm clear, whose flanks end before those of the key."""
+    key = prism([(-5, 0.1), (5, 0.1), (8, 4), (-8, 4)], -12, 12) * [1, 1, -1] + [0, 0, 4]
+    groove = [
+        prism([(-20, -2), (20, -2), (20, 0), (-20, 0)], -8, 8) - [0, 0, 0.1],
+        prism([(-20, -0.1), (-8.2, -0.1), (-5.2, 3.8), (-20, 3.8)], -8, 8),
+        prism([(20, -0.1), (8.2, -0.1), (5.2, 3.8), (20, 3.8)], -8, 8),
+    ]
+    body = trimesh.boolean.union([trimesh.convex.convex_hull(points) for points in groove], engine="manifold")
+    return (trimesh.convex.convex_hull(key), [key]), (body, groove), 0.0, (0.3, 0.5)
+
+
+def pin_at_a_rim():
+    """A pin of twelve sides whose end stands 0.2 mm in a hole of twelve sides: it leaves the hole, and touches its rim."""
+    _, pieces = ring(0.0, 4.0, 12, -0.2, 8.0)
+    points = np.unique(np.concatenate(pieces), axis=0)
+    return (trimesh.convex.convex_hull(points), [points]), ring(4.15, 10.0, 12, -6.0, 0.0), 0.0, (0.8, 0.8)
+
+
+WHOLE = {"nut over a washer": nut_over_washer, "dovetail": dovetail, "pin at a rim": pin_at_a_rim}
+
+
+def whole_case(name, method=METHOD):
+    """Return the assembly of a case whose whole surfaces may touch, and the pieces of its moving and its reference body."""
+    (moving, moving_pieces), (reference, reference_pieces), _, (height, sideways) = WHOLE[name]()
+    a = tc.Assembly(name, method=method)
+    r, m = a.part("reference", tc.Mesh(reference), fixed=True), a.part("moving", tc.Mesh(moving))
+    feet = ((-8, -8, 0), (8, -8, 0), (0, 8, 0))
+    rows = [*((p, "z") for p in feet), ((-8, 0, 0), "y"), ((8, 0, 0), "y"), ((0, 0, 0), "x")]
+    a.locate(m, [tc.Locator(f"L{k}", p, along, height if along == "z" else sideways) for k, (p, along) in enumerate(rows)])
+    a.contact("contact", moving=m.face(), reference=r.face(), within=2)
+    for along in "xyz":
+        a.measure(along, m.point(8, 8, 0), along=along, tolerance=1)
+    return a, [reference_pieces, moving_pieces]

@@ -8,7 +8,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.geometry.kernel import CORNER_ON_FACET
-from tolcontact.geometry.meeting import Meeting
+from tolcontact.geometry.meeting import NEARNESS, Meeting
 
 MAX_DEEPEST = 8  # places of a pair that get a row in one round
 
@@ -72,8 +72,9 @@ def bounded_scan(
     heights: Float[Array, " n"],
     kept: Int[Array, "n k"] | None = None,
     error: float = 0.0,
+    nearness: float = NEARNESS,
 ) -> BoundedScan:
-    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept` and `error`."""
-    found = meeting.at(X_RM, kept, error)
+    """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`."""
+    found = meeting.at(X_RM, kept, error, nearness)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
     return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, heights)

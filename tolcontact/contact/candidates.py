@@ -13,6 +13,7 @@ from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
 from tolcontact.contact.state import Slots, State, Task
+from tolcontact.geometry.meeting import NEARNESS
 from tolcontact.geometry.surface import Surface
 from tolcontact.mechanics import curved_pairs
 
@@ -161,7 +162,9 @@ class Candidates:
                 scans[k] = self.projected(k, relative[:, k])
         for k, places in self.bounded.items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
-            scans[k] = bounded_scan(scans[k], places, relative[:, k], self._pairs[k].heights(deviations), kept, error)
+            nearness = NEARNESS if width == 1 else np.inf
+            heights = self._pairs[k].heights(deviations)
+            scans[k] = bounded_scan(scans[k], places, relative[:, k], heights, kept, error, nearness)
         return scans
 
     def hold(self, task: Task, state: State) -> Bool[Array, " n"]:

@@ -27,6 +27,7 @@ FACING = -0.99  # cosine of the angle between the normals of planes that face ea
 SPARE_LEANING = 0.1  # beside the largest tilt, by which places may lean that are looked at
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
+NEARNESS = 2.0  # margins beside edges: how far from a place where planes touch such a place may lie
 MAX_PLACES = 32  # that are returned of one pose
 DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -93,11 +94,13 @@ class Meeting:
         """Numbers of the vertices of the moving body that are outermost in some directions."""
         return np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
 
-    def at(self, X_RM: Float[Array, "n 12"], kept: Int[Array, "n k"] | None = None, error: float = 0.0) -> Places:
+    def at(
+        self, X_RM: Float[Array, "n 12"], kept: Int[Array, "n k"] | None = None, error: float = 0.0, nearness: float = NEARNESS
+    ) -> Places:
         """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `kept` (n, k), -1 for none.
 
-        Facing planes count beyond their edges as far as they err there by no more than `error` [mm]. Steps need it: without it
-        a corner that hangs over an edge comes and goes.
+        Facing planes count beyond their edges as far as they err there by no more than `error` [mm], and as near to a place
+        where they touch as `nearness` says. Steps need it: without it a corner that hangs over an edge comes and goes.
         """
         room = max(min(len(self), MAX_PLACES), 1)
         shape = (len(X_RM), room)
@@ -105,7 +108,7 @@ class Meeting:
         kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.ascontiguousarray(kept)
         places_kernel.find(
             _touching_parts(self.moving), _touching_parts(self.reference), self.candidates,
-            np.array([self.depth, self.height]), kernel.MARGIN * self.size, np.array([error, self.depth]),
+            np.array([self.depth, self.height]), kernel.MARGIN * self.size, np.array([error, self.depth, nearness]),
             np.ascontiguousarray(X_RM), kept, DIRECTIONS, *places,
         )  # fmt: skip
         return places

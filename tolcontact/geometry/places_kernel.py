@@ -95,11 +95,51 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
 
 
 @compiled
-def _find_at(A, B, candidates, reach, margins, stays, X, moved, v, touching, gaps, all_places):  # type: ignore
+def _gap(A, B, candidates, s, spare, reach, X, moved, v, place, foot, n):  # type: ignore
+    """Write place, foot and normal (3,) of candidate s, which may lie `spare` [mm] beside edges; return its gap [mm]."""
+    corners, lines, back = moved
+    kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    flat = 0 if plane < 0 else candidates.facing[plane, 1]
+    if kind == EDGE_ON_EDGE:
+        if pass_by(lines, first, B.edges, second, B.normals, flat, plane, spare):
+            return np.inf
+        return edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, lines[first], v, place, foot, n)
+    if kind == CORNER_ON_FACET:
+        if plane < 0 and is_beside(B.facets, B.inward, B.normals, second, corners, first, spare, 0.0):
+            return np.inf
+        gap = corner_on_facet(A, B, first, second, plane, spare, reach, X, corners[first], v, place, foot, n)
+        is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 1, corners[first], spare)
+    else:
+        if plane < 0 and is_beside(A.facets, A.inward, A.normals, first, back, second, spare, 0.0):
+            return np.inf
+        gap = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place, foot, n)
+        is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 0, place, spare)
+    return gap if is_over else np.inf
+
+
+@compiled
+def _is_near(candidates, s, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
+    """Return whether a place of facing planes is no farther than `distance` from another one at which they touch."""
+    for other in touching:
+        if candidates.planes[other] == candidates.planes[s] and gaps[other] < np.inf:
+            away = 0.0
+            for i in range(3):
+                away += (feet[other, i] - feet[s, i]) ** 2
+            if away <= distance * distance:
+                return True
+    return False
+
+
+@compiled
+def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, v, touching, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
-    margins       (p + 1,) [mm] by which places may lie beside edges: those that stay, of each two facing planes; all others
-    stays         (c,): whether a candidate is one of those that stay
+    Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
+    planes themselves err little. Far from it, or where planes no longer overlap, another body may be free.
+
+    margins       (p + 1,) [mm] by which places may lie beside edges: those that are kept, of each two facing planes; all others
+    nearness      in margins: how far from a place where the planes touch such a place may lie
+    kept          (k,): numbers of the candidates that are kept, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
     v             scratch (5, 3)
@@ -108,39 +148,28 @@ def _find_at(A, B, candidates, reach, margins, stays, X, moved, v, touching, gap
     all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
     (places, feet, normals), margin, box = all_places, margins[-1], np.empty(4)
-    corners, lines, back = moved
     count = 0
     bounded, bounded_plane, boxes = -1, -1, candidates.boxes  # the corner or edge, and the plane, that the box is of
     for s in range(candidates.kinds.size):
-        kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
-        flat, spare = 0 if plane < 0 else candidates.facing[plane, 1], margins[plane] if stays[s] else margin
+        kind, plane = candidates.kinds[s], candidates.planes[s]
         if plane >= 0:
-            owner = 3 * (second if kind == FACET_ON_CORNER else first) + kind
+            owner = 3 * (candidates.seconds[s] if kind == FACET_ON_CORNER else candidates.firsts[s]) + kind
             if owner != bounded or plane != bounded_plane:
                 _bound(A, candidates, s, moved, margin, box)
                 bounded, bounded_plane = owner, plane
-            apart = box[2] < boxes[s, 0] or box[3] < boxes[s, 1] or box[0] > boxes[s, 2] or box[1] > boxes[s, 3]
-            if apart and not stays[s]:
+            if box[2] < boxes[s, 0] or box[3] < boxes[s, 1] or box[0] > boxes[s, 2] or box[1] > boxes[s, 3]:
                 continue
-        if kind == EDGE_ON_EDGE:
-            if not pass_by(lines, first, B.edges, second, B.normals, flat, plane, spare):
-                gaps[s] = edge_on_edge(
-                    A, B, first, second, flat, plane, spare, reach, X, lines[first], v, places[s], feet[s], normals[s]
-                )
-        elif kind == CORNER_ON_FACET:
-            if plane >= 0 or not is_beside(B.facets, B.inward, B.normals, second, corners, first, spare, 0.0):
-                gaps[s] = corner_on_facet(
-                    A, B, first, second, plane, spare, reach, X, corners[first], v, places[s], feet[s], normals[s]
-                )
-                if plane >= 0 and not _is_over_plane(candidates, plane, 1, corners[first], spare):
-                    gaps[s] = np.inf
-        elif plane >= 0 or not is_beside(A.facets, A.inward, A.normals, first, back, second, spare, 0.0):
-            gaps[s] = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, places[s], feet[s], normals[s])
-            if plane >= 0 and gaps[s] < np.inf and not _is_over_plane(candidates, plane, 0, places[s], spare):
-                gaps[s] = np.inf
+        gaps[s] = _gap(A, B, candidates, s, margin, reach, X, moved, v, places[s], feet[s], normals[s])
         if gaps[s] < np.inf:
             touching[count], count = s, count + 1
     _keep_shallowest(candidates, touching[:count], gaps)
+    strict = count
+    for s in kept:
+        if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
+            spare = margins[candidates.planes[s]]
+            gap = _gap(A, B, candidates, s, spare, reach, X, moved, v, places[s], feet[s], normals[s])
+            if gap < np.inf and _is_near(candidates, s, feet, touching[:strict], gaps, nearness * spare):
+                gaps[s], touching[count], count = gap, s, count + 1
     return count
 
 
@@ -202,7 +231,8 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
     candidates    Candidates
     reach         (2,) [mm]: the largest depth, and the largest gap, that a place may have
     margin        [mm] by which places may lie beside edges
-    error         (2,) [mm] that facing planes may make beside their edges, and the margin in which they may make it
+    error         (3,) [mm] that facing planes may make beside their edges, the margin in which they may make it, and how many
+                  margins away from a place where they touch
     labels        (n, p): numbers of the candidates, -1 where there is none
     gaps          (n, p) [mm], infinite where there is none
     places, feet, normals   (n, p, 3)
@@ -210,7 +240,6 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
     corners, lines, v, back = np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty((5, 3)), np.empty(B.vertices.shape)
     all_gaps, all_places = np.full(count, np.inf), np.zeros((3, count, 3))
-    stays = np.zeros(count, dtype=np.bool_)
     taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0] + 1)
     places_at, feet_at, normals_at = all_places
     for k in range(poses.shape[0]):
@@ -219,11 +248,8 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
         margins[-1] = margin
         for j in range(facing.shape[0]):
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
-        for s in kept[k]:
-            if s >= 0:
-                stays[s] = candidates.planes[s] >= 0
         moved = (corners, lines, back)
-        number = _find_at(A, B, candidates, reach, margins, stays, X, moved, v, touching, all_gaps, all_places)
+        number = _find_at(A, B, candidates, reach, margins, error[2], kept[k], X, moved, v, touching, all_gaps, all_places)
         if count <= room:
             labels[k] = -1
             labels[k, :count] = np.arange(count)
@@ -236,6 +262,3 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
                 places[k, p], feet[k, p], normals[k, p] = places_at[s], feet_at[s], normals_at[s]
         for s in touching[:number]:
             all_gaps[s] = np.inf
-        for s in kept[k]:
-            if s >= 0:
-                stays[s] = False
