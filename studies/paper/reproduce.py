@@ -16,9 +16,10 @@ import tolcontact as tc
 
 HERE = Path(__file__).resolve().parent
 METHODS = {
-    "linearized": {},
-    "to the letter": {"regularization": "identity", "active_set": "initial"},  # (11) with eta I, points active at first
-    "exact": {"resolution": "exact"},
+    "linearized": {"resolution": "linearized"},
+    # (11) with eta I, points active at first
+    "to the letter": {"resolution": "linearized", "regularization": "identity", "active_set": "initial"},
+    "exact": {"search": "fixed", "objective": "active points"},
 }
 
 

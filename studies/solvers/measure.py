@@ -86,7 +86,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
 
     contact_solver.InterpretedFunction.__call__ = record  # type: ignore[attr-defined, method-assign]
     try:
-        program = tc.build(assembly, solver="daqp", method=tc.Method())
+        program = tc.build(assembly, solver="daqp", method=tc.Method(resolution="linearized"))
         simulate_block(program, draw(program.nominal, seed=1, start=0, stop=realizations))
     finally:
         contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]

@@ -38,7 +38,7 @@ import matplotlib.pyplot as plt
 HERE = Path(__file__).resolve().parent
 TURNS, PAIRS = 5, 11
 named.MIN_COMPILED_CALLS = 0  # compile Functions at once: what counts here is the cost of many realizations
-EXACT = tc.Method(resolution="exact")
+EXACT = tc.Method(search="fixed", objective="active points")
 CLOSED = "loop over qpsolvers, daqp, until closed"
 Contender = Callable[[], float]  # microseconds per realization, of one turn
 Name = TypeVar("Name")
@@ -57,7 +57,7 @@ def ours(
     method: tc.Method | None = None,
     block: int = BLOCK_ROWS,
 ) -> Contender:
-    program = tc.build(assembly, solver=solver, method=method or tc.Method())
+    program = tc.build(assembly, solver=solver, method=method or tc.Method(resolution="linearized"))
     list(simulate_blocks(program, samples=256, seed=1))
 
     def turn() -> float:
