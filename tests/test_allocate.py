@@ -72,7 +72,9 @@ def test_ra1_costs_less_and_keeps_what_is_required_in_a_run_of_its_own():
         b.locate(part, [tc.Locator(*each) for each in located(part, scheme, labels, widths)])
     b.contact("interface", moving=top.face("-z"), reference=base.face("+z"), points=202)
     b.measure("wide", top.point(50, 0, 10), along="z", tolerance=12)
-    seen = tc.summarize(tc.run(b, samples=40_000, seed=77, solver="daqp", keep="measures", fields="none", surfaces=0))
+    seen = tc.summarize(
+        tc.run(b, samples=40_000, seed=77, solver="daqp", method=PAPER, keep="measures", fields="none", surfaces=0)
+    )
     _, lower, _ = seen.statistic_value.sel(measure="wide", state="corrected", statistic="outside limits").values
     assert lower < 0.0105
     effects = found.effect.sel(measure="wide", of_effect="6 sigma", interval="estimate")

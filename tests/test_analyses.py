@@ -7,13 +7,13 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import PAPER, call
 from tests.test_report import data_of, unpacked
 from tolcontact.cli.analyses import COMMANDS
 from tolcontact.report.html.page import page_of
 from tolcontact.vocabulary import ANALYSES
 
-FAST = {"solver": "daqp"}
+FAST = {"solver": "daqp", "method": PAPER}
 
 
 @pytest.fixture

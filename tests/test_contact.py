@@ -116,7 +116,7 @@ def test_the_papers_set_alone_may_leave_penetration_and_the_closed_set_does_not(
 @pytest.mark.slow
 def test_planar_contact_is_flush():
     """CASES C2: with three or more active points that are not collinear, every active gap becomes 0, to order eta."""
-    program, run = simulate(cases.ra1(), samples=1000)
+    program, run = simulate(cases.ra1(), samples=1000, method=PAPER)
     (pair,) = program.nominal.pairs
     R, t = R_t(run["poses"])
     flush = 0
@@ -185,7 +185,7 @@ class TestInvariance:
         assert np.abs(double["measured"] - 2 * single["measured"]).max() < 1e-8
 
     def test_the_papers_eta_identity_depends_on_the_origin(self, case):
-        method = tc.Method(regularization="identity")
+        method = replace(PAPER, regularization="identity")
         _, still = simulate(case(), samples=1000, method=method)
         _, moved = simulate(case(cases.Frame(shift=(1000, 0, 0))), samples=1000, method=method)
         assert np.abs(moved["measured"] - still["measured"]).max() > 1e-3

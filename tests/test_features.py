@@ -161,7 +161,7 @@ def test_one_feature_deviates_once_whatever_uses_it():
     assert_gaps_recompute(results)
     gap, same = results.measured.values[:, 1].T
     assert np.abs(gap - same).max() < 1e-12 and gap.min() > -1e-4  # corners slide over tilted planes: second order
-    assert float(results["surface"].surface_penetration.max()) < 1e-6
+    assert float(results["surface"].surface_penetration.max()) < 0.05 / 2000
     rebuilt = tc.run(tc.model_of(results), samples=2000, method=EXACT, solver="daqp")
     assert_same_run(results, rebuilt)
 

@@ -48,7 +48,7 @@ def test_declared_things_print_as_rows():
 
 def test_programs_and_blocks_are_readable():
     program = tc.build(cases.ra1(), solver="daqp")
-    assert repr(program).splitlines()[0] == "program of RA1: daqp, exact, active points"
+    assert repr(program).splitlines()[0] == "program of RA1: daqp, exact, all points"
     assert "  contact interface: 202 contact points" in repr(program)
     (block,) = tc.simulate_blocks(program, samples=100, seed=1)
     assert repr(block).startswith("realizations 0 to 99: ") and "resolved" in repr(block)
@@ -67,7 +67,7 @@ def test_a_model_is_resolved_by_its_own_method_unless_somebody_says_otherwise(tm
     for given, expected, whose in (
         (None, ALL_POINTS, "model"),
         ({"resolution": "linearized"}, tc.Method(resolution="linearized", objective="all points"), "options"),
-        (tc.Method(), tc.Method(), "options"),
+        (tc.Method(objective="active points"), tc.Method(objective="active points"), "options"),
     ):
         with tc.run(model, samples=20, solver="daqp", method=given) as run:
             assert (run.attrs["resolution"], run.attrs["objective"]) == (expected.resolution, expected.objective)

@@ -13,7 +13,7 @@ from scipy import stats
 import tolcontact as tc
 from tests import cases
 from tests.cases.fasteners import fasteners
-from tests.helpers import call, nightly
+from tests.helpers import PAPER, call, nightly
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.analysis import Analysis
@@ -86,7 +86,7 @@ def test_searches_reach_the_bound_where_the_optimality_conditions_are_known(reso
 
 @pytest.mark.slow
 def test_contact_alone_keeps_no_part_down():
-    found = tc.worst_case(small_ra1(), samples=512, solver="daqp")
+    found = tc.worst_case(small_ra1(), samples=512, solver="daqp", method=PAPER)
     least, largest = values(found, of="bound")
     assert values(found)[0] == pytest.approx(least, abs=3e-5) and math.isinf(largest)
     assert values(found)[1] > values(found, of="random")[1] and values(found)[0] < values(found, of="random")[0]

@@ -14,7 +14,7 @@ measure with and without contact, each figure with a 95 % confidence interval. L
 >>> measure = stand.measure("corner height", block.point(50, 0, 10), along="z", tolerance=1)
 >>> results = tc.run(stand, samples=1000, seed=1)
 >>> results.measured.std("realization").sel(measure="corner height").round(2).values.tolist()  # raw, corrected
-[0.21, 0.04]
+[0.21, 0.08]
 
 ## The guide
 

@@ -110,16 +110,9 @@ class Method:
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
     def with_choices(self, **choices: Any) -> "Method":
-        """Return this method with other choices.
-
-        Another resolution comes with its usual search, and with its usual objective if this one has that of its own resolution;
-        unless they are given.
-        """
-        usual = {}
-        if choices.get("resolution", self.resolution) != self.resolution:
-            has_usual = self.objective == USUAL_OBJECTIVE[self.resolution]
-            usual = {"search": "", "objective": "" if has_usual else self.objective}
-        return replace(self, **usual | choices)
+        """Return this method with other choices; another resolution comes with its usual search, unless one is given."""
+        other = choices.get("resolution", self.resolution) != self.resolution
+        return replace(self, **({"search": ""} if other else {}) | choices)
 
     @property
     def minimizes(self) -> Objective:

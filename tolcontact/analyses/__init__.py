@@ -30,7 +30,7 @@ simulated.
 
 >>> import tolcontact as tc
 >>> def assembly():
-...     stand = tc.Assembly("stand")
+...     stand = tc.Assembly("stand", method=tc.Method(resolution="linearized"))
 ...     table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
 ...     block = stand.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
 ...     scheme = tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"))

@@ -87,7 +87,7 @@ direction times the displacement. `tolcontact.testing.assert_gaps_recompute` doe
 Runs of one model with different seeds form one sample: xarray reads the rows of several archives lazily as one dataset.
 
 >>> other = path.with_name("other.nc")
->>> tc.run(stand, samples=200, seed=2, out=other, surfaces=16).close()
+>>> tc.run(stand, samples=200, seed=2, method=linear, out=other, surfaces=16).close()
 >>> once = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
 >>> rows = {"combine": "nested", "concat_dim": "realization", "drop_variables": ["row_checksum", "summed_rows"], **once}
 >>> with xr.open_mfdataset([path, other], **rows) as both:

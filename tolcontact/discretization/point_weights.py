@@ -9,6 +9,9 @@ from tolcontact.geometry.surface import Surface
 
 ELEMENTS_PER_POINT = 16
 MAX_ELEMENTS = 200_000
+EDGE = 2.0137  # of the largest edge of an element, in its size: no edge of a model is just as long as that
+NEIGHBOURS = 8  # at most, which share an element that is equally near to them
+TIE = 1e-6  # of the size of an element
 
 
 def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface, reference: Surface) -> Float[Array, " point"]:
@@ -18,7 +21,9 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     adjusted, linearly along the face, so that the weighted centroid of the points is that of this part.
     """
     size = max(moving.mesh.area / min(ELEMENTS_PER_POINT * len(P_m), MAX_ELEMENTS), 0.0) ** 0.5
-    vertices, faces = trimesh.remesh.subdivide_to_size(moving.mesh.vertices, moving.mesh.faces, max_edge=2 * size, max_iter=30)
+    vertices, faces = trimesh.remesh.subdivide_to_size(
+        moving.mesh.vertices, moving.mesh.faces, max_edge=EDGE * size, max_iter=30
+    )
     corners = np.asarray(vertices)[np.asarray(faces)]
     middles = corners.mean(axis=1)
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -27,8 +32,11 @@ def point_weights(P_m: Float[Array, "point 3"], distance: float, moving: Surface
     if not areas[counts].sum() > 0:
         return np.ones(len(P_m))
     middles, areas = middles[counts], areas[counts] / areas[counts].sum() * len(P_m)
-    _, nearest = KDTree(P_m).query(middles)
-    weights = np.bincount(nearest, weights=areas, minlength=len(P_m))
+    distances, nearest = KDTree(P_m).query(middles, k=np.arange(1, min(len(P_m), NEIGHBOURS) + 1))
+    # What is equally near to several points is shared, so that rounding in another frame changes nothing.
+    ties = distances <= distances[:, :1] + TIE * size
+    shares = ties * (areas / ties.sum(axis=1))[:, None]
+    weights = np.bincount(nearest.ravel(), weights=shares.ravel(), minlength=len(P_m))
     return _balanced(weights, P_m, areas @ middles / areas.sum())
 
 
