@@ -14,9 +14,10 @@ from studies.certificates.ends import METHOD, Convex, judged, piece, scene, sepa
 from tests.cases.ends import CASES, WHOLE, case, whole_case
 from tests.helpers import PAPER, simulate
 from tolcontact import poses as pose
-from tolcontact.geometry.meeting import meeting
+from tolcontact.geometry.meeting import Reach, meeting
 from tolcontact.geometry.surface import Surface
 from tolcontact.report import summary_text
+from tolcontact.simulation.block import simulate_block
 
 FAULTS = ("false contact", "missed contact", "lifted off", "inside")
 
@@ -107,7 +108,9 @@ def test_bodies_touch_exactly_if_a_place_has_a_gap_below_0(seed):
     rng = np.random.default_rng(seed)
     reference, moving = piece(rng, True), piece(rng, False)
     bodies = [trimesh.convex.convex_hull(points) for points in (moving, reference)]
-    places = meeting(tuple(Surface(body) for body in bodies), tuple(bodies), travel=1.0, tilt=0.1, height=0.5)
+    places = meeting(
+        tuple(Surface(body) for body in bodies), tuple(bodies), Reach(travel=1.0, tilt=0.1, overlap=0.0, clearance=0.5)
+    )
     convex = Convex(moving), Convex(reference)
     poses, distances = [], []
     for _ in range(200):
@@ -181,3 +184,24 @@ def test_a_turn_that_contact_barely_holds_is_doubted():
     assert (run["status"][~certified] == tc.Status.DOUBTFUL).all()
     _, run = simulate(case("steep cone", method=tc.Method())[0], samples=200, solver="daqp")
     assert run["status"].max() == tc.Status.RESOLVED
+
+
+@pytest.mark.parametrize("solver", ["daqp", "qpoases"])
+def test_deviations_beyond_all_that_were_tried_are_resolved_too(solver):
+    """Deviations that are given, or drawn far out, may be larger than those that reach was made for: nothing is untouched."""
+    a = tc.Assembly("stand")
+    table = a.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = a.part("block", tc.Box(50, 25, 10), at=(80, 12.5, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=1)
+    a.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
+    a.measure("height", block.point(0, 0, 0), along="z", tolerance=1)
+    program = tc.build(a, solver=solver)
+    (places,) = program.meetings.values()
+    heights = np.array([-0.5, -3.0, 2.0, -5.0, -9.0, 30.0])
+    deviations = np.zeros((6, 6))
+    deviations[:, :3] = heights[:, None]
+    block = simulate_block(program, deviations)
+    assert places.reach.depth < 3
+    assert block.status.tolist() == [1, 1, 0, 1, 1, 0]
+    assert block.gap_min[heights < 0, 0, 0] == pytest.approx(heights[heights < 0])
+    assert np.abs(block.gap_min[heights < 0, 1]).max() < 1e-9 and np.abs(block.measured[heights < 0, 1, 0]).max() < 1e-9

@@ -9,7 +9,7 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.errors import ContactWarning, shown
-from tolcontact.geometry.meeting import Meeting, meeting
+from tolcontact.geometry.meeting import Meeting, Reach, meeting
 
 TRIALS = 1024  # raw poses
 TRIAL_SEED = 2_718_281_828
@@ -71,10 +71,13 @@ def bounded_pair(
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
-    places = meeting(
-        (pair.moving_face, pair.reference_face), bodies,
-        travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size, tilt=tilt + pushed / size, height=clearance(pair),
-    )  # fmt: skip
+    reach = Reach(
+        travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
+        tilt=tilt + pushed / size,
+        overlap=max(-float(pair.least_gap(pose.AT_REST[None], np.zeros(1))[0]), 0.0),
+        clearance=clearance(pair),
+    )
+    places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
     if places is None:
         warnings.warn(
             f'contact pair "{shown(pair.name)}": its faces have too many edges to find contact where they end; '

@@ -69,7 +69,7 @@ class Limits:
                 doubtful |= pose.turn(state.relative[:, k], task.relative[:, k]) > TURN_FACTOR * places.turn
         far = self._is_far(task, state)
         for k, places in candidates.bounded.items():
-            far |= ~places.covers(state.relative[:, k])
+            far |= ~places.reaches(state.relative[:, k])
         rows = np.flatnonzero(far & ~doubtful & state.solved & ~state.in_conflict)
         travelled = state.take(rows)
         for k, index in enumerate(self._pairs):

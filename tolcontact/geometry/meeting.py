@@ -28,6 +28,8 @@ SPARE_LEANING = 0.1  # beside the largest tilt, by which places may lean that ar
 MAX_COMPARISONS = 100_000_000  # of corners with facets, and of edges with edges
 MAX_CANDIDATES = 100_000
 NEARNESS = 2.0  # margins beside edges: how far from a place where planes touch such a place may lie
+FARTHER = 4.0  # times the travel and the turn, of bodies that are beyond reach
+MAX_TRAVEL = 1e4  # in sizes
 MAX_PLACES = 32  # that are returned of one pose
 DIRECTIONS = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if 0 < np.abs(d).sum() < 3])  # 18
 CORNERS = np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
@@ -51,6 +53,35 @@ class Places(NamedTuple):
     n_r: Float[Array, "n p 3"]
 
 
+class Reach(NamedTuple):
+    """How far a moving body may be from its nominal place relative to a reference body.
+
+    travel, tilt   [mm], [rad]: how far it may move and turn
+    overlap        [mm]: how deep the bodies lie in each other nominally, at most
+    clearance      [mm]: their nominal gap, at least
+    """
+
+    travel: float
+    tilt: float
+    overlap: float
+    clearance: float
+
+    @property
+    def depth(self) -> float:
+        """The largest depth [mm] at which a place counts."""
+        return self.travel + self.overlap
+
+    @property
+    def height(self) -> float:
+        """The largest gap [mm] at which a place counts."""
+        return self.clearance + self.depth
+
+    @property
+    def leaning(self) -> float:
+        """The sine of the angle by which normals may nominally lean out of a cone."""
+        return min(kernel.LEANING + self.tilt + SPARE_LEANING, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Meeting:
     """The places at which two faces can touch as long as they stay near their nominal places.
@@ -58,36 +89,52 @@ class Meeting:
     candidates   kinds, firsts, seconds (candidate,): the kind, and the numbers of the moving and the reference body's part;
              planes (candidate,): for corners of facing planes the number of these planes, else -1; facing (plane, 2): a facet
              of the moving and of the reference plane
-    depth, height   [mm]: the largest depth and gap at which a place counts; `depth` is also how far the moving body may travel
-    tilt     [rad] by which it may turn
+    reach    how far the bodies may be from their nominal places
+    size     [mm] of the larger face
     """
 
     moving: Polyhedron
     reference: Polyhedron
     candidates: places_kernel.Candidates
-    depth: float
-    height: float
+    reach: Reach
     size: float
-    tilt: float
 
     def __len__(self) -> int:
-        return len(self.kinds)
+        return len(self.candidates.kinds)
 
     @property
     def kinds(self) -> Int[Array, " c"]:
-        """The kinds of the candidates."""
-        return self.candidates.kinds
+        """The kinds of the candidates, and then of those farther away that have been looked for."""
+        farther = self.__dict__.get("farther")
+        return self.candidates.kinds if farther is None else np.concatenate([self.candidates.kinds, farther.kinds])
+
+    @cached_property
+    def farther(self) -> "Meeting | None":
+        """The meeting for bodies that are farther apart; None if there is no end of it, or too much to compare."""
+        if self.reach.travel > MAX_TRAVEL * self.size:
+            return None
+        travel, tilt = FARTHER * self.reach.travel, FARTHER * (self.reach.tilt + SPARE_LEANING)
+        return _meeting(self.moving, self.reference, self.reach._replace(travel=travel, tilt=tilt), self.size)
 
     @property
     def turn(self) -> float:
         """The turn [rad] that moves the ends of the moving face about its middle as far as the body may travel."""
-        return 2 * self.depth / float(np.ptp(self.moving.vertices, axis=0).max())
+        return 2 * self.reach.travel / float(np.ptp(self.moving.vertices, axis=0).max())
 
     def covers(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
-        """Return whether the bodies stay so near to their nominal places that no place is missed (n,)."""
+        """Return whether the bodies stay so near to their nominal places that no candidate is missed (n,)."""
         corners = self.moving.vertices[self._extremes]
         moved = np.linalg.norm(pose.apply(X_RM - pose.AT_REST, corners), axis=2).max(axis=1)
-        return (moved <= self.depth) & (pose.turn(X_RM, pose.AT_REST[None]).reshape(-1) <= self.tilt + SPARE_LEANING)
+        turned = pose.turn(X_RM, pose.AT_REST[None]).reshape(-1)
+        is_turned = turned > self.reach.tilt + SPARE_LEANING if self.reach.leaning < 1 else np.zeros(len(X_RM), dtype=bool)
+        return ~(moved > self.reach.travel) & ~is_turned
+
+    def reaches(self, X_RM: Float[Array, "n 12"]) -> Bool[Array, " n"]:
+        """Return whether no candidate is missed at poses X_RM (n, 12), also of those farther away (n,)."""
+        reached = self.covers(X_RM)
+        if not reached.all() and self.farther is not None:
+            reached[~reached] = self.farther.reaches(X_RM[~reached])
+        return reached
 
     @cached_property
     def _extremes(self) -> np.ndarray:
@@ -99,16 +146,44 @@ class Meeting:
     ) -> Places:
         """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `kept` (n, k), -1 for none.
 
+        Where bodies are beyond reach, these are places of the `farther` meeting, whose numbers follow those of this one.
+
         Facing planes count beyond their edges as far as they err there by no more than `error` [mm], and as near to a place
         where they touch as `nearness` says. Steps need it: without it a corner that hangs over an edge comes and goes.
         """
+        beyond = np.flatnonzero(~self.covers(X_RM))
+        if beyond.size and self.farther is not None:
+            return self._beyond(beyond, X_RM, kept, error, nearness)
+        return self._near(X_RM, kept, error, nearness)
+
+    def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, kept: np.ndarray | None, error: float, nearness: float) -> Places:
+        """Return places at poses of which some `rows` are beyond reach."""
+        assert self.farther is not None
+        count = len(self)
+        near = self._near(X_RM, kept, error, nearness)
+        far_kept = None if kept is None else np.maximum(kept[rows] - count, -1)
+        far = self.farther.at(X_RM[rows], far_kept, error, nearness)
+        far = far._replace(labels=np.where(far.labels >= 0, far.labels + count, -1))
+        room = max(near.gaps.shape[1], far.gaps.shape[1])
+        padded = []
+        for empty, of_all, of_some in zip((-1, np.inf, 0.0, 0.0, 0.0), near, far, strict=True):
+            values = np.full((len(X_RM), room, *of_all.shape[2:]), empty, dtype=of_all.dtype)
+            values[:, : of_all.shape[1]] = of_all
+            values[rows], values[rows, : of_some.shape[1]] = empty, of_some
+            padded.append(values)
+        return Places(*padded)
+
+    def _near(self, X_RM: np.ndarray, kept: np.ndarray | None, error: float, nearness: float) -> Places:
+        """Return places at poses that are within reach."""
         room = max(min(len(self), MAX_PLACES), 1)
         shape = (len(X_RM), room)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
-        kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.ascontiguousarray(kept)
+        # Bodies that were beyond reach before may have kept candidates of the farther meeting.
+        kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.where(kept < len(self), kept, -1)
         places_kernel.find(
             _touching_parts(self.moving), _touching_parts(self.reference), self.candidates,
-            np.array([self.depth, self.height]), kernel.MARGIN * self.size, np.array([error, self.depth, nearness]),
+            np.array([self.reach.depth, self.reach.height]), kernel.MARGIN * self.size,
+            np.array([error, self.reach.depth, nearness]),
             np.ascontiguousarray(X_RM), kept, DIRECTIONS, *places,
         )  # fmt: skip
         return places
@@ -121,19 +196,21 @@ def _touching_parts(body: Polyhedron) -> kernel.Body:
     )  # fmt: skip
 
 
-def meeting(faces: tuple[Surface, Surface], bodies: tuple, travel: float, tilt: float, height: float) -> Meeting | None:
+def meeting(faces: tuple[Surface, Surface], bodies: tuple, reach: Reach) -> Meeting | None:
     """Return where a moving and a reference face can touch; None if they have too many corners and edges to compare.
 
     faces, bodies   in their nominal places
-    travel [mm], tilt [rad]   how far the moving body moves and turns relative to the reference body
-    height          [mm]: the largest gap at which a place is of interest
     """
     A, B = (polyhedron(face, body) for face, body in zip(faces, bodies, strict=True))
+    return _meeting(A, B, reach, float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces)))
+
+
+def _meeting(A: Polyhedron, B: Polyhedron, reach: Reach, size: float) -> Meeting | None:
     comparisons = len(A.vertices) * len(B.facets) + len(A.facets) * len(B.vertices) + len(A.edges) * len(B.edges)
     if comparisons > MAX_COMPARISONS:
         return None
-    leaning = min(kernel.LEANING + tilt + SPARE_LEANING, 1.0)
-    facing, facets = _facing_planes(A, B, travel, height)
+    travel, leaning = reach.depth, reach.leaning
+    facing, facets = _facing_planes(A, B, travel, reach.clearance)
     parts = [
         _on_facets(A, B, facing, travel, leaning, CORNER_ON_FACET),
         _on_facets(B, A, facing.T, travel, leaning, FACET_ON_CORNER),
@@ -143,8 +220,7 @@ def meeting(faces: tuple[Surface, Surface], bodies: tuple, travel: float, tilt: 
         return None
     kinds = np.repeat([CORNER_ON_FACET, FACET_ON_CORNER, EDGE_ON_EDGE], [len(part) for part in parts])
     candidates = sorted_candidates(A, B, np.column_stack([kinds, np.concatenate(parts)]), facets)
-    size = float(max(np.ptp(face.mesh.vertices, axis=0).max() for face in faces))
-    return Meeting(A, B, candidates, depth=travel, height=height + travel, size=size, tilt=tilt)
+    return Meeting(A, B, candidates, reach, size)
 
 
 def _facing_planes(A: Polyhedron, B: Polyhedron, travel: float, height: float) -> tuple[np.ndarray, np.ndarray]:
