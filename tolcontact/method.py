@@ -110,7 +110,10 @@ class Method:
             raise OptionError(f'search is "{self.search}" with a linearized resolution; it needs resolution "exact"')
 
     def with_choices(self, **choices: Any) -> "Method":
-        """Return this method with other choices; another resolution comes with its usual search, unless one is given."""
+        """Return this method with other choices; another resolution comes with its usual search, unless one is given.
+
+        The objective stays, so that resolutions are compared by what they do to one problem.
+        """
         other = choices.get("resolution", self.resolution) != self.resolution
         return replace(self, **({"search": ""} if other else {}) | choices)
 

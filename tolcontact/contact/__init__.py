@@ -16,7 +16,8 @@ bodies is open and the objective is minimal. It usually takes 3 to 8 steps. Wher
 it takes 5 to 30 times as long as the single linear step, and up to 50 times where two outlines have many corners: 0.05 ms a
 realization for the README's blocks, 2 ms for nine blocks in a row or for RA2. With fixed points it takes one to four times as
 long as the single step. By default it minimizes the displacements of all contact points, which count by the areas that they
-stand for; the single step minimizes those of the active points, each of which counts once, as in the paper.
+stand for; the single step minimizes those of the active points, each of which counts once, as in the paper. If an option
+replaces the resolution alone, the objective stays: `--resolution linearized --objective "active points"` is the paper's method.
 
 `resolution="linearized"` is the paper's single linear step, about contact points and planes that are fixed in the nominal
 state. If one plane meets one plane, this step opens all gaps with nearly the smallest motion. With several free bodies, or
@@ -72,7 +73,8 @@ anyway.
 `studies/certificates` judges certified realizations of random bodies by exact distances of polyhedra. Limits: triangles are the
 body, also where they stand for a curved face that is not known analytically. A pair of more than 100 000 places keeps its fixed
 points, with a warning. The objective still weighs the sampled contact points. Places are looked for within twice the largest
-travel of the 1024 raw poses.
+travel of the 1024 raw poses, and as far as contact may push; for poses beyond, they are looked for again, farther away. Which
+pairs keep their fixed points is decided by the tolerances: deviations that you supply, far beyond these, do not change that.
 
 A part that contact barely holds may turn far at little cost: a plate over a tip, if only the points there count. Unless forces
 turn it, a turn of more than twice that which moves the ends of the face as far as contact may push is not certified: the
@@ -101,13 +103,15 @@ under the points that carry load, and penetrate each other by no more than 1 % o
 if that is less) plus the error of their triangles. For other solutions far from the raw pose, other starts are tried; if these
 do not help, the realization is `doubtful`.
 
-A certificate does not cover the surfaces *between* contact points. After the run, 64 certified realizations (`surfaces=`,
-`--surfaces`) are checked on the surfaces, at a much denser set of points and in both directions. One third are those that
-penetrate most, one third those with most points under load, and the rest are random. The check looks both ways: for
+Where faces end, a certificate covers both bodies as their triangles: corners, edges and facets. A place that carries may lie
+beside its edge as far as its plane errs there by a two-thousandth of the smallest tolerance range. Where contact points are
+fixed, or projected again, a certificate does not cover the surfaces *between* them. After the run, 64 certified realizations
+(`surfaces=`, `--surfaces`) are checked on the surfaces, at a much denser set of points and in both directions. One third are
+those that penetrate most, one third those with most points under load, and the rest are random. The check looks both ways: for
 penetration that contact points do not see, and, where points are fixed, for contact that was resolved while the surfaces were
 apart. The summary states the largest depths, shares with their intervals (from the random realizations), and how many touching
-points stand on a plane whose face has ended; above 1 % of the smallest tolerance range a `tc.ContactWarning` names the pair and
-the remedy. The group `surface` of the archive states the realizations and pairs that were checked. One-sided locators are
+points stand on a plane whose face has ended; above 1 % of the smallest tolerance range a `tc.ContactWarning` names the pair
+and the remedy. The group `surface` of the archive states the realizations and pairs that were checked. One-sided locators are
 points, so they are not part of this check. The study in `studies/certificates` looks for a counterexample in a million
 realizations.
 
@@ -118,12 +122,11 @@ True
 
 - There is no friction, and features have no form error: they shift, tilt and grow. With fixed points, gaps are correct only to
   first order between faces that tilt and touch outside their nominal overlap; so are those of round faces with sampled points
-  that change in size.
-  The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models ipopt, also started
-  from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything holds, another
-  optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat triangles has one
-  optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no solution, or one far from
-  the raw pose.
+  that change in size. The pose is a local optimum, found step by step from the raw pose. On 1000 realizations of five models
+  ipopt, also started from the raw pose, found no lower one. In a chain of bodies with degrees of freedom that barely anything
+  holds, another optimum may lie a few mm away with an objective that differs in the fifth digit; a round part of flat
+  triangles has one optimum on each triangle. Other starts are tried only if the first start leads to a conflict, no solution,
+  or one far from the raw pose.
 - Linearized, or with `search="fixed"`, contact points and planes are those of the nominal state, and planes do not end.
   If rims of faces shift against each other *and* tilt, their edges may
   penetrate deeper than the points, by about shift times tilt; the check of `surfaces` measures this.

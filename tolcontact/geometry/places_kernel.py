@@ -105,12 +105,12 @@ def _gap(A, B, candidates, s, spare, reach, X, moved, v, place, foot, n):  # typ
             return np.inf
         return edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, lines[first], v, place, foot, n)
     if kind == CORNER_ON_FACET:
-        if plane < 0 and is_beside(B.facets, B.inward, B.normals, second, corners, first, spare, 0.0):
+        if plane < 0 and is_beside(B.facets, B.inward, second, corners, first, spare):
             return np.inf
         gap = corner_on_facet(A, B, first, second, plane, spare, reach, X, corners[first], v, place, foot, n)
         is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 1, corners[first], spare)
     else:
-        if plane < 0 and is_beside(A.facets, A.inward, A.normals, first, back, second, spare, 0.0):
+        if plane < 0 and is_beside(A.facets, A.inward, first, back, second, spare):
             return np.inf
         gap = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place, foot, n)
         is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 0, place, spare)

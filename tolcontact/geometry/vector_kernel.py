@@ -59,18 +59,15 @@ def is_over(corners, inward, x, margin):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def is_beside(facets, inward, normals, facet, points, point, spare, slope):  # type: ignore[no-untyped-def]
-    """Return whether a point lies beside a facet, by more than `spare` and by more than `slope` times its height."""
-    height = 0.0
-    for i in range(3):
-        height += normals[facet, i] * (points[point, i] - facets[facet, 0, i])
+def is_beside(facets, inward, facet, points, point, spare):  # type: ignore[no-untyped-def]
+    """Return whether a point lies beside a facet, by more than `spare` [mm]."""
     lowest = 0.0
     for j in range(3):
         aside = 0.0
         for i in range(3):
             aside += inward[facet, j, i] * (points[point, i] - facets[facet, j, i])
         lowest = min(lowest, aside)
-    return lowest < -spare - slope * abs(height)
+    return lowest < -spare
 
 
 @compiled

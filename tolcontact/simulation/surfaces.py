@@ -88,7 +88,7 @@ def warn_of(program: Program, surfaces: Surfaces) -> None:
 def _advice(program: Program, k: int) -> str:
     """Return what to do about pair k."""
     if not program.method.is_exact:
-        return "use --resolution exact, or tc.Method()"
+        return 'use --resolution exact, or tc.Method(resolution="exact")'
     if not program.method.is_bounded:
         return f'faces may end within reach of contact: leave out search="{program.method.search}"'
     return "use a finer mesh" if k in program.meetings else "use more contact points"
