@@ -23,6 +23,7 @@ RANGE = 0.5  # mm, of every locator: the smallest tolerance range
 ALLOWED = RANGE / 2000
 TOUCHING = 1e-7  # mm
 ON_FACET = 1e-9
+COUNTED = 100  # scenes, after which the counts are printed
 
 
 class Convex:
@@ -156,6 +157,8 @@ def main():
         wrong = {name: n for name, n in counts.items() if n and name not in ("realizations", "certified")}
         if wrong or counts["certified"] < options.samples:
             print(f"scene {seed}: {counts['certified']} of {options.samples} certified", wrong, flush=True)
+        if seed % COUNTED == COUNTED - 1:
+            print(f"up to scene {seed}: {dict(total)}, deepest {deepest:.2g} mm", flush=True)
     print(dict(total), f"refused scenes: {refused}, deepest {deepest:.2g} mm, {time.perf_counter() - start:.0f} s")
 
 
