@@ -5,6 +5,7 @@ if neither can be written, and to continue once a file there has been cut off.
 """
 
 import contextlib
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -12,12 +13,21 @@ from numba import njit
 from numba.core.caching import FunctionCache
 
 
-def compiled(function: Callable[..., Any], *, inline: bool = False) -> Any:
-    """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it."""
-    dispatcher = njit(nogil=True, error_model="numpy", inline="always" if inline else "never")(function)
+def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True) -> Any:
+    """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it.
+
+    counts   whether it counts references to arrays. A function that creates no array need not; if it passes on tuples of many
+             arrays, counting takes longer than the arithmetic.
+    """
+    # `_nrt` is Numba's own option for code without reference counts, as on graphics processors.
+    dispatcher = njit(nogil=True, error_model="numpy", inline="always" if inline else "never", _nrt=counts)(function)
     with contextlib.suppress(RuntimeError):  # there is no folder to write to
         dispatcher._cache = _Cache(function)  # what njit(cache=True) does, with Numba's own class
     return dispatcher
+
+
+inlined = functools.partial(compiled, inline=True)
+uncounted = functools.partial(compiled, counts=False)
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]

@@ -24,12 +24,12 @@ def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-u
 
 @compiled
 def deepest(labels, values, numbers, depths):  # type: ignore[no-untyped-def]
-    """Write labels and depths of the deepest places (n, m), deepest first; the first label, and 0, where there are fewer."""
+    """Write labels and depths of the deepest places (n, m), deepest first; where there are fewer, some label, and -inf."""
     for k in range(values.shape[0]):
         count = 0
         for p in range(values.shape[1]):
             depth = -values[k, p]
-            if not depth > 0:
+            if not depth > -np.inf:
                 continue
             j = min(count, numbers.shape[1] - 1)
             if count == numbers.shape[1] and depth <= depths[k, j]:
@@ -39,7 +39,7 @@ def deepest(labels, values, numbers, depths):  # type: ignore[no-untyped-def]
             numbers[k, j], depths[k, j] = labels[k, p], depth
             count = min(count + 1, numbers.shape[1])
         for j in range(count, numbers.shape[1]):
-            numbers[k, j], depths[k, j] = max(labels[k, 0], 0), 0.0
+            numbers[k, j], depths[k, j] = max(labels[k, 0], 0), -np.inf
 
 
 @compiled

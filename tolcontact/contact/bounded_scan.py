@@ -5,12 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
 from tolcontact.geometry.kernel import CORNER_ON_FACET
 from tolcontact.geometry.meeting import NEARNESS, Meeting
 
-MAX_DEEPEST = 8  # places of a pair that get a row in one round
+MAX_DEEPEST = SLOTS  # places of a pair that get a row in one round
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,6 +22,8 @@ class BoundedScan(SlotScan):
     places, feet, normals   (realization, place, 3): P^m, P^r, n^r
     heights             (realization,) [mm] by which both faces have grown
     """
+
+    fills = True
 
     meeting: Meeting
     labels: Int[Array, "realization place"]

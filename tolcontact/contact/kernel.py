@@ -7,14 +7,11 @@ Gaps are summed up in the order of `PairScan.gaps`, so that both give the same t
 another order than NumPy's, and agree to rounding.
 """
 
-import functools
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compiled import compiled
-
-inlined = functools.partial(compiled, inline=True)
+from tolcontact.compiled import compiled, inlined
 
 LEAF, BRANCH = 32, 32  # points of a leaf, leaves of a branch
 SUMS = 8  # side by side

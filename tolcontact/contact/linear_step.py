@@ -84,7 +84,10 @@ class LinearStep:
         rows, part, part_inputs = np.arange(len(task)), (task, state), inputs
         slots, deepest = start_slots, self._deepest(task, state.relative)
         for number in range(self._max_rounds):
-            extended = [old.with_deepest(*points, PENETRATION) for old, points in zip(slots, deepest, strict=True)]
+            extended = [
+                old.with_deepest(*points, PENETRATION, fills=changing(task.scans[k]).fills)
+                for k, old, points in zip(self.varying, slots, deepest, strict=True)
+            ]
             slots = [new for new, _ in extended]
             enters = np.logical_or.reduce([np.full(len(rows), number == 0), *(grows for _, grows in extended)])
             if not enters.any():

@@ -8,7 +8,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -76,7 +76,12 @@ class Scan:
 
 
 class SlotScan(Scan):
-    """A scan whose points take turns in the slots of the QP."""
+    """A scan whose points take turns in the slots of the QP.
+
+    fills   whether points outside take the slots that are left: worth it where most points may carry
+    """
+
+    fills: ClassVar[bool] = False
 
     def rows(
         self, points: Int[Array, "realization slot"], deviations: Float[Array, "realization contributor"]
@@ -85,7 +90,7 @@ class SlotScan(Scan):
         raise NotImplementedError
 
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> "Deepest":
-        """Return the deepest point of each cluster; its depth is 0 if no point is inside.
+        """Return the deepest point of each cluster; its depth is at most 0 if no point is inside.
 
         may_carry   (realization, point): the points to look at; all if it is None
         """

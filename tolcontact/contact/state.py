@@ -63,15 +63,17 @@ class Slots:
         return Slots(np.take_along_axis(self.points, order, axis=1), carries, np.where(carries, sorted_, 0.0))
 
     def with_deepest(
-        self, points: Int[Array, "n cluster"], depth: Float[Array, "n cluster"], tolerance: float
+        self, points: Int[Array, "n cluster"], depth: Float[Array, "n cluster"], tolerance: float, *, fills: bool
     ) -> tuple["Slots", Bool[Array, " n"]]:
         """Return slots whose free places hold the deepest of the candidate `points` (n, cluster) that are inside.
 
-        Returns also whether any candidate is new, (n,).
+        Returns also whether any candidate that is inside is new, (n,). If it `fills`, candidates outside follow those inside;
+        a depth of -inf stands for no candidate.
         """
         has_slot = ((points[:, :, None] == self.points[:, None, :]) & self.filled[:, None, :]).any(axis=2)
         new = (depth > tolerance) & ~has_slot
-        urgency = np.hstack([np.where(self.filled, np.inf, -np.inf), np.where(new, depth, -np.inf)])
+        enters = ~has_slot if fills else new
+        urgency = np.hstack([np.where(self.filled, np.inf, -np.inf), np.where(enters, depth, -np.inf)])
         order = np.argsort(-urgency, axis=1, kind="stable")[:, : self.points.shape[1]]
         candidates = np.hstack([self.points, points])
         reactions = np.hstack([self.reactions, np.zeros(points.shape)])

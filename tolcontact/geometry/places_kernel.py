@@ -5,26 +5,29 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compiled import compiled
+from tolcontact.compiled import compiled, inlined, uncounted
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
     FACET_ON_CORNER,
     INSIDE,
+    NOWHERE,
     TINY,
     corner_on_facet,
     edge_on_edge,
     facet_on_corner,
-    pass_by,
 )
-from tolcontact.geometry.vector_kernel import cross, dot, inlined, is_beside, is_within, move_back, turn
+from tolcontact.geometry.vector_kernel import cross, dot, is_within, minus, move, move_back, row, row_of, turn
 
 MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
+EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 
 
 class Candidates(NamedTuple):
     """The places at which two bodies can touch (see Meeting), those of a corner or edge of one body one after the other.
 
+    Those of a corner or edge and one facing plane, or no such plane, are a run, sorted by the first value of their boxes; runs
+    begin at `runs` (run + 1,), and no box of a run is wider than its `widths` (run,) [mm].
     `boxes` (candidate, 4) [mm] are least and largest coordinates, in a facing plane, of the facets or the edge that a corner or
     an edge may touch there, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 4) are the outlines
     of facing planes in these coordinates; those of a plane of the moving and of the reference body begin at `outlines`
@@ -36,13 +39,15 @@ class Candidates(NamedTuple):
     seconds: np.ndarray
     planes: np.ndarray
     facing: np.ndarray
+    runs: np.ndarray
+    widths: np.ndarray
     boxes: np.ndarray
     frames: np.ndarray
     segments: np.ndarray
     outlines: np.ndarray
 
 
-@compiled
+@uncounted
 def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def]
     """Drop all but the nearest of the facets that a corner is behind: by that one it leaves. Facing planes hold all corners."""
     best, owner_of_best = -1, -1
@@ -62,76 +67,89 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
             best = s
 
 
-@compiled
-def _bound(A, candidates, s, moved, spare, box):  # type: ignore[no-untyped-def]
-    """Write the least and largest coordinates (4,) of the corner or edge of candidate s in the plane that faces it."""
-    corners, lines, back = moved
-    kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
-    frame = candidates.frames[plane, 0 if kind == FACET_ON_CORNER else 1]
-    for axis in range(2):
-        if kind == EDGE_ON_EDGE:
-            low, along = dot(frame[axis], lines[first, 0]), dot(frame[axis], lines[first, 1])
-            low, high = low + min(along, 0.0), low + max(along, 0.0)
-        elif kind == CORNER_ON_FACET:
-            low = high = dot(frame[axis], corners[first])
-        else:
-            height, facet = 0.0, candidates.facing[plane, 0]
-            for i in range(3):
-                height += A.normals[facet, i] * (back[second, i] - A.facets[facet, 0, i])
-            low = dot(frame[axis], back[second])
-            low, high = low - MAX_SHEAR * abs(height), low + MAX_SHEAR * abs(height)
-        box[axis], box[2 + axis] = low - spare, high + spare
-
-
 @inlined
 def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untyped-def]
-    """Return whether x (3,), in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
-    frame, start, end = (
-        candidates.frames[plane, body],
-        candidates.outlines[2 * plane + body],
-        candidates.outlines[2 * plane + body + 1],
-    )
-    return is_within(candidates.segments[start:end], dot(frame[0], x), dot(frame[1], x), spare)
+    """Return whether x, in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
+    outline, frames = 2 * plane + body, candidates.frames
+    first = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
+    second = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
+    start, end = candidates.outlines[outline], candidates.outlines[outline + 1]
+    return is_within(candidates.segments, start, end, first, second, spare)
 
 
-@compiled
-def _gap(A, B, candidates, s, spare, reach, X, moved, v, place, foot, n):  # type: ignore
-    """Write place, foot and normal (3,) of candidate s, which may lie `spare` [mm] beside edges; return its gap [mm]."""
+@uncounted
+def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
+    """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
     corners, lines, back = moved
     kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     flat = 0 if plane < 0 else candidates.facing[plane, 1]
     if kind == EDGE_ON_EDGE:
-        if pass_by(lines, first, B.edges, second, B.normals, flat, plane, spare):
-            return np.inf
-        return edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, lines[first], v, place, foot, n)
+        return edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, row_of(lines, first, 0), row_of(lines, first, 1))
     if kind == CORNER_ON_FACET:
-        if plane < 0 and is_beside(B.facets, B.inward, second, corners, first, spare):
-            return np.inf
-        gap = corner_on_facet(A, B, first, second, plane, spare, reach, X, corners[first], v, place, foot, n)
-        is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 1, corners[first], spare)
+        found = corner_on_facet(A, B, first, second, plane, spare, reach, X, row(corners, first))
+        is_over = plane < 0 or found[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, first), spare)
     else:
-        if plane < 0 and is_beside(A.facets, A.inward, first, back, second, spare):
-            return np.inf
-        gap = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, v, place, foot, n)
-        is_over = plane < 0 or gap == np.inf or _is_over_plane(candidates, plane, 0, place, spare)
-    return gap if is_over else np.inf
+        found = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, row(back, second))
+        is_over = plane < 0 or found[0] == np.inf or _is_over_plane(candidates, plane, 0, found[1], spare)
+    return found if is_over else NOWHERE
 
 
-@compiled
-def _is_near(candidates, s, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
+@inlined
+def _write(found, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+    """Write gap, place, foot and normal of candidate s."""
+    gaps[s] = found[0]
+    for vectors, vector in ((places, found[1]), (feet, found[2]), (normals, found[3])):
+        vectors[s, 0], vectors[s, 1], vectors[s, 2] = vector
+
+
+@uncounted
+def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
     """Return whether a place of facing planes is no farther than `distance` from another one at which they touch."""
     for other in touching:
         if candidates.planes[other] == candidates.planes[s] and gaps[other] < np.inf:
-            away = 0.0
-            for i in range(3):
-                away += (feet[other, i] - feet[s, i]) ** 2
-            if away <= distance * distance:
+            away = minus(row(feet, other), foot)
+            if dot(away, away) <= distance * distance:
                 return True
     return False
 
 
-@compiled
-def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, v, touching, gaps, all_places):  # type: ignore
+@uncounted
+def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
+    """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
+    corners, lines, back = moved
+    kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    body = 0 if kind == FACET_ON_CORNER else 1
+    one, other = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
+    if kind == EDGE_ON_EDGE:
+        start, vector = row_of(lines, first, 0), row_of(lines, first, 1)
+        low, high, low_2, high_2 = dot(one, start), dot(one, vector), dot(other, start), dot(other, vector)
+        return (
+            low + min(high, 0.0) - spare, low_2 + min(high_2, 0.0) - spare,
+            low + max(high, 0.0) + spare, low_2 + max(high_2, 0.0) + spare,
+        )  # fmt: skip
+    shear = spare
+    if kind == FACET_ON_CORNER:
+        x, facet = row(back, second), candidates.facing[plane, 0]
+        shear += MAX_SHEAR * abs(dot(row(A.normals, facet), minus(x, row_of(A.facets, facet, 0))))
+    else:
+        x = row(corners, first)
+    return dot(one, x) - shear, dot(other, x) - shear, dot(one, x) + shear, dot(other, x) + shear
+
+
+@inlined
+def _first_within(values, start, end, least):  # type: ignore[no-untyped-def]
+    """Return the first of rows start to end, whose first values ascend, with a first value that is not below `least`."""
+    while start < end:
+        middle = (start + end) // 2
+        if values[middle, 0] < least:
+            start = middle + 1
+        else:
+            end = middle
+    return start
+
+
+@uncounted
+def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touching, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
@@ -142,38 +160,37 @@ def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, v, touc
     kept          (k,): numbers of the candidates that are kept, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
-    v             scratch (5, 3)
     touching      (c,): numbers of the candidates that touch
     gaps          (c,) [mm], infinite before
     all_places    places, feet, normals (3, c, 3): P^m, P^r, n^r of the paper
     """
-    (places, feet, normals), margin, box = all_places, margins[-1], np.empty(4)
+    (places, feet, normals), margin, boxes = all_places, margins[-1], candidates.boxes
     count = 0
-    bounded, bounded_plane, boxes = -1, -1, candidates.boxes  # the corner or edge, and the plane, that the box is of
-    for s in range(candidates.kinds.size):
-        kind, plane = candidates.kinds[s], candidates.planes[s]
-        if plane >= 0:
-            owner = 3 * (candidates.seconds[s] if kind == FACET_ON_CORNER else candidates.firsts[s]) + kind
-            if owner != bounded or plane != bounded_plane:
-                _bound(A, candidates, s, moved, margin, box)
-                bounded, bounded_plane = owner, plane
-            if box[2] < boxes[s, 0] or box[3] < boxes[s, 1] or box[0] > boxes[s, 2] or box[1] > boxes[s, 3]:
-                continue
-        gaps[s] = _gap(A, B, candidates, s, margin, reach, X, moved, v, places[s], feet[s], normals[s])
-        if gaps[s] < np.inf:
-            touching[count], count = s, count + 1
+    for run in range(candidates.widths.size):
+        s, end = candidates.runs[run], candidates.runs[run + 1]
+        is_flat = candidates.planes[s] >= 0
+        low, low_2, high, high_2 = _range(A, candidates, s, moved, margin) if is_flat else EVERYWHERE
+        if is_flat:
+            s = _first_within(boxes, s, end, low - candidates.widths[run])
+        while s < end and not boxes[s, 0] > high:
+            if not (boxes[s, 2] < low or boxes[s, 3] < low_2 or boxes[s, 1] > high_2):
+                _write(_place(A, B, candidates, s, margin, reach, X, moved), s, gaps, places, feet, normals)
+                if gaps[s] < np.inf:
+                    touching[count], count = s, count + 1
+            s += 1
     _keep_shallowest(candidates, touching[:count], gaps)
     strict = count
     for s in kept:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
             spare = margins[candidates.planes[s]]
-            gap = _gap(A, B, candidates, s, spare, reach, X, moved, v, places[s], feet[s], normals[s])
-            if gap < np.inf and _is_near(candidates, s, feet, touching[:strict], gaps, nearness * spare):
-                gaps[s], touching[count], count = gap, s, count + 1
+            found = _place(A, B, candidates, s, spare, reach, X, moved)
+            if found[0] < np.inf and _is_near(candidates, s, found[2], feet, touching[:strict], gaps, nearness * spare):
+                _write(found, s, gaps, places, feet, normals)
+                touching[count], count = s, count + 1
     return count
 
 
-@compiled
+@uncounted
 def _choose(touching, gaps, feet, kept, directions, taken, labels):  # type: ignore[no-untyped-def]
     """Write the labels (p,) of places that may matter: those kept, those of the least gaps, and the outermost; -1 for none."""
     number = 0
@@ -194,30 +211,58 @@ def _choose(touching, gaps, feet, kept, directions, taken, labels):  # type: ign
         outermost, farthest = -1, -np.inf
         for s in touching:
             if gaps[s] < np.inf:
-                along = dot(direction, feet[s])
-                if along > farthest:
-                    outermost, farthest = s, along
+                distance = dot(direction, row(feet, s))
+                if distance > farthest:
+                    outermost, farthest = s, distance
         if outermost >= 0 and not taken[outermost]:
             labels[number], taken[outermost], number = outermost, True, number + 1
     labels[number:] = -1
 
 
-@compiled
-def _move(A, B, facing, X, v, corners, lines, back, sines):  # type: ignore[no-untyped-def]
+@uncounted
+def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-untyped-def]
     """Write what moves at a pose X_RM (12,): see `moved` in _find_at; and sines of the angles between facing planes."""
     for j in range(corners.shape[0]):
-        turn(X, A.vertices[j], corners[j])
-        corners[j] += X[9:]
+        corners[j, 0], corners[j, 1], corners[j, 2] = move(X, row(A.vertices, j))
     for j in range(lines.shape[0]):
-        turn(X, A.edges[j, 0], lines[j, 0])
-        turn(X, A.edges[j, 1] - A.edges[j, 0], lines[j, 1])
-        lines[j, 0] += X[9:]
+        start, end = row_of(A.edges, j, 0), row_of(A.edges, j, 1)
+        lines[j, 0, 0], lines[j, 0, 1], lines[j, 0, 2] = move(X, start)
+        lines[j, 1, 0], lines[j, 1, 1], lines[j, 1, 2] = turn(X, minus(end, start))
     for j in range(back.shape[0]):
-        move_back(X, B.vertices[j], v[0], back[j])
+        back[j, 0], back[j, 1], back[j, 2] = move_back(X, row(B.vertices, j))
     for j in range(facing.shape[0]):
-        turn(X, A.normals[facing[j, 0]], v[0])
-        cross(v[0], B.normals[facing[j, 1]], v[1])
-        sines[j] = math.sqrt(dot(v[1], v[1]))
+        across = cross(turn(X, row(A.normals, facing[j, 0])), row(B.normals, facing[j, 1]))
+        sines[j] = math.sqrt(dot(across, across))
+
+
+@uncounted
+def _find_at_each(A, B, candidates, reach, margin, error, poses, kept, directions, found, scratch):  # type: ignore
+    """Write what `find` writes, found = (labels, gaps, places, feet, normals)."""
+    corners, lines, back, margins, touching, taken, all_gaps, all_places = scratch
+    labels, gaps, places, feet, normals = found
+    places_at, feet_at, normals_at = all_places
+    count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
+    for k in range(poses.shape[0]):
+        X = poses[k]
+        _move(A, B, facing, X, corners, lines, back, margins)
+        margins[-1] = margin
+        for j in range(facing.shape[0]):
+            margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
+        moved = (corners, lines, back)
+        number = _find_at(A, B, candidates, reach, margins, error[2], kept[k], X, moved, touching, all_gaps, all_places)
+        if count <= room:
+            for p in range(room):
+                labels[k, p] = p if p < count else -1
+        else:
+            _choose(touching[:number], all_gaps, feet_at, kept[k], directions, taken, labels[k])
+        for p in range(room):
+            s = labels[k, p]
+            gaps[k, p] = np.inf if s < 0 else all_gaps[s]
+            if gaps[k, p] < np.inf:
+                for i in range(3):
+                    places[k, p, i], feet[k, p, i], normals[k, p, i] = places_at[s, i], feet_at[s, i], normals_at[s, i]
+        for s in touching[:number]:
+            all_gaps[s] = np.inf
 
 
 @compiled
@@ -235,30 +280,13 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
                   margins away from a place where they touch
     labels        (n, p): numbers of the candidates, -1 where there is none
     gaps          (n, p) [mm], infinite where there is none
-    places, feet, normals   (n, p, 3)
+    places, feet, normals   (n, p, 3), left as they are where there is none
     """
-    count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
-    corners, lines, v, back = np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty((5, 3)), np.empty(B.vertices.shape)
-    all_gaps, all_places = np.full(count, np.inf), np.zeros((3, count, 3))
-    taken, touching, margins = np.zeros(count, dtype=np.bool_), np.empty(count, dtype=np.int64), np.empty(facing.shape[0] + 1)
-    places_at, feet_at, normals_at = all_places
-    for k in range(poses.shape[0]):
-        X = poses[k]
-        _move(A, B, facing, X, v, corners, lines, back, margins)
-        margins[-1] = margin
-        for j in range(facing.shape[0]):
-            margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
-        moved = (corners, lines, back)
-        number = _find_at(A, B, candidates, reach, margins, error[2], kept[k], X, moved, v, touching, all_gaps, all_places)
-        if count <= room:
-            labels[k] = -1
-            labels[k, :count] = np.arange(count)
-        else:
-            _choose(touching[:number], all_gaps, feet_at, kept[k], directions, taken, labels[k])
-        for p in range(room):
-            s = labels[k, p]
-            gaps[k, p] = np.inf if s < 0 else all_gaps[s]
-            if s >= 0:
-                places[k, p], feet[k, p], normals[k, p] = places_at[s], feet_at[s], normals_at[s]
-        for s in touching[:number]:
-            all_gaps[s] = np.inf
+    count = candidates.kinds.size
+    scratch = (
+        np.empty(A.vertices.shape), np.empty(A.edges.shape), np.empty(B.vertices.shape),
+        np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64), np.zeros(count, dtype=np.bool_),
+        np.full(count, np.inf), np.empty((3, count, 3)),
+    )  # fmt: skip
+    found = (labels, gaps, places, feet, normals)
+    _find_at_each(A, B, candidates, reach, margin, error, poses, kept, directions, found, scratch)

@@ -27,11 +27,14 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
                 [coordinates.min(axis=1), coordinates.max(axis=1)], axis=1
             )
     owners = np.where(kinds == FACET_ON_CORNER, seconds, firsts)
-    order = np.lexsort((planes, owners, kinds))
+    order = np.lexsort((boxes[:, 0], planes, owners, kinds))
+    keys, boxes = np.column_stack([kinds, owners, planes])[order], boxes[order]
+    runs = np.flatnonzero(np.concatenate([[True], (np.diff(keys, axis=0) != 0).any(axis=1), [True]])) if len(keys) else [0]
+    widths = np.maximum.reduceat(boxes[:, 2] - boxes[:, 0], runs[:-1]) if len(keys) else np.zeros(0)
     kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[order].T)
     lengths = np.cumsum([0, *(len(outline) for outline in outlines)])
     segments = np.concatenate([np.zeros((0, 4)), *(outline.reshape(-1, 4) for outline in outlines)])
-    return Candidates(kinds, firsts, seconds, planes, facing, boxes[order], frames, segments, lengths)
+    return Candidates(kinds, firsts, seconds, planes, facing, np.array(runs), widths, boxes, frames, segments, lengths)
 
 
 def _outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:

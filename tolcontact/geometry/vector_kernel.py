@@ -1,13 +1,20 @@
 """Compiled arithmetic of vectors and poses, and whether points lie over triangles and inside bodies."""
 
-import functools
 import math
 
-import numpy as np
+from tolcontact.compiled import inlined, uncounted
 
-from tolcontact.compiled import compiled
 
-inlined = functools.partial(compiled, inline=True)
+@inlined
+def row(vectors, k):  # type: ignore[no-untyped-def]
+    """Return row k of an array (n, 3). Vectors are three numbers: views of arrays would cost more than the arithmetic."""
+    return vectors[k, 0], vectors[k, 1], vectors[k, 2]
+
+
+@inlined
+def row_of(vectors, k, j):  # type: ignore[no-untyped-def]
+    """Return a vector of an array (n, m, 3)."""
+    return vectors[k, j, 0], vectors[k, j, 1], vectors[k, j, 2]
 
 
 @inlined
@@ -17,71 +24,82 @@ def dot(a, b):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def cross(a, b, out):  # type: ignore[no-untyped-def]
-    """Write a x b."""
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
+def cross(a, b):  # type: ignore[no-untyped-def]
+    """Return a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inlined
-def turn(X, v, out):  # type: ignore[no-untyped-def]
-    """Write R v."""
-    for i in range(3):
-        out[i] = X[3 * i] * v[0] + X[3 * i + 1] * v[1] + X[3 * i + 2] * v[2]
+def minus(a, b):  # type: ignore[no-untyped-def]
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @inlined
-def turn_back(X, v, out):  # type: ignore[no-untyped-def]
-    """Write R' v."""
-    for i in range(3):
-        out[i] = X[i] * v[0] + X[3 + i] * v[1] + X[6 + i] * v[2]
+def scaled(s, a):  # type: ignore[no-untyped-def]
+    """Return s a."""
+    return s * a[0], s * a[1], s * a[2]
 
 
 @inlined
-def move_back(X, x, scratch, out):  # type: ignore[no-untyped-def]
-    """Write R' (x - t)."""
-    for i in range(3):
-        scratch[i] = x[i] - X[9 + i]
-    turn_back(X, scratch, out)
+def along(a, s, b):  # type: ignore[no-untyped-def]
+    """Return a + s b."""
+    return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
 
 
 @inlined
-def is_over(corners, inward, x, margin):  # type: ignore[no-untyped-def]
-    """Return whether x lies over a triangle, not beside one of its edges."""
-    over = True
-    for j in range(3):
-        aside = 0.0
-        for i in range(3):
-            aside += inward[j, i] * (x[i] - corners[j, i])
-        over = over and aside >= -margin
-    return over
+def turn(X, v):  # type: ignore[no-untyped-def]
+    """Return R v for a pose X (12,)."""
+    return (
+        X[0] * v[0] + X[1] * v[1] + X[2] * v[2],
+        X[3] * v[0] + X[4] * v[1] + X[5] * v[2],
+        X[6] * v[0] + X[7] * v[1] + X[8] * v[2],
+    )
 
 
 @inlined
-def is_beside(facets, inward, facet, points, point, spare):  # type: ignore[no-untyped-def]
-    """Return whether a point lies beside a facet, by more than `spare` [mm]."""
+def turn_back(X, v):  # type: ignore[no-untyped-def]
+    """Return R' v for a pose X (12,)."""
+    return (
+        X[0] * v[0] + X[3] * v[1] + X[6] * v[2],
+        X[1] * v[0] + X[4] * v[1] + X[7] * v[2],
+        X[2] * v[0] + X[5] * v[1] + X[8] * v[2],
+    )
+
+
+@inlined
+def move(X, v):  # type: ignore[no-untyped-def]
+    """Return R v + t for a pose X (12,)."""
+    return along(turn(X, v), 1.0, (X[9], X[10], X[11]))
+
+
+@inlined
+def move_back(X, x):  # type: ignore[no-untyped-def]
+    """Return R' (x - t) for a pose X (12,)."""
+    return turn_back(X, minus(x, (X[9], X[10], X[11])))
+
+
+@inlined
+def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
+    """Return whether x lies over a facet, or beside one of its edges by no more than a margin [mm]."""
     lowest = 0.0
     for j in range(3):
-        aside = 0.0
-        for i in range(3):
-            aside += inward[facet, j, i] * (points[point, i] - facets[facet, j, i])
-        lowest = min(lowest, aside)
-    return lowest < -spare
+        lowest = min(lowest, dot(row_of(inward, facet, j), minus(x, row_of(facets, facet, j))))
+    return lowest >= -margin
 
 
-@compiled
-def is_within(outline, x, y, spare):  # type: ignore[no-untyped-def]
-    """Return whether (x, y) lies inside an outline of segments (segment, 4), or no farther than `spare` beside one."""
+@uncounted
+def is_within(segments, start, end, x, y, spare):  # type: ignore[no-untyped-def]
+    """Return whether (x, y) lies inside the outline that is rows start to end of `segments` (segment, 4), or `spare` beside."""
     inside = False
-    for k in range(outline.shape[0]):
-        x0, y0, x1, y1 = outline[k, 0], outline[k, 1], outline[k, 2], outline[k, 3]
+    for k in range(start, end):
+        x0, y0, x1, y1 = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
         if (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
             inside = not inside
     if inside:
         return True
-    for k in range(outline.shape[0]):
-        x0, y0, x1, y1 = outline[k, 0], outline[k, 1], outline[k, 2], outline[k, 3]
+    for k in range(start, end):
+        x0, y0, x1, y1 = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
         if min(x0, x1) > x + spare or max(x0, x1) < x - spare or min(y0, y1) > y + spare or max(y0, y1) < y - spare:
             continue
         dx, dy = x1 - x0, y1 - y0
@@ -92,7 +110,7 @@ def is_within(outline, x, y, spare):  # type: ignore[no-untyped-def]
     return False
 
 
-@compiled
+@uncounted
 def is_inside(triangles, x):  # type: ignore[no-untyped-def]
     """Return whether x lies in a closed body: its triangles fill half of all solid angles or more. No triangles hold all.
 
@@ -101,12 +119,9 @@ def is_inside(triangles, x):  # type: ignore[no-untyped-def]
     if triangles.shape[0] == 0:
         return True
     total = 0.0
-    a, b, c, bc = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for k in range(triangles.shape[0]):
-        for i in range(3):
-            a[i], b[i], c[i] = triangles[k, 0, i] - x[i], triangles[k, 1, i] - x[i], triangles[k, 2, i] - x[i]
+        a, b, c = minus(row_of(triangles, k, 0), x), minus(row_of(triangles, k, 1), x), minus(row_of(triangles, k, 2), x)
         length_a, length_b, length_c = math.sqrt(dot(a, a)), math.sqrt(dot(b, b)), math.sqrt(dot(c, c))
-        cross(b, c, bc)
         near = length_a * length_b * length_c + dot(a, b) * length_c + dot(b, c) * length_a + dot(c, a) * length_b
-        total += math.atan2(dot(a, bc), near)
+        total += math.atan2(dot(a, cross(b, c)), near)
     return total > math.pi  # half of the solid angle, 2 pi inside
