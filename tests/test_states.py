@@ -6,7 +6,8 @@ from tolcontact.compilation import ACCURACY
 from tolcontact.contact.record import initial_numbers
 from tolcontact.contact.repeated_steps import better_state
 from tolcontact.contact.resolver import is_better
-from tolcontact.contact.state import Slots, State
+from tolcontact.contact.slots import Slots
+from tolcontact.contact.state import State
 
 
 def state(residual, slack, *, doubtful=False):

@@ -12,7 +12,8 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.bounded_scan import bounded_scan
 from tolcontact.contact.scan import PairScan, RoundScan, Scan, changing, fixed, min_gaps, pair_scan
-from tolcontact.contact.state import Slots, State, Task
+from tolcontact.contact.slots import Slots
+from tolcontact.contact.state import State, Task
 from tolcontact.geometry.meeting import NEARNESS
 from tolcontact.geometry.surface import Surface
 from tolcontact.mechanics import curved_pairs

@@ -14,7 +14,8 @@ from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
 from tolcontact.contact.linear_step import LinearStep
 from tolcontact.contact.scan import min_gaps, undone
-from tolcontact.contact.state import Slots, State, Task, Unsettled
+from tolcontact.contact.slots import Slots
+from tolcontact.contact.state import State, Task, Unsettled
 
 MAX_STEPS = 100
 GOOD_RATIO = 0.7  # a good step is at most this part of the step before, or gains at least this part of the foreseen gain

@@ -14,7 +14,8 @@ import numpy as np
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation import ContactGroup, Program
 from tolcontact.contact.scan import Deepest, SlotScan, changing
-from tolcontact.contact.state import NEGLIGIBLE_SHARE, Slots, State, Task
+from tolcontact.contact.slots import NEGLIGIBLE_SHARE, Slots
+from tolcontact.contact.state import State, Task
 from tolcontact.mechanics import ENTRIES
 
 MAX_ROUNDS = 60

@@ -161,10 +161,11 @@ def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, x, d):  # ty
     if not (-reach[0] <= height <= reach[1]):
         return NOWHERE
     if plane < 0 and height < -INSIDE:
-        if not is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, second)):
-            return NOWHERE
         back, up, under = turn_back(X, e), turn_back(X, scaled(-1.0, m)), move_back(X, foot)
-        if not is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, first)):
+        if not (
+            is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, second))
+            and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, first))
+        ):
             return NOWHERE
     is_slanted = plane >= 0 and MIN_SLANT * abs(crossing) < length < MAX_SLANT * abs(crossing)
     return height, move_back(X, y), foot, scaled(1 / crossing, c) if is_slanted else m
