@@ -36,6 +36,10 @@ class InterpretedFunction:
 
         Outputs are NaN if the evaluation failed.
         """
+        with quiet():  # plugins may print in every evaluation
+            return self._evaluated(inputs)
+
+    def _evaluated(self, inputs: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         count = len(inputs[0])
         results = [np.empty((count, size)) for size in self._calls[-1].sizes_out]
         failed = np.zeros(count, dtype=bool)
@@ -99,8 +103,8 @@ class _Buffers:
             buffer[:count] = array
             buffer[count:] = array[-1:]
         try:
-            # The first evaluation constructs objects of CasADi. Plugins may print in every one.
-            with CONSTRUCTION_LOCK if self.is_new else contextlib.nullcontext(), quiet():
+            # The first evaluation constructs objects of CasADi.
+            with CONSTRUCTION_LOCK if self.is_new else contextlib.nullcontext():
                 self._evaluate()
         except RuntimeError:  # CasADi's only exception: bounds that are not numbers
             return False
