@@ -4,20 +4,22 @@ The first steps are like the paper's. Realizations that still move then have fre
 curvature of gaps and objective counts: they continue with Newton steps, which hold those freedoms firmly at first.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.arrays import Array, Float
+from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
-from tolcontact.contact.linear_step import PENETRATION, LinearStep
+from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.state import State, Task, Unsettled
 
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
+CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
 ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
 
 
@@ -47,8 +49,14 @@ STEPS_WHERE_FACES_END = (
 def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, best = Unsettled(task, state), None
+    trail: list[np.ndarray] = []
+    asleep, last = np.zeros(len(task), dtype=bool), None
     for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
-        size, scaled = step.take(unsettled.task, unsettled.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+        asleep &= kind == last
+        last = kind
+        if asleep.all():
+            continue
+        size, scaled = _take(step, unsettled, np.flatnonzero(~asleep), kind, stride)
         knows_curvature = kind.newton or step.knows_walls
         moves = (kind.firmness > 1) | ((size > STEP_TOLERANCE) & ((scaled > ROUNDING) | (not knows_curvature)))
         if kind.width > 1:
@@ -59,10 +67,15 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         residual = unsettled.state.kkt_residual
         residual[~moves] = np.maximum(residual[~moves], unrest[~moves])
         lost = moves & limits.is_lost(unsettled.task, unsettled.state)
+        if kind.width > 1 and not kind.newton:
+            lost |= moves & _goes_round(trail, unsettled.state)
+            trail = [*trail[-1:], unsettled.state.poses.copy()]
         residual[lost] = np.inf
         moves &= ~lost
         unsettled.settle(~moves)
-        unrest, best = unrest[moves], None if best is None else best.take(moves)
+        # What rests while it is held back need not be held back longer.
+        asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
+        unrest, best, trail = unrest[moves], None if best is None else best.take(moves), [poses[moves] for poses in trail]
         if not len(unsettled):
             return
         if candidates.bounded:
@@ -78,6 +91,25 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         final.put_answer(stuck, best.take(stuck))
     final.kkt_residual[:] = np.maximum(final.kkt_residual, np.where(final.in_conflict, 0, unrest))
     unsettled.settle(np.ones(len(unsettled), dtype=bool))
+
+
+def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKind, stride: float) -> Step:
+    """Take a step of some realizations; the others stay where they are."""
+    if len(rows) == len(unsettled):
+        return step.take(unsettled.task, unsettled.state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+    task, state = unsettled.task.take(rows), unsettled.state.take(rows)
+    size, scaled = np.zeros((2, len(unsettled)))
+    size[rows], scaled[rows] = step.take(task, state, stride=stride, firmness=kind.firmness, newton=kind.newton)
+    unsettled.state.put(rows, state)
+    return Step(size, scaled)
+
+
+def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
+    """Return whether parts that do not contradict each other are back where they were two steps ago, not one step (n,)."""
+    if len(trail) < 2:
+        return np.zeros(len(state), dtype=bool)
+    two, one = (np.abs(state.poses - poses).reshape(len(state), -1).max(axis=1) for poses in trail)
+    return (two < CLOSED) & (one > 10 * CLOSED) & ~(state.slack > PENETRATION).any(axis=1)
 
 
 def true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:
