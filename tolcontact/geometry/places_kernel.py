@@ -17,7 +17,7 @@ from tolcontact.geometry.kernel import (
     edge_on_edge,
     facet_on_corner,
 )
-from tolcontact.geometry.vector_kernel import cross, dot, is_within, minus, move, move_back, row, row_of, turn
+from tolcontact.geometry.vector_kernel import cross, dot, first_from, is_within, minus, move, move_back, row, row_of, turn
 
 MAX_SHEAR = 1.8  # by which a corner's place beside a facet changes with its height, where planes face each other
 EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
@@ -26,12 +26,12 @@ EVERYWHERE = (-np.inf, -np.inf, np.inf, np.inf)
 class Candidates(NamedTuple):
     """The places at which two bodies can touch (see Meeting), those of a corner or edge of one body one after the other.
 
-    Those of a corner or edge and one facing plane, or no such plane, are a run, sorted by the first value of their boxes; runs
-    begin at `runs` (run + 1,), and no box of a run is wider than its `widths` (run,) [mm].
+    Those of a corner or edge and one facing plane, or no such plane, are a run; runs begin at `runs` (run + 1,). From `middles`
+    (run,) on they are sorted by the first value of their boxes, which are no wider than `widths` (run,) [mm].
     `boxes` (candidate, 4) [mm] are least and largest coordinates, in a facing plane, of the facets or the edge that a corner or
-    an edge may touch there, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 4) are the outlines
-    of facing planes in these coordinates; those of a plane of the moving and of the reference body begin at `outlines`
-    (2 planes + 1,).
+    an edge may touch there, along the vectors in `frames` (facing planes, body, 2, 3). `segments` (segment, 5) are the outlines
+    of facing planes in these coordinates (see is_within); those of a plane of the moving and of the reference body begin at
+    `outlines` (2 planes + 1,); their sorted segments begin at `outline_middles` and are no taller than `tallest` (2 planes,).
     """
 
     kinds: np.ndarray
@@ -40,11 +40,14 @@ class Candidates(NamedTuple):
     planes: np.ndarray
     facing: np.ndarray
     runs: np.ndarray
+    middles: np.ndarray
     widths: np.ndarray
     boxes: np.ndarray
     frames: np.ndarray
     segments: np.ndarray
     outlines: np.ndarray
+    outline_middles: np.ndarray
+    tallest: np.ndarray
 
 
 @uncounted
@@ -74,10 +77,11 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
     first = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
     second = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
     start, end = candidates.outlines[outline], candidates.outlines[outline + 1]
-    return is_within(candidates.segments, start, end, first, second, spare)
+    middle, tallest = candidates.outline_middles[outline], candidates.tallest[outline]
+    return is_within(candidates.segments, start, middle, end, tallest, first, second, spare)
 
 
-@uncounted
+@inlined
 def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
     corners, lines, back = moved
@@ -113,7 +117,7 @@ def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: igno
     return False
 
 
-@uncounted
+@inlined
 def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
     """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
@@ -136,18 +140,6 @@ def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
     return dot(one, x) - shear, dot(other, x) - shear, dot(one, x) + shear, dot(other, x) + shear
 
 
-@inlined
-def _first_within(values, start, end, least):  # type: ignore[no-untyped-def]
-    """Return the first of rows start to end, whose first values ascend, with a first value that is not below `least`."""
-    while start < end:
-        middle = (start + end) // 2
-        if values[middle, 0] < least:
-            start = middle + 1
-        else:
-            end = middle
-    return start
-
-
 @uncounted
 def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touching, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
@@ -167,12 +159,14 @@ def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touchin
     (places, feet, normals), margin, boxes = all_places, margins[-1], candidates.boxes
     count = 0
     for run in range(candidates.widths.size):
-        s, end = candidates.runs[run], candidates.runs[run + 1]
+        s, middle, end = candidates.runs[run], candidates.middles[run], candidates.runs[run + 1]
         is_flat = candidates.planes[s] >= 0
         low, low_2, high, high_2 = _range(A, candidates, s, moved, margin) if is_flat else EVERYWHERE
-        if is_flat:
-            s = _first_within(boxes, s, end, low - candidates.widths[run])
-        while s < end and not boxes[s, 0] > high:
+        while True:
+            if s == middle:
+                s = first_from(boxes, middle, end, low - candidates.widths[run])
+            if s >= end or (s >= middle and boxes[s, 0] > high):
+                break
             if not (boxes[s, 2] < low or boxes[s, 3] < low_2 or boxes[s, 1] > high_2):
                 _write(_place(A, B, candidates, s, margin, reach, X, moved), s, gaps, places, feet, normals)
                 if gaps[s] < np.inf:

@@ -1,5 +1,7 @@
 """Candidates for places of contact, with what lets a search pass over most of them."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from tolcontact.arrays import Array, Float, Int
@@ -7,6 +9,23 @@ from tolcontact.geometry.edges import edges
 from tolcontact.geometry.kernel import CORNER_ON_FACET, EDGE_ON_EDGE, FACET_ON_CORNER
 from tolcontact.geometry.places_kernel import Candidates
 from tolcontact.geometry.polyhedron import Polyhedron
+
+WIDE_SHARE = 1 / 8  # of the whole: wider intervals come first
+
+
+class Sorted(NamedTuple):
+    """Runs of intervals, in each the wide ones first, and then the others by where they begin.
+
+    order     (n,): numbers of the intervals
+    runs      (run + 1,): where runs begin, and the end
+    middles   (run,): where their narrow intervals begin
+    widths    (run,): no narrow interval is wider
+    """
+
+    order: Int[Array, " n"]
+    runs: Int[Array, " _"]
+    middles: Int[Array, " run"]
+    widths: Float[Array, " run"]
 
 
 def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], facing: Int[Array, "p 2"]) -> Candidates:
@@ -27,14 +46,36 @@ def sorted_candidates(A: Polyhedron, B: Polyhedron, table: Int[Array, "c 4"], fa
                 [coordinates.min(axis=1), coordinates.max(axis=1)], axis=1
             )
     owners = np.where(kinds == FACET_ON_CORNER, seconds, firsts)
-    order = np.lexsort((boxes[:, 0], planes, owners, kinds))
-    keys, boxes = np.column_stack([kinds, owners, planes])[order], boxes[order]
-    runs = np.flatnonzero(np.concatenate([[True], (np.diff(keys, axis=0) != 0).any(axis=1), [True]])) if len(keys) else [0]
-    widths = np.maximum.reduceat(boxes[:, 2] - boxes[:, 0], runs[:-1]) if len(keys) else np.zeros(0)
-    kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[order].T)
-    lengths = np.cumsum([0, *(len(outline) for outline in outlines)])
-    segments = np.concatenate([np.zeros((0, 4)), *(outline.reshape(-1, 4) for outline in outlines)])
-    return Candidates(kinds, firsts, seconds, planes, facing, np.array(runs), widths, boxes, frames, segments, lengths)
+    by_owner = _sorted(boxes[:, 0], boxes[:, 2], np.stack([kinds, owners, planes]))
+    kinds, firsts, seconds, planes = (np.ascontiguousarray(column) for column in table[by_owner.order].T)
+    segments = np.concatenate([np.zeros((0, 2, 2)), *outlines])
+    numbers = np.repeat(np.arange(len(outlines)), [len(outline) for outline in outlines])
+    y = segments[:, :, 1]
+    by_outline = _sorted(y.min(axis=1), y.max(axis=1), numbers[None])
+    rows = np.column_stack([y.min(axis=1), segments.reshape(-1, 4)])[by_outline.order]
+    return Candidates(
+        kinds, firsts, seconds, planes, facing, *by_owner[1:], boxes[by_owner.order], frames, rows, *by_outline[1:]
+    )
+
+
+def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array, "key n"]) -> Sorted:
+    """Return intervals in runs that have the same keys, the first key first."""
+    if not len(lows):
+        return Sorted(*(np.zeros(0, dtype=int), np.zeros(1, dtype=int)), np.zeros(0, dtype=int), np.zeros(0))
+    _, run = np.unique(keys, axis=1, return_inverse=True)
+    run = run.reshape(-1)
+    count = int(run.max()) + 1
+    first, last = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(first, run, lows)
+    np.maximum.at(last, run, highs)
+    is_finite = np.isfinite(last - first)[run]
+    widths = np.where(is_finite, highs, 0.0) - np.where(is_finite, lows, 0.0)
+    is_wide = ~is_finite | (widths > WIDE_SHARE * (np.where(is_finite, (last - first)[run], 0.0)))
+    narrowest = np.zeros(count)
+    np.maximum.at(narrowest, run[~is_wide], widths[~is_wide])
+    lengths, wide = np.bincount(run, minlength=count), np.bincount(run[is_wide], minlength=count)
+    runs = np.concatenate([[0], np.cumsum(lengths)])
+    return Sorted(np.lexsort((lows, ~is_wide, run)), runs, runs[:-1] + wide, narrowest)
 
 
 def _outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:

@@ -88,26 +88,41 @@ def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
     return lowest >= -margin
 
 
+@inlined
+def first_from(values, start, end, least):  # type: ignore[no-untyped-def]
+    """Return the first of rows start to end, whose first values ascend, with a first value that is not below `least`."""
+    while start < end:
+        middle = (start + end) // 2
+        if values[middle, 0] < least:
+            start = middle + 1
+        else:
+            end = middle
+    return start
+
+
 @uncounted
-def is_within(segments, start, end, x, y, spare):  # type: ignore[no-untyped-def]
-    """Return whether (x, y) lies inside the outline that is rows start to end of `segments` (segment, 4), or `spare` beside."""
-    inside = False
-    for k in range(start, end):
-        x0, y0, x1, y1 = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
+def is_within(segments, start, middle, end, tallest, x, y, spare):  # type: ignore[no-untyped-def]
+    """Return whether (x, y) lies inside an outline, or no farther than `spare` beside it.
+
+    The outline is rows start to end of `segments` (segment, 5): least y, then x and y of both ends. From row `middle` they are
+    sorted, and none of them is taller than `tallest`.
+    """
+    inside, k = False, start
+    while True:
+        if k == middle:
+            k = first_from(segments, middle, end, y - spare - tallest)
+        if k >= end or (k >= middle and segments[k, 0] > y + spare):
+            return inside
+        x0, y0, x1, y1 = segments[k, 1], segments[k, 2], segments[k, 3], segments[k, 4]
         if (y0 > y) != (y1 > y) and x < x0 + (x1 - x0) * (y - y0) / (y1 - y0):
             inside = not inside
-    if inside:
-        return True
-    for k in range(start, end):
-        x0, y0, x1, y1 = segments[k, 0], segments[k, 1], segments[k, 2], segments[k, 3]
-        if min(x0, x1) > x + spare or max(x0, x1) < x - spare or min(y0, y1) > y + spare or max(y0, y1) < y - spare:
-            continue
-        dx, dy = x1 - x0, y1 - y0
-        share = min(max(((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
-        aside_x, aside_y = x - x0 - share * dx, y - y0 - share * dy
-        if aside_x * aside_x + aside_y * aside_y <= spare * spare:
-            return True
-    return False
+        if not (min(x0, x1) > x + spare or max(x0, x1) < x - spare or max(y0, y1) < y - spare):
+            dx, dy = x1 - x0, y1 - y0
+            share = min(max(((x - x0) * dx + (y - y0) * dy) / (dx * dx + dy * dy), 0.0), 1.0)
+            aside_x, aside_y = x - x0 - share * dx, y - y0 - share * dy
+            if aside_x * aside_x + aside_y * aside_y <= spare * spare:
+                return True
+        k += 1
 
 
 @uncounted
