@@ -36,7 +36,8 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
             point, is_inside = candidates[k, c], depth[k, c] > tolerance
             if not (is_inside or (fills and depth[k, c] > -np.inf)) or _has(new_points, k, used, point):
                 continue
-            grows[k] = grows[k] or is_inside
+            # What had a row just now is inside by the solver's residual; another round would not change that.
+            grows[k] = grows[k] or (is_inside and not (fills and _has(points, k, room, point)))
             if count < room:
                 count += 1
             elif count == used or depth[k, c] <= new_reactions[k, count - 1]:
@@ -51,7 +52,7 @@ def extend(points, filled, reactions, candidates, depth, tolerance, fills, exten
             if s >= used:
                 new_reactions[k, s] = 0.0
             if s >= count:
-                new_points[k, s] = points[k, s]
+                new_points[k, s] = -1 if fills else points[k, s]
 
 
 @uncounted
