@@ -24,11 +24,13 @@ MIN_TRAVEL_SHARE = 1e-6  # of the size of the face
 class Trial(NamedTuple):
     """The trial of a pair: the largest error of its fixed planes in the depth of contact, and the one allowed, both [mm].
 
-    NaN for a pair that has no choice: one-sided locators, round faces, tolerances without an end, or too many edges.
+    `places` is the largest number of places at which its faces could touch. Errors are NaN for a pair that has no choice:
+    one-sided locators, round faces, tolerances without an end, or too many edges.
     """
 
     error: float
     allowed: float
+    places: int = 0
 
 
 def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Array, "n contributor"], *, presses: bool) -> float:
@@ -86,15 +88,17 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
-    error = 0.0
+    error, most = 0.0, 0
     for k in range(0, len(X_RM), POSES_AT_ONCE):
         rows = slice(k, k + POSES_AT_ONCE)
-        bounded = places.at(X_RM[rows]).gaps.min(axis=1, initial=np.inf) - heights[rows]
+        gaps = places.at(X_RM[rows]).gaps
+        most = max(most, int(np.isfinite(gaps).sum(axis=1).max()))
+        bounded = gaps.min(axis=1, initial=np.inf) - heights[rows]
         fixed = pair.least_gap(X_RM[rows], heights[rows])
         differences = np.minimum(bounded, room) - np.minimum(fixed, room)
         error = max(error, float(np.abs(differences).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
-    trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)))
+    trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)), most)
     return (places if trial.error > trial.allowed else None), trial
 
 

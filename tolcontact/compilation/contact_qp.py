@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.contact_rows import SLOTS, Rows, contact_rows, standing_points
+from tolcontact.compilation.contact_rows import Rows, contact_rows, standing_points
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.plugins import Plugin, solver
 from tolcontact.discretization import Nominal
@@ -61,7 +61,7 @@ def is_convex(Q: ca.SX) -> ca.SX:
     return ca.mmin(ca.if_else(pivots > 0, 1, 0))
 
 
-Standing = Sequence[np.ndarray | None]  # see ContactQP
+Standing = Sequence[np.ndarray | int]  # see ContactQP
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
 
 
@@ -73,7 +73,7 @@ class ContactQP:
     relate       X_RM of the pairs at `poses`: of poses, deviations
     slacks       number of slacks: the QP's last variables, which are not negative
     equations    number of equations: the QP's last rows, for two-sided locators that the objective makes exact
-    standing     for each pair of the group the contact points that always have a row, or None if slots hold changing points
+    standing     for each pair of the group the contact points that always have a row, or the number of its slots
     """
 
     assemble: ca.Function
@@ -92,8 +92,12 @@ class ContactQP:
     @property
     def spans(self) -> list[slice]:
         """The rows of each pair among those of the group."""
-        ends = np.cumsum([0, *(SLOTS if points is None else len(points) for points in self.standing)])
+        ends = np.cumsum([0, *(_row_count(points) for points in self.standing)])
         return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+
+
+def _row_count(points: np.ndarray | int) -> int:
+    return points if isinstance(points, int) else len(points)
 
 
 def contact_qp(
@@ -157,8 +161,8 @@ def contact_qp(
 def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.SX]:
     """Return the symbols of all inputs by name, for `p` parts, `k` rows and contributors (c).
 
-    If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have SLOTS rows each,
-    for changing points: `m` = v * SLOTS.
+    If only few points of a pair can be the deepest, each of them always has a row. The `v` other pairs have slots, `m` in all,
+    for changing points.
 
     poses (12 p)         poses of the group's parts about which the gaps are linearized
     raw (12 p)           their raw poses, from which displacements count
@@ -174,9 +178,8 @@ def _inputs(nominal: Nominal, group: Group, standing: Standing) -> dict[str, ca.
     P_m, P_r, n_r (3, m) the contact points in the slots
     filled (m)           1 if a slot holds a point, 0 if it is empty
     """
-    varying = sum(points is None for points in standing)
-    slots = SLOTS * varying
-    rows = slots + sum(len(points) for points in standing if points is not None)
+    slots_of_pairs = [points for points in standing if isinstance(points, int)]
+    varying, slots, rows = len(slots_of_pairs), sum(slots_of_pairs), sum(_row_count(points) for points in standing)
     shapes = {
         "poses": (ENTRIES * len(group.parts), 1),
         "raw": (ENTRIES * len(group.parts), 1),

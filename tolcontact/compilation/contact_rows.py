@@ -14,7 +14,7 @@ from tolcontact.mechanics.round_gap import heights, round_gaps
 from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
-SLOTS = 12
+SLOTS, LEAST_SLOTS = 12, 8  # of a pair: at most, and at least; six rows can carry
 
 Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
 
@@ -46,19 +46,19 @@ class Rows:
         return len(self.pairs)
 
 
-def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | None:
-    """Return the points of a pair that always have a row, or None if slots hold changing points.
+def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) -> np.ndarray | int:
+    """Return the points of a pair that always have a row, or the number of slots if these hold changing points.
 
     Points of round faces always have a row. So have the points that can be the deepest, if they are few and fixed.
     """
     if gaps is None:
         return np.arange(len(pair.P_m))
-    return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else None
+    return gaps.corners if method.corners_suffice and len(gaps.corners) <= SLOTS else SLOTS
 
 
 def contact_rows(
     setting: Setting,
-    standing: Sequence[np.ndarray | None],
+    standing: Sequence[np.ndarray | int],
     start_poses: Sequence[Pose],
     end_poses: Sequence[Pose],
     inputs: Mapping[str, ca.SX],
@@ -86,15 +86,15 @@ def contact_rows(
             bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
             continue
-        if points is None:
-            row_points, bend = list(itertools.islice(slots, SLOTS)), next(slot_bends)
+        if isinstance(points, int):
+            row_points, bend = list(itertools.islice(slots, points)), next(slot_bends)
         else:
             row_points, bend = _standing_rows(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
         for P_m, P_r, n_r, is_filled in row_points:
             X = ca.SX.sym("X_RM", ENTRIES)
             g = gap(pose_of(X), P_m, P_r, n_r)
             gradient = ca.substitute(ca.jacobian(g, X), X, start.vector())
-            if points is not None:
+            if not isinstance(points, int):
                 bend += gradient.T * inputs["reactions"][len(pairs)]
             slopes.append(gradient @ by_z)
             gaps.append(ca.substitute(g, X, start.vector()))

@@ -10,7 +10,7 @@ import numpy as np
 
 from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, bounded_pair, push
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
-from tolcontact.compilation.contact_rows import standing_points
+from tolcontact.compilation.contact_rows import LEAST_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.plugins import Plugin, plugin
@@ -142,7 +142,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             round_gaps={k: NamedFunction.dense(function) for k, function in round_functions.items()},
             meetings=meetings,
             trials=trials,
-            groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings) for group in groups),
+            groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
@@ -187,9 +187,13 @@ def _contact_group(
     method: Method,
     plugin: Plugin,
     meetings: Mapping[int, Meeting],
+    trials: Mapping[int, Trial],
 ) -> ContactGroup:
     # Where bodies meet changes with every pose, so that no row of such a pair stands.
-    standing = [None if k in meetings else standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
+    standing = [
+        min(max(trials[k].places, LEAST_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
+        for k in group.pairs
+    ]
     qp = contact_qp(nominal, group, gaps, method, plugin, standing if meetings else ())
     return ContactGroup(group, qp, ContactSolver(qp))
 

@@ -116,7 +116,7 @@ class Candidates:
         self._method = program.method
         self._pairs = [program.nominal.pairs[pair] for pair in group.group.pairs]
         self._standing, self._spans = group.qp.standing, group.qp.spans
-        self._varying = [k for k, points in enumerate(self._standing) if points is None]
+        self._varying = [k for k, points in enumerate(self._standing) if isinstance(points, int)]
         self._all_scans: list[Scan] = []
         self._carrying_scans: list[Scan] = []
         for position, index in enumerate(group.group.pairs):
@@ -232,7 +232,7 @@ class Candidates:
             realization, column = np.nonzero(loaded & ~points["cut"].any(axis=1))  # where a wall ends a shaft may go on
             spacing = OVERHANG_SHARE * float(points["radius"].max())
             return Carriers(realization, points["centre"][column], points["on_moving"][column], spacing)
-        if standing is None:
+        if isinstance(standing, int):
             slots = state.slots[self._varying.index(k)]
             realization, column = np.nonzero(loaded & slots.filled)
             places = self._carrying_scans[k].P_m[slots.points[realization, column]]

@@ -39,7 +39,8 @@ class LinearStep:
         self._remembers = program.plugin.remembers
         self._max_residual = MAX_RESIDUAL * group.group.length
         self.spans = group.qp.spans
-        self.varying = [k for k, points in enumerate(group.qp.standing) if points is None]
+        self._slots = {k: points for k, points in enumerate(group.qp.standing) if isinstance(points, int)}
+        self.varying = list(self._slots)
         # The curvature of walls around round faces counts in every step, not in Newton's alone.
         self.knows_walls = any(program.nominal.pairs[pair].round for pair in group.group.pairs)
 
@@ -56,7 +57,7 @@ class LinearStep:
 
     def start(self, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"]) -> State:
         """Return the state at poses (n, part, 12), with X_RM (n, pair, 12), before the first step."""
-        return State.start(poses, relative, self.spans[-1].stop, len(self.varying))
+        return State.start(poses, relative, self.spans[-1].stop, list(self._slots.values()))
 
     def take(
         self,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from tolcontact.arrays import Array, Bool, Float, Int
-from tolcontact.compilation import ACCURACY, SLOTS
+from tolcontact.compilation import ACCURACY
 from tolcontact.contact.record import Record, initial_numbers
 from tolcontact.contact.scan import Scan
 from tolcontact.contact.slots import Slots
@@ -100,8 +100,10 @@ class State(Record):
         return self.multipliers > LOADED_SHARE * self.multipliers.max(axis=1, initial=0)[:, None]
 
     @classmethod
-    def start(cls, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], rows: int, varying: int) -> "State":
-        """Return the state before the first step, of a QP with `rows` rows, and slots for `varying` of the pairs."""
+    def start(
+        cls, poses: Float[Array, "n part 12"], relative: Float[Array, "n pair 12"], rows: int, slots: Sequence[int]
+    ) -> "State":
+        """Return the state before the first step, of a QP with `rows` rows; `slots` are those of pairs with changing points."""
         count, pairs = relative.shape[:2]
         return cls(
             **initial_numbers(count),
@@ -112,7 +114,7 @@ class State(Record):
             multipliers=np.zeros((count, rows)),
             gap_min=np.full((count, pairs), np.nan),
             doubtful=np.zeros(count, dtype=bool),
-            slots=[Slots.empty(count, SLOTS) for _ in range(varying)],
+            slots=[Slots.empty(count, number) for number in slots],
         )
 
     def take(self, rows: np.ndarray) -> "State":
