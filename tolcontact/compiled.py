@@ -20,7 +20,7 @@ def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool
              arrays, counting takes longer than the arithmetic.
     """
     # `_nrt` is Numba's own option for code without reference counts, as on graphics processors.
-    dispatcher = njit(nogil=True, error_model="numpy", inline="always" if inline else "never", _nrt=counts)(function)
+    dispatcher = njit(nogil=True, error_model="numpy", forceinline=inline, _nrt=counts)(function)
     with contextlib.suppress(RuntimeError):  # there is no folder to write to
         dispatcher._cache = _Cache(function)  # what njit(cache=True) does, with Numba's own class
     return dispatcher
@@ -28,6 +28,7 @@ def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool
 
 inlined = functools.partial(compiled, inline=True)
 uncounted = functools.partial(compiled, counts=False)
+inlined_uncounted = functools.partial(compiled, counts=False, inline=True)
 
 
 class _Cache(FunctionCache):  # type: ignore[misc]

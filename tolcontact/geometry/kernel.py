@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compiled import inlined
+from tolcontact.compiled import inlined_uncounted
 from tolcontact.geometry.vector_kernel import (
     along,
     cross,
@@ -48,7 +48,7 @@ class Body(NamedTuple):
     triangles: np.ndarray
 
 
-@inlined
+@inlined_uncounted
 def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
     """Return the sine of the angle by which edges at a corner rise above the plane across n."""
     leaning = 0.0
@@ -57,7 +57,7 @@ def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
     return leaning
 
 
-@inlined
+@inlined_uncounted
 def corner_on_facet(A, B, first, second, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of a corner, now at x, of the moving body on a facet of the reference body."""
     n = row(B.normals, second)
@@ -71,7 +71,7 @@ def corner_on_facet(A, B, first, second, plane, spare, reach, X, x):  # type: ig
     return height, row(A.vertices, first), along(x, -height, n), n
 
 
-@inlined
+@inlined_uncounted
 def facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of a facet of the moving body on a corner of the reference body.
 
@@ -97,7 +97,7 @@ def facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, y):  # ty
     return height, place, row(B.vertices, second), n
 
 
-@inlined
+@inlined_uncounted
 def _rises(A, B, first, second, X, n):  # type: ignore[no-untyped-def]
     """Return how far n and -n lean towards the facets beside two edges, if they point from the reference to the moving body.
 
@@ -111,7 +111,7 @@ def _rises(A, B, first, second, X, n):  # type: ignore[no-untyped-def]
     return rises, falls
 
 
-@inlined
+@inlined_uncounted
 def _inner(x, share, d, n, height, normals, edge):  # type: ignore[no-untyped-def]
     """Return the place on the edge x + s d that is equally deep below both facets beside another edge.
 
@@ -123,14 +123,14 @@ def _inner(x, share, d, n, height, normals, edge):  # type: ignore[no-untyped-de
     return along(x, min(max(s, -share), 1 - share), d)
 
 
-@inlined
+@inlined_uncounted
 def _is_past(share, edge, spare):  # type: ignore[no-untyped-def]
     """Return whether a share of an edge lies beyond its ends by more than `spare` [mm]."""
     beyond = max(-share, share - 1)
     return beyond > 0 and beyond * beyond * dot(edge, edge) > spare * spare
 
 
-@inlined
+@inlined_uncounted
 def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of an edge of the moving body across one of the reference body.
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compiled import compiled, inlined, uncounted
+from tolcontact.compiled import compiled, inlined_uncounted, uncounted
 from tolcontact.geometry.kernel import (
     CORNER_ON_FACET,
     EDGE_ON_EDGE,
@@ -70,7 +70,7 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
             best = s
 
 
-@inlined
+@inlined_uncounted
 def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untyped-def]
     """Return whether x, in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
     outline, frames = 2 * plane + body, candidates.frames
@@ -81,7 +81,7 @@ def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untype
     return is_within(candidates.segments, start, middle, end, tallest, first, second, spare)
 
 
-@inlined
+@inlined_uncounted
 def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
     corners, lines, back = moved
@@ -98,7 +98,7 @@ def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-unty
     return found if is_over else NOWHERE
 
 
-@inlined
+@inlined_uncounted
 def _write(found, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
     """Write gap, place, foot and normal of candidate s."""
     gaps[s] = found[0]
@@ -117,7 +117,7 @@ def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: igno
     return False
 
 
-@inlined
+@inlined_uncounted
 def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
     """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved

@@ -2,52 +2,52 @@
 
 import math
 
-from tolcontact.compiled import inlined, uncounted
+from tolcontact.compiled import inlined_uncounted, uncounted
 
 
-@inlined
+@inlined_uncounted
 def row(vectors, k):  # type: ignore[no-untyped-def]
     """Return row k of an array (n, 3). Vectors are three numbers: views of arrays would cost more than the arithmetic."""
     return vectors[k, 0], vectors[k, 1], vectors[k, 2]
 
 
-@inlined
+@inlined_uncounted
 def row_of(vectors, k, j):  # type: ignore[no-untyped-def]
     """Return a vector of an array (n, m, 3)."""
     return vectors[k, j, 0], vectors[k, j, 1], vectors[k, j, 2]
 
 
-@inlined
+@inlined_uncounted
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@inlined
+@inlined_uncounted
 def cross(a, b):  # type: ignore[no-untyped-def]
     """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@inlined
+@inlined_uncounted
 def minus(a, b):  # type: ignore[no-untyped-def]
     """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@inlined
+@inlined_uncounted
 def scaled(s, a):  # type: ignore[no-untyped-def]
     """Return s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
-@inlined
+@inlined_uncounted
 def along(a, s, b):  # type: ignore[no-untyped-def]
     """Return a + s b."""
     return a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]
 
 
-@inlined
+@inlined_uncounted
 def turn(X, v):  # type: ignore[no-untyped-def]
     """Return R v for a pose X (12,)."""
     return (
@@ -57,7 +57,7 @@ def turn(X, v):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
+@inlined_uncounted
 def turn_back(X, v):  # type: ignore[no-untyped-def]
     """Return R' v for a pose X (12,)."""
     return (
@@ -67,19 +67,19 @@ def turn_back(X, v):  # type: ignore[no-untyped-def]
     )
 
 
-@inlined
+@inlined_uncounted
 def move(X, v):  # type: ignore[no-untyped-def]
     """Return R v + t for a pose X (12,)."""
     return along(turn(X, v), 1.0, (X[9], X[10], X[11]))
 
 
-@inlined
+@inlined_uncounted
 def move_back(X, x):  # type: ignore[no-untyped-def]
     """Return R' (x - t) for a pose X (12,)."""
     return turn_back(X, minus(x, (X[9], X[10], X[11])))
 
 
-@inlined
+@inlined_uncounted
 def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
     """Return whether x lies over a facet, or beside one of its edges by no more than a margin [mm]."""
     lowest = 0.0
@@ -88,7 +88,7 @@ def is_over(facets, inward, facet, x, margin):  # type: ignore[no-untyped-def]
     return lowest >= -margin
 
 
-@inlined
+@inlined_uncounted
 def first_from(values, start, end, least):  # type: ignore[no-untyped-def]
     """Return the first of rows start to end, whose first values ascend, with a first value that is not below `least`."""
     while start < end:
