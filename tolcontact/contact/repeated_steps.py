@@ -50,6 +50,8 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
     unsettled, best = Unsettled(task, state), None
     trail: list[np.ndarray] = []
+    if not len(task):
+        return
     asleep, last = np.zeros(len(task), dtype=bool), None
     for kind in STEPS_WHERE_FACES_END if candidates.bounded else STEPS:
         asleep &= kind == last
