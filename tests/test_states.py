@@ -44,7 +44,7 @@ def test_the_better_of_two_states_is_kept():
     inside = np.array([[0.1, 0.0], [0.5, 0.2], [0.0, 0.0], [0.3, 0.4]])
     poses = np.zeros((4, 1, 12))
     relative = np.zeros((4, 2, 12))
-    best, here = (State.start(poses + number, relative, 2, 0) for number in (1.0, 2.0))
+    best, here = (State.start(poses + number, relative, 2, []) for number in (1.0, 2.0))
     best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
     here.astray[:] = [0, 0, 1e-3, 0]
     found = better_state(best, here, inside)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tolcontact.compiled import compiled
+from tolcontact.compiled import compiled, uncounted
 
 
 @compiled
@@ -23,8 +23,12 @@ def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-u
 
 
 @compiled
-def deepest(labels, values, numbers, depths):  # type: ignore[no-untyped-def]
-    """Write labels and depths of the deepest places (n, m), deepest first; where there are fewer, some label, and -inf."""
+def deepest(labels, feet, values, distance, numbers, depths):  # type: ignore[no-untyped-def]
+    """Write labels and depths of the deepest places (n, m), deepest first; where there are fewer, some label, and -inf.
+
+    Places outside are left out within a `distance` [mm] of a deeper one: of two that nearly coincide either could carry, and
+    which one does should not be left to the solver.
+    """
     for k in range(values.shape[0]):
         count = 0
         for p in range(values.shape[1]):
@@ -36,10 +40,25 @@ def deepest(labels, values, numbers, depths):  # type: ignore[no-untyped-def]
                 continue
             while j > 0 and depths[k, j - 1] < depth:
                 numbers[k, j], depths[k, j], j = numbers[k, j - 1], depths[k, j - 1], j - 1
-            numbers[k, j], depths[k, j] = labels[k, p], depth
+            numbers[k, j], depths[k, j] = p, depth
             count = min(count + 1, numbers.shape[1])
-        for j in range(count, numbers.shape[1]):
-            numbers[k, j], depths[k, j] = max(labels[k, 0], 0), -np.inf
+        for j in range(numbers.shape[1]):
+            if j >= count or (depths[k, j] <= 0 and _is_near(feet, numbers, depths, k, j, distance)):
+                depths[k, j] = -np.inf
+        for j in range(numbers.shape[1]):
+            numbers[k, j] = max(labels[k, numbers[k, j] if j < count else 0], 0)
+
+
+@uncounted
+def _is_near(feet, columns, depths, k, j, distance):  # type: ignore[no-untyped-def]
+    """Return whether the foot in column j is within a distance of one in a column before it that counts."""
+    is_near = False
+    for other in range(j):
+        away = 0.0
+        for i in range(3):
+            away += (feet[k, columns[k, other], i] - feet[k, columns[k, j], i]) ** 2
+        is_near = is_near or (depths[k, other] > -np.inf and away < distance * distance)
+    return is_near
 
 
 @compiled

@@ -51,7 +51,8 @@ class BoundedScan(SlotScan):
     def deepest(self, relative: np.ndarray, deviations: np.ndarray, may_carry: np.ndarray | None = None) -> Deepest:
         shape = len(relative), min(MAX_DEEPEST, self.labels.shape[1])
         deepest = Deepest(np.empty(shape, dtype=np.int64), np.empty(shape))
-        bounded_kernel.deepest(self.labels, self.gaps(relative, deviations), *deepest)
+        gaps, distance = self.gaps(relative, deviations), self.meeting.reach.travel
+        bounded_kernel.deepest(self.labels, self.feet, gaps, distance, *deepest)
         return deepest
 
     def rows(self, points: np.ndarray, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
