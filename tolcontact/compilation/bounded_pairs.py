@@ -59,7 +59,7 @@ def bounded_pair(
 
     X_RM      (n, 12), raw, at trial poses, for `deviations` (n, contributor)
     pushed    [mm]: how far all contact together may push its parts
-    room      [mm]: how far other contact, or forces, may: gaps below it are compared, too
+    room      [mm]: how far other contact, or forces, may: gaps below it are compared, and below the range of all gaps
     """
     pair = nominal.pairs[index]
     smallest = nominal.assembly.smallest_zone()
@@ -88,17 +88,20 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
+    fixed = pair.least_gap(X_RM, heights)
+    room = max(room, float(np.ptp(fixed)))  # rarer poses than those of the trial may be as much deeper
     error, most = 0.0, 0
     for k in range(0, len(X_RM), POSES_AT_ONCE):
         rows = slice(k, k + POSES_AT_ONCE)
         gaps = places.at(X_RM[rows]).gaps
         most = max(most, int(np.isfinite(gaps).sum(axis=1).max()))
         bounded = gaps.min(axis=1, initial=np.inf) - heights[rows]
-        fixed = pair.least_gap(X_RM[rows], heights[rows])
-        differences = np.minimum(bounded, room) - np.minimum(fixed, room)
+        differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         error = max(error, float(np.abs(differences).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)
-    trial = Trial(error, max(ALLOWED_SHARE * smallest, min(FACET_FACTOR * bulge, COARSE_SHARE * smallest)), most)
+    stands_for_curves = FACET_FACTOR * bulge <= COARSE_SHARE * smallest
+    allowed = max(ALLOWED_SHARE * smallest, FACET_FACTOR * bulge if stands_for_curves else 0.0)
+    trial = Trial(error, allowed, most)
     return (places if trial.error > trial.allowed else None), trial
 
 
