@@ -270,17 +270,16 @@ def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
 
     Intervals are those of means over batches of the same draws.
     """
-    measures = zip(program.nominal.measures, program.nominal_measures, strict=True)
-    limits = [measure.bounds(nominal) for measure, nominal in measures]
+    limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     ones = np.ones(len(trials))
     present = trials.corrected(ones)
     effects = np.empty((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
     for group in range(len(trials)):
         narrowed = trials.corrected(ones - STEP * np.eye(len(trials))[group])
-        for measure, (lower, upper) in enumerate(limits):
+        for measure, limits_of_measure in enumerate(limits):
             batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
             spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]
-            shares = [np.array([((x < lower) | (x > upper)).mean() for x in values]) for values in batches]
+            shares = [np.array([limits_of_measure.outside(x).mean() for x in values]) for values in batches]
             effects[measure, 0, group] = mean(spreads[0] - spreads[1])
             effects[measure, 1, group] = mean(shares[0] - shares[1])
     return effects

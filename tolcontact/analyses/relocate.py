@@ -14,6 +14,7 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import NominalPart, discretize
+from tolcontact.limits import Limits
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
@@ -89,7 +90,7 @@ class Goal:
 
     measure: int
     is_spread: bool
-    limits: tuple[float, float]
+    limits: Limits
     units: str
 
     @classmethod
@@ -98,22 +99,21 @@ class Goal:
         question = Question.parse(text, "least", statistics=(SIX_SIGMA, terms.PPM), examples=EXAMPLES)
         measures, is_spread = program.nominal.measures, question.statistic == SIX_SIGMA
         number = question.number_of([measure.name for measure in measures])
-        limits = measures[number].bounds(program.nominal_measures[number])
-        if not is_spread and not np.isfinite(limits).any():
+        limits = program.limits(number)
+        if not is_spread and limits.are_open:
             raise OptionError(f"least is {text!r}, and the measure has no limits; give it tolerance=... or limits=...")
         return cls(number, is_spread, limits, measures[number].units if is_spread else "1")
 
     def estimate(self, x: np.ndarray) -> Estimate:
         """Return 6 sigma, or the share outside, of values (n,), with its interval."""
         sample = Sample.of(x)
-        return intervals.standard_deviation(sample, times=6) if self.is_spread else share_outside(sample, *self.limits)
+        return intervals.standard_deviation(sample, times=6) if self.is_spread else share_outside(sample, self.limits)
 
     def change(self, before: np.ndarray, after: np.ndarray) -> Estimate:
         """Return the change from values (n,) to values of the same draws: a ratio of 6 sigma, or a difference of shares."""
         if self.is_spread:
             return Estimate(*np.sqrt(two_samples.variance_ratio(Sample.of(after), Sample.of(before), paired=True)))
-        lower, upper = self.limits
-        hits = [Sample.of((x < lower) | (x > upper)) for x in (after, before)]
+        hits = [Sample.of(self.limits.outside(x)) for x in (after, before)]
         return two_samples.share_shift(*hits, paired=True)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.limits import Limits
 from tolcontact.statistics.capability import by_percentiles, share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.question import VALUE, Question
@@ -29,8 +30,7 @@ class Requirement:
 
     name: str
     measure: int
-    lower: float
-    upper: float
+    limits: Limits
     is_share: bool
     value: float
 
@@ -40,11 +40,11 @@ class Requirement:
         question = Question.parse(text, "require", statistics=(PPM, PPK), form=VALUE, examples=EXAMPLES)
         measures = program.nominal.measures
         number = question.number_of([measure.name for measure in measures])
-        lower, upper = measures[number].bounds(program.nominal_measures[number])
-        if not (np.isfinite(lower) or np.isfinite(upper)):
+        limits = program.limits(number)
+        if limits.are_open:
             raise OptionError(f'require names "{question.measure}", which has no limits; give it tolerance=... or limits=...')
         is_share = question.statistic == PPM
-        return cls(text.strip(), number, lower, upper, is_share, question.value * (1e-6 if is_share else 1))
+        return cls(text.strip(), number, limits, is_share, question.value * (1e-6 if is_share else 1))
 
     def check(self, samples: int) -> None:
         """Raise OptionError if `samples` are too few to estimate the share or the Ppk."""
@@ -59,14 +59,17 @@ class Requirement:
         while a count of values outside jumps.
         """
         if self.is_share:
-            return -float(np.quantile(np.maximum(self.lower - x, x - self.upper), 1 - self.value))
+            return -float(np.quantile(self.limits.excess(x), 1 - self.value))
         tail, middle, head = np.quantile(x, [TAIL, 0.5, HEAD])
-        sides = [self.upper - middle - self.value * (head - middle), middle - self.lower - self.value * (middle - tail)]
+        sides = [
+            self.limits.upper - middle - self.value * (head - middle),
+            middle - self.limits.lower - self.value * (middle - tail),
+        ]
         return float(min(sides))
 
     def estimate(self, x: np.ndarray) -> Estimate:
         """Return the share outside, or the Ppk, of values (n,), with its 95 % interval."""
         sample = Sample.of(x)
         if self.is_share:
-            return share_outside(sample, self.lower, self.upper)
-        return by_percentiles(sample, self.lower, self.upper)[1]
+            return share_outside(sample, self.limits)
+        return by_percentiles(sample, self.limits)[1]

@@ -87,6 +87,7 @@ def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
     write(file, terms.LOWER_LIMIT, bounds[:, 0])
     write(file, terms.UPPER_LIMIT, bounds[:, 1])
+    write(file, terms.MEASURE_ACCURACY, program.accuracies)
     write(file, terms.QUANTITY, [measure.quantity for measure in measures])
     write(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
 

@@ -13,11 +13,13 @@ from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_rows import LEAST_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
 from tolcontact.compilation.functions import NamedFunction
+from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.limits import Limits
 from tolcontact.mechanics.gap import GapMap, gap_map, gap_matrix
 from tolcontact.mechanics.groups import Group, contact_groups
 from tolcontact.mechanics.measures import measured, record
@@ -56,6 +58,7 @@ class Program(Pictured):
     trials       by number of the pair: the trial that decided this; none unless the search is bounded
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
+    accuracies   of the measures, in their units (see measure_accuracies)
     tapes        the users' own expressions by measure name
     """
 
@@ -71,6 +74,7 @@ class Program(Pictured):
     trials: dict[int, Trial]
     groups: tuple[ContactGroup, ...]
     nominal_measures: np.ndarray
+    accuracies: np.ndarray
     tapes: dict[str, Tape]
 
     def __str__(self) -> str:
@@ -83,6 +87,11 @@ class Program(Pictured):
             for measure, value in zip(nominal.measures, self.nominal_measures, strict=True)
         ]
         return "\n".join(rows)
+
+    def limits(self, measure: int) -> Limits:
+        """Return the limits of a measure, given by number, with its accuracy."""
+        nominal, accuracy = float(self.nominal_measures[measure]), float(self.accuracies[measure])
+        return Limits(*self.nominal.measures[measure].bounds(nominal), accuracy)
 
     def contact_in_words(self, k: int) -> str:
         """Return the contact of pair k in a few words: its points, and whether places are found where its faces end."""
@@ -143,6 +152,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             meetings=meetings,
             trials=trials,
             groups=tuple(_contact_group(nominal, group, gaps, method, conic_plugin, meetings, trials) for group in groups),
+            accuracies=measure_accuracies(nominal, groups, draws, place, observed),
             nominal_measures=observe(np.tile(AT_REST, len(nominal.parts)), np.zeros(d.numel()))[0].full().ravel(),
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))

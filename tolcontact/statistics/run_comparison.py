@@ -9,6 +9,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import OptionError
+from tolcontact.limits import Limits
 from tolcontact.realizations import pieces
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
@@ -173,7 +174,5 @@ class _Change:
 
 def _outside(x: Sample, summary: xr.Dataset) -> Sample | None:
     """Return which values are beyond the limits of a summary's measure, as a sample of booleans; None without limits."""
-    lower, upper = (float(summary[name]) for name in terms.MEASURE_BOUNDS)
-    if not (np.isfinite(lower) or np.isfinite(upper)):
-        return None
-    return x.map(lambda piece: (piece < lower) | (piece > upper))
+    limits = Limits(*(float(summary[name]) for name in terms.MEASURE_BOUNDS))
+    return None if limits.are_open else x.map(limits.outside)

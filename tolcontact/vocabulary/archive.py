@@ -205,6 +205,9 @@ LOWER_LIMIT = ArchiveVariable(
 UPPER_LIMIT = ArchiveVariable(
     "measure_upper_limit", (MEASURE,), "f8", "largest allowed value of the measure; NaN if that side is open"
 )
+MEASURE_ACCURACY = ArchiveVariable(
+    "measure_accuracy", (MEASURE,), "f8", "by how much a value may be beyond a limit and still count as at the limit"
+)
 QUANTITY = ArchiveVariable(
     "measure_quantity",
     (MEASURE,),
