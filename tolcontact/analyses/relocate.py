@@ -14,8 +14,8 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly, Locator, ThreeTwoOne
 from tolcontact.discretization import NominalPart, discretize
-from tolcontact.limits import Limits
 from tolcontact.errors import ModelError, OptionError
+from tolcontact.limits import Limits
 from tolcontact.statistics import intervals, two_samples
 from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate

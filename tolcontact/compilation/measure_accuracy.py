@@ -22,7 +22,7 @@ LEVERS = 2.0  # a gap that is off by 1 at the end of a span of contact turns the
 def measure_accuracies(
     nominal: Nominal, groups: list[Group], draws: Draws, place: NamedFunction, observe: NamedFunction
 ) -> Float[Array, " measure"]:
-    """Return the accuracy of each measure in its units: that of gaps times what an error of 1 mm in gaps does to it, at least 1.
+    """Return the accuracy of each measure in its units: that of gaps, times what an error of 1 mm in gaps does to it if more.
 
     A free part is displaced with what is located on it. What it does to a measure is the sum of the derivatives by its
     translation, and by its turn about the middle of its contact times 2 over their span, the largest at some raw poses.
@@ -35,11 +35,9 @@ def measure_accuracies(
     gains = np.zeros(len(nominal.measures))
     for group in groups:
         for number, free in enumerate(group.free):
-            carried = [
-                part for part, mobility in zip(group.parts, group.mobilities, strict=True) if number in mobility.movers
-            ]
+            carried = [part for part, mobility in zip(group.parts, group.mobilities, strict=True) if number in mobility.movers]
             middle, span = _contact_of(nominal, group, free)
-                        slopes = np.zeros((2, 3, len(before), len(gains)))
+            slopes = np.zeros((2, 3, len(before), len(gains)))
             for kind, axis in itertools.product(range(2), range(3)):
                 moved = poses.reshape(len(poses), -1, 12).copy()
                 centre = pose.apply(moved[:, free], middle[None])[:, 0]
@@ -66,4 +64,5 @@ def _displacement(centre: np.ndarray, axis: int, step: float, *, turns: bool) ->
     """Return poses (n, 1, 12) that shift by a step along an axis, or turn by it about a centre (n, 3)."""
     direction = step * np.eye(3)[axis]
     R = Rotation.from_rotvec(direction if turns else np.zeros(3)).as_matrix()
-    return pose.pose(np.broadcast_to(R, (len(centre), 3, 3)), centre - centre @ R.T if turns else direction + 0 * centre)[:, None]
+    shift = centre - centre @ R.T if turns else np.broadcast_to(direction, centre.shape)
+    return pose.pose(np.broadcast_to(R, (len(centre), 3, 3)), shift)[:, None]

@@ -58,7 +58,7 @@ def histogram(
             z = np.linspace(-CURVE_SIGMAS, CURVE_SIGMAS, 161)
             height = 100 * (edges[1] - edges[0]) / (sigma * math.sqrt(2 * math.pi))
             axes.plot(mean + sigma * z, height * np.exp(-(z**2) / 2), ":", color=COLOURS[state], label=f"normal, {state}")
-    for limit in limits(rows)[place]:
+    for limit in limits(rows)[place][:2]:
         if math.isfinite(limit):
             axes.axvline(limit, color=LIMIT_COLOUR, label="_limit")
     axes.set(xlabel=f"{name} [{units}]", ylabel="% of realizations", title=results.attrs.get("title", ""))

@@ -10,12 +10,14 @@ With one limit, Ppk is that of its side, and there is no Pp. As of a normal dist
 are 3 and 6 standard deviations.
 """
 
+import math
 from functools import lru_cache
 
 import numpy as np
 import scipy
 from scipy import special
 
+from tolcontact.limits import Limits
 from tolcontact.statistics.intervals import (
     CONFIDENCE,
     UNDEFINED,
@@ -29,49 +31,68 @@ from tolcontact.statistics.sample import Sample
 
 LOW, MEDIAN, HIGH = PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
-MAX_ORDER_STATISTICS = 33  # that are read around each percentile
 
 
-def share_below(x: Sample, limit: float) -> Estimate:
+def share_below(x: Sample, limits: Limits) -> Estimate:
     """Return the share of values below the lower limit, with its exact interval; undefined if that side is open."""
-    return proportion(x.map(lambda piece: piece < limit)) if np.isfinite(limit) else UNDEFINED
+    return proportion(x.map(limits.below)) if np.isfinite(limits.lower) else UNDEFINED
 
 
-def share_above(x: Sample, limit: float) -> Estimate:
+def share_above(x: Sample, limits: Limits) -> Estimate:
     """Return the share of values above the upper limit, with its exact interval; undefined if that side is open."""
-    return proportion(x.map(lambda piece: piece > limit)) if np.isfinite(limit) else UNDEFINED
+    return proportion(x.map(limits.above)) if np.isfinite(limits.upper) else UNDEFINED
 
 
-def share_outside(x: Sample, lower: float, upper: float) -> Estimate:
+def share_outside(x: Sample, limits: Limits) -> Estimate:
     """Return the share of values beyond the limits, with its exact interval; undefined without limits."""
-    if not (np.isfinite(lower) or np.isfinite(upper)):
-        return UNDEFINED
-    return proportion(x.map(lambda piece: (piece < lower) | (piece > upper)))
+    return UNDEFINED if limits.are_open else proportion(x.map(limits.outside))
 
 
-def by_percentiles(x: Sample, lower: float, upper: float) -> tuple[Estimate, Estimate]:
-    """Return Pp and Ppk by percentiles.
+def without_stops(x: Sample, limits: Limits) -> Limits:
+    """Return the limits without those at which values stop: none lies beyond, and the outer percentile is the limit itself.
 
-    The numbers of values below the three percentiles are multinomial for any distribution. Simulated numbers give joint
-    positions of the percentiles between order statistics; the interval leaves out 2.5 % of the simulated indices on either
-    side. A sample that is too small to bound a tail has 0 as the lower bound.
+    Otherwise such a limit would have an index of exactly 1, whatever the values between are.
     """
-    if is_constant(x) or not np.isfinite(x.mean):
+    low, _, high = (percentile.value for percentile in percentiles(x.map(limits.settled), PERCENTS))
+    if low == limits.lower and not _is_any(x.map(limits.below)):
+        limits = limits._replace(lower=-math.inf)
+    if high == limits.upper and not _is_any(x.map(limits.above)):
+        limits = limits._replace(upper=math.inf)
+    return limits
+
+
+def _is_any(hits: Sample) -> bool:
+    return any(bool(piece.any()) for piece in hits.pieces())
+
+
+def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
+    """Return Pp and Ppk by percentiles; sides at which values stop are left out (see without_stops).
+
+    The numbers of values below the three percentiles are multinomial for any distribution. Each percentile lies between the
+    two order statistics next to its simulated number; the interval takes the one that is on the safe side, and leaves out
+    2.5 % of the simulated indices on either side. A sample that is too small to bound a tail has 0 as the lower bound.
+    """
+    if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
+    limits, x = without_stops(x, limits), x.map(limits.settled)
     low, median, high = (percentile.value for percentile in percentiles(x, PERCENTS))
-    lows, medians, highs = _simulated_percentiles(x)
+    least, most = _simulated_percentiles(x)
     pp, ppk = UNDEFINED, UNDEFINED
-    if np.isfinite(lower) and np.isfinite(upper):
-        pp = _with_interval(_pp(low, high, lower, upper), _pp(lows, highs, lower, upper))
-    if np.isfinite(lower) or np.isfinite(upper):
-        ppk = _with_interval(_ppk(low, median, high, lower, upper), _ppk(lows, medians, highs, lower, upper))
+    if np.isfinite(limits.lower) and np.isfinite(limits.upper):
+        worst, best = _pp(least[0], most[2], limits), _pp(most[0], least[2], limits)
+        pp = _with_interval(_pp(low, high, limits), worst, best)
+    if not limits.are_open:
+        worst = np.fmin(*(_ppk(least[0], median_, most[2], limits) for median_ in (least[1], most[1])))
+        best = np.fmax(*(_ppk(most[0], median_, least[2], limits) for median_ in (least[1], most[1])))
+        ppk = _with_interval(_ppk(low, median, high, limits), worst, best)
     return pp, ppk
 
 
-def as_normal(x: Sample, lower: float, upper: float) -> tuple[Estimate, Estimate]:
+def as_normal(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     """Return Pp and Ppk from mean and standard deviation; their intervals do not assume a normal distribution."""
-    if is_constant(x) or not np.isfinite(x.mean):
+    if is_constant(x, limits.accuracy) or not np.isfinite(x.mean):
         return UNDEFINED, UNDEFINED
+    lower, upper, _ = without_stops(x, limits)
     deviation = float(np.sqrt(x.moments[0] * x.count / (x.count - 1)))
     _, kurt = x.standardized_moments
     pp, sides = UNDEFINED, []
@@ -90,51 +111,54 @@ def _side(x: Sample, index: float, sign: float) -> Estimate:
     return from_standardized_influence(x, index, lambda z: -sign * z / 3 - index / 2 * (z**2 - 1))
 
 
-def _pp(low: np.ndarray | float, high: np.ndarray | float, lower: float, upper: float) -> np.ndarray:
-    with np.errstate(divide="ignore"):
-        return np.divide(upper - lower, np.subtract(high, low))
-
-
-def _ppk(
-    low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, lower: float, upper: float
-) -> np.ndarray:
+def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
-        upper_index = np.divide(upper - median, np.subtract(high, median)) if np.isfinite(upper) else np.inf
-        lower_index = np.divide(np.subtract(median, lower), np.subtract(median, low)) if np.isfinite(lower) else np.inf
+        return np.divide(limits.upper - limits.lower, np.maximum(np.subtract(high, low), 0.0))
+
+
+def _ppk(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
+    lower, upper, _ = limits
+    with np.errstate(divide="ignore", invalid="ignore"):
+        upper_index = np.divide(upper - median, np.maximum(np.subtract(high, median), 0.0)) if np.isfinite(upper) else np.inf
+        lower_index = (
+            np.divide(np.subtract(median, lower), np.maximum(np.subtract(median, low), 0.0)) if np.isfinite(lower) else np.inf
+        )
     return np.fmin(upper_index, lower_index)
 
 
-def _with_interval(estimate: np.ndarray, simulated: np.ndarray) -> Estimate:
-    """Return an estimate with the interval that covers 95 % of the simulated values."""
-    low, high = np.quantile(simulated, [0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2], method="inverted_cdf")
+def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: np.ndarray) -> Estimate:
+    """Return an estimate with the interval that covers 95 % of simulated indices, of which the worst and the best are known."""
+    worst, best = np.where(np.isnan(worst), 0.0, worst), np.where(np.isnan(best), np.inf, best)
+    low = np.quantile(worst, 0.5 - CONFIDENCE / 2, method="inverted_cdf")
+    high = np.quantile(best, 0.5 + CONFIDENCE / 2, method="inverted_cdf")
     return Estimate(float(estimate), float(min(low, estimate)), float(max(high, estimate)))
 
 
-def _simulated_percentiles(x: Sample) -> np.ndarray:
-    """Return possible values of the three percentiles of the distribution, (percentile, trial)."""
-    ranks = percentile_ranks(x.count)
-    low = np.maximum(np.floor(ranks.min(axis=1)), 1)
-    high = np.maximum(np.minimum(np.ceil(ranks.max(axis=1)), x.count), low)
-    nodes = np.linspace(low, high, MAX_ORDER_STATISTICS, axis=1).round().astype(np.int64)
-    values = x.ordered((nodes - 1).ravel().tolist()).reshape(nodes.shape)  # in one call, which sorts the sample
-    simulated = np.array([np.interp(*curve) for curve in zip(ranks, nodes, values, strict=True)])
-    return np.where(ranks < 1, -np.inf, np.where(ranks > x.count, np.inf, simulated))
+def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:
+    """Return order statistics at or below, and at or above, simulated percentiles of the distribution, (percentile, trial)."""
+    numbers = values_below(x.count)
+    ranks, places = np.unique(np.stack([numbers, numbers + 1]), return_inverse=True)
+    known = (ranks >= 1) & (ranks <= x.count)
+    values = np.where(ranks < 1, -np.inf, np.inf)
+    values[known] = x.ordered((ranks[known] - 1).tolist())
+    least, most = values[places.reshape(2, *numbers.shape)]
+    return least, most
 
 
 @lru_cache
-def percentile_ranks(n: int) -> np.ndarray:
-    """Return simulated ranks of the percentiles among `n` ordered values, (percentile, trial).
-
-    Rank 1 is the least value; a rank below 1 lies below all values.
-    """
+def values_below(n: int) -> np.ndarray:
+    """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
     u = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(0)).random(TRIALS).T
     p = np.array(PERCENTS) / 100
-    below_low = _hits(u[0], n, p[0])
+    below_low = _hits(u[0], np.full(TRIALS, n), p[0])
     below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))
     below_high = below_median + _hits(u[2], n - below_median, (p[2] - p[1]) / (1 - p[1]))
-    return np.array([below_low, below_median, below_high]) + 1
+    return np.array([below_low, below_median, below_high])
 
 
-def _hits(u: np.ndarray, n: np.ndarray | int, p: float) -> np.ndarray:
-    """Return quantiles `u` of a binomial distribution minus one, interpolated between whole numbers."""
-    return np.where(u < (1 - p) ** n, -0.5, special.bdtrik(u, n, p))
+def _hits(u: np.ndarray, n: np.ndarray, p: float) -> np.ndarray:
+    """Return quantiles `u` of binomial distributions."""
+    k = np.maximum(np.ceil(special.bdtrik(u, np.maximum(n, 1), p)), 0).astype(np.int64)
+    k = np.where(np.isnan(special.bdtrik(u, np.maximum(n, 1), p)), 0, k)
+    k -= (k > 0) & (special.bdtr(np.maximum(k - 1, 0), np.maximum(n, 1), p) >= u)
+    return np.where(n > 0, np.minimum(k, n), 0)

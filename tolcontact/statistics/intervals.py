@@ -174,9 +174,9 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
     return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
 
 
-def is_constant(x: Sample) -> bool:
-    """Return whether the spread of a sample may be mere rounding."""
-    return not x.moments[0] > (8 * np.finfo(float).eps * x.mean) ** 2
+def is_constant(x: Sample, accuracy: float = 0.0) -> bool:
+    """Return whether the spread of a sample may be mere rounding, or that of a solver with some accuracy."""
+    return not x.moments[0] > max(8 * np.finfo(float).eps * abs(x.mean), accuracy) ** 2
 
 
 def _unbiased(x: Sample) -> float:

@@ -7,6 +7,7 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.limits import GAP_ACCURACY, Limits
 from tolcontact.statistics import capability, intervals
 from tolcontact.statistics.intervals import UNDEFINED, Estimate
 from tolcontact.statistics.sample import Sample, measured_sample
@@ -17,7 +18,7 @@ class MeasuredValues:
 
     def __init__(self, rows: xr.Dataset, measure: int, state: str) -> None:
         self.sample: Sample = measured_sample(rows, measure, state)
-        self.lower, self.upper = limits(rows)[measure]
+        self.limits = limits(rows)[measure]
 
     @cached_property
     def variance(self) -> Estimate:
@@ -30,16 +31,16 @@ class MeasuredValues:
     @cached_property
     def capability(self) -> tuple[Estimate, Estimate]:
         """Pp and Ppk by percentiles."""
-        return capability.by_percentiles(self.sample, self.lower, self.upper)
+        return capability.by_percentiles(self.sample, self.limits)
 
     @cached_property
     def capability_as_normal(self) -> tuple[Estimate, Estimate]:
         """Pp and Ppk as of a normal distribution."""
-        return capability.as_normal(self.sample, self.lower, self.upper)
+        return capability.as_normal(self.sample, self.limits)
 
-    def share(self, share: Callable[..., Estimate], *bounds: float) -> Estimate:
+    def share(self, share: Callable[[Sample, Limits], Estimate]) -> Estimate:
         """Return a share of values beyond limits; undefined if a value is not a number."""
-        return share(self.sample, *bounds) if np.isfinite(self.sample.mean) else UNDEFINED
+        return share(self.sample, self.limits) if np.isfinite(self.sample.mean) else UNDEFINED
 
 
 STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
@@ -50,9 +51,9 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
     **{f"{percent:g} %": lambda x, percent=percent: x.percentiles[percent] for percent in terms.PERCENTILES},  # type: ignore[misc]
     terms.SKEWNESS: lambda x: intervals.skewness(x.sample),
     terms.KURTOSIS: lambda x: intervals.kurtosis(x.sample),
-    terms.BELOW: lambda x: x.share(capability.share_below, x.lower),
-    terms.ABOVE: lambda x: x.share(capability.share_above, x.upper),
-    terms.OUTSIDE: lambda x: x.share(capability.share_outside, x.lower, x.upper),
+    terms.BELOW: lambda x: x.share(capability.share_below),
+    terms.ABOVE: lambda x: x.share(capability.share_above),
+    terms.OUTSIDE: lambda x: x.share(capability.share_outside),
     terms.PP: lambda x: x.capability[0],
     terms.PPK: lambda x: x.capability[1],
     terms.PP_NORMAL: lambda x: x.capability_as_normal[0],
@@ -81,9 +82,13 @@ def changes(rows: xr.Dataset) -> np.ndarray:
     return np.array(rows_of_changes)
 
 
-def limits(rows: xr.Dataset) -> np.ndarray:
-    """Return the lower and the upper limit of each measure, (measure, 2); NaN where a side is open."""
+def limits(rows: xr.Dataset) -> list[Limits]:
+    """Return the limits of each measure; not a number where a side is open."""
     if terms.LOWER_LIMIT.name in rows:
-        return np.column_stack([rows[terms.LOWER_LIMIT.name].values, rows[terms.UPPER_LIMIT.name].values])
-    nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
-    return np.column_stack([nominal - half, nominal + half])
+        lower, upper = rows[terms.LOWER_LIMIT.name].values, rows[terms.UPPER_LIMIT.name].values
+    else:
+        nominal, half = rows[terms.MEASURE_NOMINAL.name].values, rows[terms.MEASURE_TOLERANCE.name].values / 2
+        lower, upper = nominal - half, nominal + half
+    is_stated = terms.MEASURE_ACCURACY.name in rows  # archives of former versions do not state it
+    accuracies = rows[terms.MEASURE_ACCURACY.name].values if is_stated else np.full(len(lower), GAP_ACCURACY)
+    return [Limits(*map(float, values)) for values in zip(lower, upper, accuracies, strict=True)]

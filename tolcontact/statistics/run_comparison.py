@@ -55,7 +55,7 @@ def compare_runs(runs: Mapping[str, xr.DataTree]) -> xr.Dataset:
     }
     units = summaries[reference_name].sel(measure=shared)[terms.MEASURE_UNITS.name].values.astype(str)
     bounds = {
-        name: np.array([summary[name].sel(measure=shared) for summary in summaries.values()]) for name in terms.MEASURE_BOUNDS
+        name: np.array([summary[name].sel(measure=shared) for summary in summaries.values()]) for name in terms.MEASURE_LIMITS
     }
     return xr.Dataset(
         {variable.name: variable.entry(np.array(values[variable.name])) for variable in terms.COMPARED_RUNS},
@@ -174,5 +174,5 @@ class _Change:
 
 def _outside(x: Sample, summary: xr.Dataset) -> Sample | None:
     """Return which values are beyond the limits of a summary's measure, as a sample of booleans; None without limits."""
-    limits = Limits(*(float(summary[name]) for name in terms.MEASURE_BOUNDS))
+    limits = Limits(*(float(summary[name]) for name in terms.MEASURE_LIMITS))
     return None if limits.are_open else x.map(limits.outside)

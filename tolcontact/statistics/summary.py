@@ -123,7 +123,10 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
         terms.OF_ITERATIONS: list(terms.MIDDLES),
         terms.EXTREME: list(terms.EXTREMES),
         terms.MEASURE_UNITS.name: (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),
-        **{name: (terms.MEASURE, bounds) for name, bounds in zip(terms.MEASURE_BOUNDS, limits(rows).T, strict=True)},
+        **{
+            name: (terms.MEASURE, np.array(values))
+            for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
+        },
         terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
     }
 

@@ -32,7 +32,7 @@ REACTION_PERCENTILES = (5, 50, 95)
 OF_REACTION, COMBINATION = "of_reaction", "combination"
 REACTION_STATISTICS = (MEAN, *(f"{percent} %" for percent in REACTION_PERCENTILES))  # labels of `of_reaction`
 MIDDLES = ("median", "largest")  # labels of `of_iterations`
-MEASURE_BOUNDS = tuple(f"measure_{bound}" for bound in BOUNDS)  # coordinates: the limits of a measure
+MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
 
 STATISTIC_VALUE = ArchiveVariable(
     "statistic_value", (MEASURE, STATE, STATISTIC, INTERVAL), "f8", "estimate, in the measure's units; shares are of 1"
