@@ -1,8 +1,9 @@
 """Probabilities that a measure is outside its limits, or that parts cannot be assembled, where this is rare."""
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,29 +14,32 @@ from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.statistics.rare_events import Score, tail_probability
+from tolcontact.limits import Limits
+from tolcontact.statistics.rare import Score, either, tail_probability
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 4000  # for an event
-INFLATIONS = 1.3 ** np.arange(7)  # of all deviations, up to 4.8: the first one that prevents assembly is the score
-BISECTIONS = 3  # that find the first one of them, or that there is none
-Event = Callable[[Engine], Score]
+MIN_AT_STOP = 50  # values at a limit that nothing exceeds
 
 
 def tails(
     model: Model | Program, *, samples: int = 100_000, seed: int = 1, solver: str | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return probabilities of rare events, by subset simulation (see tolcontact.statistics.rare_events).
+    """Return probabilities of rare events (see tolcontact.statistics.rare).
 
         probability  (event, interval)          with its 95 % interval
+        disagreement (event)                    factor by which two searches for the event differ; 1 if they agree
+        stop         (event)                    1: many values were at one of the limits, and none beyond; beside another limit
+                                                it is left out
         simulated    (event)                    number of realizations, of about `samples`
         by_status    (event, status_meaning)    number of realizations, most of them unlikely ones
 
-    An event is that a corrected measure is outside its limits, or, in an exact resolution, that parts cannot be assembled. The
-    score of the former is the measure itself. The score of the latter is the factor by which all deviations, as normal scores,
-    have to grow until parts cannot be assembled. This is right if larger deviations never make assembly possible again.
+    An event is that a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, that parts
+    cannot be assembled. The score of the former is the measure itself, and each limit is searched for by itself; the latter is
+    searched for by inflation of all deviations alone. Where two searches disagree, the interval covers what both say, and more
+    realizations are needed.
     Probabilities include realizations that are not resolved, with their last poses. `progress` is called with the number of
     realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
@@ -55,13 +59,28 @@ def tails(
             f'"{analysis.assembly}" has no rare event: no measure has limits, and parts can always be assembled; '
             "give measures tolerance=... or limits=..."
         )
-    engine, probabilities, statuses = analysis.engine(len(events) * samples), [], []
-    for number, (score_of, simulations) in enumerate(events.values()):
+    engine = analysis.engine(len(events) * samples)
+    found, statuses, stops = [], [], []
+    for number, event in enumerate(events.values()):
         counted = engine.statuses.copy()
         rng, dimensions = np.random.default_rng([seed, number]), len(program.draws.varying)
-        probabilities.append(tail_probability(score_of(engine), dimensions, samples=samples // simulations, rng=rng))
+        tails_of_sides, is_stop = [], []
+        for side in event.sides:  # each has its own way, and may hide that of the other
+            score, part = side(engine), samples // len(event.sides)
+            tails_of_sides.append(tail_probability(score, dimensions, samples=part, rng=rng, leads=event.leads))
+            is_stop.append(isinstance(score, _Beyond) and score.is_stop)
+        # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
+        kept = [tail for tail, stop in zip(tails_of_sides, is_stop, strict=True) if not stop]
+        found.append(either(kept or tails_of_sides))
+        stops.append(any(is_stop))
         statuses.append(engine.statuses - counted)
-    values = {"probability": probabilities, "simulated": np.sum(statuses, axis=1), "by_status": statuses}
+    values = {
+        "probability": [tail.probability for tail in found],
+        "disagreement": [tail.disagreement for tail in found],
+        "stop": np.array(stops, dtype=np.int8),
+        "simulated": np.sum(statuses, axis=1),
+        "by_status": statuses,
+    }
     return analysis.dataset(values, {terms.EVENT: list(events)}, samples=samples)
 
 
@@ -83,40 +102,52 @@ def simulated_scores(engine: Engine, u: np.ndarray) -> tuple[np.ndarray, np.ndar
     return engine.simulate_deviations(draws.from_numbers(numbers, len(u)))
 
 
-def _events(program: Program) -> dict[str, tuple[Event, int]]:
-    """Return the score of each event, and the number of simulations that one score takes."""
-    events: dict[str, tuple[Event, int]] = {}
-    for number, (measure, nominal) in enumerate(zip(program.nominal.measures, program.nominal_measures, strict=True)):
-        lower, upper = measure.bounds(nominal)
-        if np.isfinite(lower) or np.isfinite(upper):
-            events[f"{measure.name} outside limits"] = _outside(number, lower, upper), 1
+class _Event(NamedTuple):
+    """An event: scores of its sides, which exclude each other, and whether these say how near it is."""
+
+    sides: list[Callable[[Engine], Score]]
+    leads: bool
+
+
+def _events(program: Program) -> dict[str, _Event]:
+    """Return the events of a program by name."""
+    events = {}
+    for number, measure in enumerate(program.nominal.measures):
+        limits = program.limits(number)
+        if not limits.are_open:
+            events[f"{measure.name} outside limits"] = _Event(
+                [partial(_Beyond, measure=number, limits=side) for side in limits.sides], leads=True
+            )
     if program.method.is_exact and program.nominal.pairs:
-        events["not assemblable"] = not_assemblable, BISECTIONS
+        events["not assemblable"] = _Event([not_assemblable], leads=False)
     return events
 
 
-def _outside(measure: int, lower: float, upper: float) -> Event:
-    def event(engine: Engine) -> Score:
-        def score(u: np.ndarray) -> np.ndarray:
-            measured, _ = simulated_scores(engine, u)
-            x: np.ndarray = measured[:, terms.CORRECTED, measure]
-            return np.maximum(lower - x, x - upper)
+class _Beyond:
+    """The score of one side of a measure's limits: by how much values are beyond the limit and their accuracy."""
 
-        return score
+    def __init__(self, engine: Engine, measure: int, limits: Limits) -> None:
+        self._engine, self._measure, self._limits = engine, measure, limits
+        self._beyond = self._at_limit = 0
 
-    return event
+    def __call__(self, u: np.ndarray) -> np.ndarray:
+        measured, _ = simulated_scores(self._engine, u)
+        excess = np.nan_to_num(self._limits.excess(measured[:, terms.CORRECTED, self._measure]), nan=-np.inf, posinf=np.inf)
+        self._beyond += int((excess > 0).sum())
+        self._at_limit += int(((excess >= -2 * self._limits.accuracy) & (excess <= 0)).sum())
+        return excess
+
+    @property
+    def is_stop(self) -> bool:
+        """Whether many values were at the limit, also inflated ones, and none beyond."""
+        return self._beyond == 0 and self._at_limit >= MIN_AT_STOP
 
 
 def not_assemblable(engine: Engine) -> Score:
-    """Return the score 0.5 - k, where the inflation with number k is the first one that prevents assembly; by bisection."""
+    """Return the score of parts that cannot be assembled: 1 if it is so, else -1."""
 
     def score(u: np.ndarray) -> np.ndarray:
-        low, high = np.zeros(len(u), dtype=int), np.full(len(u), len(INFLATIONS))
-        for _ in range(BISECTIONS):
-            middle = (low + high) // 2
-            _, status = simulated_scores(engine, INFLATIONS[middle][:, None] * u)
-            is_stuck = status == terms.Status.NOT_ASSEMBLABLE
-            low, high = np.where(is_stuck, low, middle + 1), np.where(is_stuck, middle, high)
-        return 0.5 - low
+        _, status = simulated_scores(engine, u)
+        return np.where(status == terms.Status.NOT_ASSEMBLABLE, 1.0, -1.0)
 
     return score

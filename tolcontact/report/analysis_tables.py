@@ -207,7 +207,15 @@ def _tails(dataset: xr.Dataset) -> AnalysisReport:
         estimate, lower, upper = (grouped(round(value)) if value >= 1000 else f"{value:.3g}" for value in ppm)
         rows.append([str(event), f"{estimate} [{lower}, {upper}]"])
     count = f"{grouped(int(dataset['simulated'].sum()))} realizations"
-    notes = ["Probabilities in ppm, with contact, by subset simulation; 95 % intervals."]
+    notes = ["Probabilities in ppm, with contact, by searches and importance sampling; 95 % intervals."]
+    disagreement = dataset["disagreement"].values if "disagreement" in dataset else np.ones(len(rows))  # of older archives
+    for event, factor in zip(dataset["event"].values, disagreement, strict=True):
+        if factor > 1:
+            differ = f"disagree by a factor of {factor:.2g}" if math.isfinite(factor) else "disagree: only one of them found it"
+            notes.append(f"{event}: two searches {differ}; more realizations are needed.")
+    stops = dataset["stop"].values if "stop" in dataset else np.zeros(len(rows))
+    for event in dataset["event"].values[stops == 1]:
+        notes.append(f"{event}: values stop at a limit; none was found beyond it.")
     return AnalysisReport("Rare events", count, notes, [AnalysisTable("", ["", "ppm"], rows)])
 
 

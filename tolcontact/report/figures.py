@@ -15,11 +15,13 @@ def grouped(count: int) -> str:
 
 
 def limits_text(measure: xr.Dataset) -> str:
-    """Return the limits of a measure in words; empty without limits."""
+    """Return the limits of a measure in words, and which of them are stops; empty without limits."""
     lower, upper = float(measure["measure_lower"].values), float(measure["measure_upper"].values)
+    stops = str(measure["measure_stops"].values) if "measure_stops" in measure.coords else ""
+    note = f" ({stops} limit: a stop)" if stops else ""
     if math.isfinite(lower) and math.isfinite(upper):
-        return f"limits {lower:g} to {upper:g}"
-    return f"at least {lower:g}" if math.isfinite(lower) else f"at most {upper:g}" if math.isfinite(upper) else ""
+        return f"limits {lower:g} to {upper:g}{note}"
+    return f"at least {lower:g}{note}" if math.isfinite(lower) else f"at most {upper:g}{note}" if math.isfinite(upper) else ""
 
 
 def number(values: object, *, sign: bool = False, max_decimals: int = MAX_DECIMALS) -> str:

@@ -67,6 +67,17 @@ def all_statistics(rows: xr.Dataset) -> np.ndarray:
     return np.array([[[statistic(x) for statistic in STATISTICS.values()] for x in states] for states in values])
 
 
+def stops(rows: xr.Dataset) -> list[str]:
+    """Return the sides, "lower" or "upper" or both, at which the corrected values of each measure stop (see without_stops)."""
+    sides = []
+    for number, limits_of_measure in enumerate(limits(rows)):
+        sample = measured_sample(rows, number, terms.STATES[terms.CORRECTED])
+        kept = capability.without_stops(sample, limits_of_measure) if np.isfinite(sample.mean) else limits_of_measure
+        named = zip(terms.BOUNDS, limits_of_measure, kept, strict=False)
+        sides.append(" and ".join(side for side, limit, left in named if np.isfinite(limit) and not np.isfinite(left)))
+    return sides
+
+
 def changes(rows: xr.Dataset) -> np.ndarray:
     """Return the changes from raw to corrected measures, (measure, change_of, interval)."""
     rows_of_changes = []

@@ -13,7 +13,7 @@ from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, all_statistics, changes, limits
+from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, all_statistics, changes, limits, stops
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
@@ -127,6 +127,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
             name: (terms.MEASURE, np.array(values))
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
         },
+        terms.MEASURE_STOPS: (terms.MEASURE, np.array(stops(rows), dtype=object)),
         terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
     }
 

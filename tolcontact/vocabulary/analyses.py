@@ -122,6 +122,8 @@ TAILS = AnalysisRecord(
     "rare events of {assembly}",
     (
         ArchiveVariable("probability", (EVENT, INTERVAL), "f8", "probability of a rare event", "1"),
+        ArchiveVariable("disagreement", (EVENT,), "f8", "factor between two searches for the event; 1: they agree", "1"),
+        ArchiveVariable("stop", (EVENT,), "i1", "1: many values were at a limit, and none beyond; 0: not so", "1"),
         ArchiveVariable("simulated", (EVENT,), "i8", "number of realizations simulated", "1"),
         replace(_by_status(EVENT), long_name="number of realizations simulated"),
     ),

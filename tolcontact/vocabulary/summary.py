@@ -33,6 +33,7 @@ OF_REACTION, COMBINATION = "of_reaction", "combination"
 REACTION_STATISTICS = (MEAN, *(f"{percent} %" for percent in REACTION_PERCENTILES))  # labels of `of_reaction`
 MIDDLES = ("median", "largest")  # labels of `of_iterations`
 MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
+MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
 
 STATISTIC_VALUE = ArchiveVariable(
     "statistic_value", (MEASURE, STATE, STATISTIC, INTERVAL), "f8", "estimate, in the measure's units; shares are of 1"

@@ -1,0 +1,179 @@
+"""The probability of a rare event, from two searches and importance sampling about what they found."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.statistics import intervals
+from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
+from tolcontact.statistics.rare.searches import INFLATIONS, Found, Score, by_inflation, by_levels, first_inflation
+
+PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
+SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
+SCOUTING = 0.04  # of a search, for each inflation that is tried
+REPLICATES = 4  # of each search
+MIN_LEVEL_SAMPLES = 50  # realizations at a level
+MIN_GROUP = 8  # realizations of a replicate that centres are found from
+AROUND_ZERO = 0.1  # share of the mixture that is drawn as it is
+REFITS = 2  # to what the searches found
+ROUNDS, ROUND = 2, 0.15  # of importance sampling, before the last one, and their shares: to find centres that are missing
+MIN_REFIT, REFIT = 40, 500  # hits from which centres are found again, and how many are drawn of them
+MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # hits that importance sampling needs, and the largest share of one of them
+SIGNIFICANT = 1.3  # times both half widths: by so much more a search says what importance sampling missed
+
+
+class Tail(NamedTuple):
+    """The probability of an event, and the factor by which the searches for it disagree: 1 if they agree."""
+
+    probability: Estimate
+    disagreement: float
+
+
+def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
+    """Return the probability that a score is above 0, with its 95 % interval, from about `samples` realizations.
+
+    leads   whether scores outside of the event say how near it is; otherwise inflation alone is searched by
+    """
+    pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_LEVEL_SAMPLES), dimensions))) > 0
+    if pilot.sum() >= MIN_COUNTED:
+        return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
+    budgets = [int(share * samples) for share in SEARCHES]
+    searches = [_replicates(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
+    if leads:
+        searches.insert(0, _replicates(score, dimensions, budgets[0], rng, inflates=False))
+    said = [_mean([found.probability for found in search]) for search in searches]
+    drawn = int((1 - PILOT - sum(SEARCHES)) * samples)
+    groups = [[found.points for found in search if len(found.points) >= MIN_GROUP] for search in searches]
+    groups = [group for group in groups if group]
+    if not groups:
+        if not any(estimate.value for estimate in said):
+            return Tail(_counted(score, dimensions, drawn, rng), 1.0)
+        return _agreed(said)
+    weights = _importance(score, dimensions, groups, drawn, rng)
+    if not _suffices(weights):
+        return _agreed(said)
+    mean = float(weights.mean())
+    reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
+    estimate = Estimate(mean, mean / reach, min(mean * reach, 1.0))
+    for other in said:
+        if other.value > 0 and math.log(other.value / mean) > SIGNIFICANT * math.hypot(_log_width(other), _log_width(estimate)):
+            return Tail(estimate._replace(upper=max(estimate.upper, other.upper)), other.value / mean)
+    return Tail(estimate, 1.0)
+
+
+def either(tails: Sequence[Tail]) -> Tail:
+    """Return the probability of one of several events that exclude each other, from independent estimates.
+
+    Distances of the bounds add up like errors (Zou and Donner, 2008).
+    """
+    estimates = np.array([tail.probability for tail in tails])
+    total = float(estimates[:, 0].sum())
+    below, above = (math.sqrt(float(((estimates[:, k] - estimates[:, 0]) ** 2).sum())) for k in (1, 2))
+    bounds = max(total - below, 0.0), min(total + above, 1.0)
+    return Tail(Estimate(total, *bounds), max(tail.disagreement for tail in tails))
+
+
+def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> Estimate:
+    return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
+
+
+def _replicates(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> list[Found]:
+    """Return what independent repetitions of a search found, with about `budget` realizations in all."""
+    used = 0
+
+    def counting(u: np.ndarray) -> np.ndarray:
+        nonlocal used
+        used += len(u)
+        return score(u)
+
+    search: Callable[[int], Found]
+    if inflates:
+        looks = max(int(SCOUTING * budget), MIN_LEVEL_SAMPLES)
+        inflation = first_inflation(counting, dimensions, looks // len(INFLATIONS) * len(INFLATIONS) or looks, rng)
+
+        def search(count: int) -> Found:
+            return by_inflation(counting, dimensions, count, rng, inflation)
+    else:
+
+        def search(count: int) -> Found:
+            return by_levels(counting, dimensions, count, rng)
+
+    trial, before = max(budget // 100, MIN_LEVEL_SAMPLES), used
+    search(trial)
+    cost = max((used - before) / trial, 1.0)  # the number of levels
+    count = max(int((budget - used) / REPLICATES / cost), MIN_LEVEL_SAMPLES)
+    return [search(count) for _ in range(REPLICATES)]
+
+
+def _importance(
+    score: Score, dimensions: int, groups: Sequence[Sequence[np.ndarray]], count: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Return weights of realizations drawn about what each search found, groups of (n, d): (n,), 0 outside of the event."""
+    around_zero = Mixture(np.zeros((1, dimensions)), np.ones(1))
+    shares = [(1 - AROUND_ZERO) / len(groups)] * len(groups)
+    mixtures = [fitted(group, rng).flattened() for group in groups]
+    mixture, some = joined([*mixtures, around_zero], [*shares, AROUND_ZERO]), int(ROUND * count)
+    points = np.concatenate([points for group in groups for points in group])
+    for _ in range(REFITS):
+        mixture = _completed(mixture, points, np.exp(-mixture.log_ratio(points)), rng)
+    for _ in range(ROUNDS):
+        u, w = mixture.weights(score, some, dimensions, rng)
+        hits = np.flatnonzero(w)
+        if len(hits) > MIN_REFIT:
+            mixture = _completed(mixture, u[hits], w[hits], rng)
+    return mixture.weights(score, count - ROUNDS * some, dimensions, rng)[1]
+
+
+def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Generator) -> Mixture:
+    """Return the mixture with more centres where realizations (n, d) in the event have large weights: there, some are missing.
+
+    w   (n,): weights, or in proportion to them
+    """
+    groups = [u[rng.choice(len(u), REFIT, p=w / w.sum())] for _ in range(2)]
+    return joined([mixture, fitted(groups, rng).flattened()], [0.5, 0.5])
+
+
+def _suffices(weights: np.ndarray) -> bool:
+    """Return whether many realizations carry the estimate, and none much of it."""
+    total = weights.sum()
+    is_carried = total > 0 and total**2 / (weights**2).sum() >= MIN_EFFECTIVE
+    return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
+
+
+def _mean(probabilities: Sequence[float]) -> Estimate:
+    """Return the mean of independent estimates of a probability, with its 95 % interval; [0, 1] if all are zero.
+
+    Estimates are skewed to the right: the interval of their mean is that of its logarithm.
+    """
+    values = np.array(probabilities)
+    mean = float(values.mean())
+    if mean == 0:
+        return Estimate(0.0, 0.0, 1.0)
+    error = float(values.std(ddof=1)) / math.sqrt(len(values))
+    reach = math.exp(min(intervals.student(len(values) - 1) * error / mean, 700.0))
+    return Estimate(mean, mean / reach, min(mean * reach, 1.0))
+
+
+def _agreed(said: Sequence[Estimate]) -> Tail:
+    """Return the mean of what the searches say if they agree, else the larger with an interval that covers both."""
+    best = max(said, key=lambda estimate: estimate.value)
+    if len(said) == 1:
+        return Tail(best, 1.0)
+    one, other = said
+    if not (one.value > 0 and other.value > 0):
+        return Tail(best._replace(lower=0.0), math.inf)
+    widths = _log_width(one), _log_width(other)
+    if abs(math.log(one.value / other.value)) > math.hypot(*widths):
+        bounds = min(one.lower, other.lower), max(one.upper, other.upper)
+        return Tail(Estimate(best.value, *bounds), max(one.value / other.value, other.value / one.value))
+    mean = (one.value + other.value) / 2
+    reach = math.exp(math.hypot(one.value * widths[0], other.value * widths[1]) / 2 / mean)
+    return Tail(Estimate(mean, mean / reach, min(mean * reach, 1.0)), 1.0)
+
+
+def _log_width(estimate: Estimate) -> float:
+    """Return the half width of an interval on the log scale."""
+    return math.log(estimate.upper / estimate.value)
