@@ -115,9 +115,8 @@ def _events(program: Program) -> dict[str, _Event]:
     for number, measure in enumerate(program.nominal.measures):
         limits = program.limits(number)
         if not limits.are_open:
-            events[f"{measure.name} outside limits"] = _Event(
-                [partial(_Beyond, measure=number, limits=side) for side in limits.sides], leads=True
-            )
+            sides: list[Callable[[Engine], Score]] = [partial(_Beyond, measure=number, limits=side) for side in limits.sides]
+            events[f"{measure.name} outside limits"] = _Event(sides, leads=True)
     if program.method.is_exact and program.nominal.pairs:
         events["not assemblable"] = _Event([not_assemblable], leads=False)
     return events

@@ -6,6 +6,7 @@ import xarray as xr
 
 MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
+NO_INTERVAL = "[-]"
 PERCENT_FROM = 10_000  # ppm; smaller shares are in ppm
 
 
@@ -25,10 +26,15 @@ def limits_text(measure: xr.Dataset) -> str:
 
 
 def number(values: object, *, sign: bool = False, max_decimals: int = MAX_DECIMALS) -> str:
-    """Return `estimate [lower, upper]` with the decimals that its width supports; "-" without an estimate."""
+    """Return `estimate [lower, upper]` with the decimals that its width supports; "-" without an estimate.
+
+    An estimate without an interval has four digits, and says so.
+    """
     estimate, lower, upper = (float(v) for v in values)  # type: ignore[attr-defined]
     if not math.isfinite(estimate):
         return "-"
+    if math.isnan(lower) and math.isnan(upper):
+        return f"{estimate:{'+' if sign else ''}.4g} {NO_INTERVAL}"
     finite = [abs(bound - estimate) for bound in (lower, upper) if math.isfinite(bound)]
     width = max(finite, default=0.0)
     decimals = (

@@ -15,6 +15,9 @@ from scipy import special
 from tolcontact.statistics.sample import Sample
 
 CONFIDENCE = 0.95
+MIN_VARIANCE, MAX_SMALL = 10, 1000  # realizations: variances of fewer have no interval, of fewer the wider of two
+MIN_SHAPE, MAX_KURTOSIS = 1000, 3.5  # realizations, and their kurtosis: else skewness and kurtosis have no interval
+MIN_SKEW = 1e-6
 
 _LOWER, _UPPER = 0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2
 _Z = float(special.ndtri(_UPPER))
@@ -44,13 +47,17 @@ def student(freedom: float) -> float:
     return float(special.stdtrit(freedom, _UPPER))
 
 
-def from_influence(estimate: float, squares: float, count: int) -> Estimate:
+def from_influence(estimate: float, squares: float, count: int, fourths: float | None = None) -> Estimate:
     """Return an estimate whose influence function over `count` realizations has the sum of squares `squares`.
 
     The influence of a realization is its contribution to the estimate times `count`. See Serfling, Approximation Theorems of
-    Mathematical Statistics (1980), chapter 6.
+    Mathematical Statistics (1980), chapter 6. With the sum of their fourth powers, `fourths`, Student's t has as many degrees
+    of freedom as the spread of the influences is known by: fewer if it comes from few realizations.
     """
-    half = student(count - 1) * math.sqrt(squares / count / (count - 1))
+    freedom = count - 1.0
+    if fourths is not None and squares > 0:
+        freedom = min(max(2 * count / max(count * fourths / squares**2 - 1, 1e-12), 1.0), freedom)
+    half = student(freedom) * math.sqrt(squares / count / (count - 1))
     return Estimate(float(estimate), float(estimate - half), float(estimate + half))
 
 
@@ -62,12 +69,19 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Callable[
     return from_influence(estimate, squares * influences.widening**2, x.count)
 
 
+def is_shape_known(x: Sample) -> bool:
+    """Return whether skewness and kurtosis have an interval: their spread depends on moments that few samples tell."""
+    return x.count >= MIN_SHAPE and x.standardized_moments[1] < MAX_KURTOSIS
+
+
 def skewness(x: np.ndarray | Sample) -> Estimate:
     """Return the third central moment over the cube of the standard deviation; 0 for a symmetric distribution."""
     x = Sample.of(x)
     if is_constant(x):
         return UNDEFINED
     skew, _ = x.standardized_moments
+    if not is_shape_known(x):
+        return Estimate(skew, math.nan, math.nan)
     return from_standardized_influence(x, skew, lambda z: z**3 - 3 * z - skew - 1.5 * skew * (z**2 - 1))
 
 
@@ -77,17 +91,38 @@ def kurtosis(x: np.ndarray | Sample) -> Estimate:
     if is_constant(x):
         return UNDEFINED
     skew, kurt = x.standardized_moments
+    if not is_shape_known(x):
+        return Estimate(kurt, math.nan, math.nan)
     return from_standardized_influence(x, kurt, lambda z: z**4 - kurt - 4 * skew * z - 2 * kurt * (z**2 - 1))
 
 
 def variance(x: np.ndarray | Sample) -> Estimate:
-    """Return the variance with Bonett's interval (2006): on the log scale, standard error from the fourth moment."""
+    """Return the variance with the interval of Hall's transformation (1992), which knows how skewed squares are.
+
+    Of small samples it is Bonett's if that reaches farther (see variance_from_moments); the smallest have none.
+    """
     x = Sample.of(x)
-    estimate, lower, upper = (float(value) for value in variance_from_moments(x.count, *x.moments))
+    estimate, *bonett = (float(value) for value in variance_from_moments(x.count, *x.moments))
+    if x.count < MIN_VARIANCE:
+        return Estimate(estimate, math.nan, math.nan)
+    if not estimate > 0:
+        return Estimate(estimate, *bonett)
+    _, kurt = x.standardized_moments
+    deviation = math.sqrt(max(kurt - 1, 0.0))  # of squares, relative to their mean
+    skew = (x.sixth_moment - 3 * kurt + 2) / deviation**3 if deviation > 0 else 0.0
     widening = x.map(lambda piece: (piece - x.mean) ** 2).widening
-    if widening == 1.0 or not estimate > 0:
-        return Estimate(estimate, lower, upper)
-    return Estimate(estimate, estimate * (lower / estimate) ** widening, estimate * (upper / estimate) ** widening)
+    lower, upper = (1 - deviation * _back(sign * _Z * widening, skew, x.count) for sign in (1, -1))
+    lower, upper = estimate * max(lower, 0.0), estimate * upper
+    if x.count < MAX_SMALL:
+        lower, upper = min(lower, bonett[0]), max(upper, bonett[1])
+    return Estimate(estimate, min(lower, estimate), max(upper, estimate))
+
+
+def _back(z: float, skew: float, count: int) -> float:
+    """Return the standard errors, over the root of the count, that Hall's transformation takes to z."""
+    if abs(skew) < MIN_SKEW:
+        return z / math.sqrt(count)
+    return float(3 / skew * (np.cbrt(1 + skew * (z / math.sqrt(count) - skew / (6 * count))) - 1))
 
 
 def standard_deviation(x: np.ndarray | Sample, *, times: float = 1.0) -> Estimate:
@@ -154,12 +189,14 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
         (a - sample.mean) ** 2 / variance_sample - (b - baseline.mean) ** 2 / variance_baseline
         for a, b in zip(sample.pieces(), baseline.pieces(), strict=True)
     ), sample.replicate)  # fmt: skip
-    squares = sum((piece**2).sum() for piece in influence.pieces())
-    # The correction for small samples is Bonett's for one variance.
-    n = sample.count
-    factor = np.exp(influence.widening * _Z * n / (n - _Z) * np.sqrt((squares / n + 3 / n) / (n - 1)))
-    ratio = variance_sample / variance_baseline
-    return Estimate(ratio, float(ratio / factor), float(ratio * factor))
+    squares = sum(float((piece**2).sum()) for piece in influence.pieces())
+    fourths = sum(float((piece**4).sum()) for piece in influence.pieces())
+    ratio, n = variance_sample / variance_baseline, sample.count
+    if n < MIN_VARIANCE:
+        return Estimate(ratio, math.nan, math.nan)
+    # The addition for small samples is Bonett's for one variance.
+    half = from_influence(0.0, squares + 3, n, fourths).upper * influence.widening
+    return Estimate(ratio, ratio * math.exp(-half), ratio * math.exp(half))
 
 
 def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

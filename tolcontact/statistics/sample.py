@@ -80,6 +80,12 @@ class Sample:
         return float(sums[0] / self.count), float(sums[1] / self.count)
 
     @cached_property
+    def sixth_moment(self) -> float:
+        """The sixth moment of the standardized values."""
+        scale = np.sqrt(self.moments[0])
+        return float(sum((((piece - self.mean) / scale) ** 6).sum() for piece in self.pieces()) / self.count)
+
+    @cached_property
     def standardized_moments(self) -> tuple[float, float]:
         """The third and the fourth moment of the standardized values."""
         scale, sums = np.sqrt(self.moments[0]), np.zeros(2)

@@ -16,13 +16,18 @@ drawn anew, given these, the group at place m has
 
     Sh = mean((f(A) - f_m)^2 - (f(A) - f_{m+1})^2) / mean((f(A) - f_0)^2)
 
-Each is a ratio of means over independent base realizations, so its interval is that of Student's t for its influence function.
+Each is a ratio of means over independent base realizations, so its interval is that of Student's t for its influence function,
+with as many degrees of freedom as the spread of the influences is known by. A measure that contact nearly always holds at a
+stop has its variance from few realizations: from fewer than 100, an index has no interval.
 """
+
+import math
 
 import numpy as np
 
 from tolcontact.statistics.intervals import UNDEFINED, Estimate, from_influence
 
+MIN_EFFECTIVE = 100  # realizations that carry the variance: from fewer an index has no interval
 CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
 
 
@@ -58,5 +63,8 @@ def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
 def ratio(u: np.ndarray, v: np.ndarray) -> Estimate:
     """Return the mean of u over the mean of v, of the same realizations, with the interval of its influence function."""
     mean_v = v.mean()
-    estimate = u.mean() / mean_v
-    return from_influence(estimate, (((u - estimate * v) / mean_v) ** 2).sum(), len(u))
+    estimate = float(u.mean() / mean_v)
+    if not v.sum() ** 2 >= MIN_EFFECTIVE * (v**2).sum():
+        return Estimate(estimate, math.nan, math.nan)
+    squares = ((u - estimate * v) / mean_v) ** 2
+    return from_influence(estimate, float(squares.sum()), len(u), float((squares**2).sum()))
