@@ -76,7 +76,7 @@ def test_a_constant_has_no_spread():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [2, 3, 5, 10, 30])
+@pytest.mark.parametrize("size", [10, 30])
 def test_intervals_of_spreads_cover_in_small_samples(size):
     rng = np.random.default_rng(2)
     covered = np.zeros(2)
@@ -88,6 +88,12 @@ def test_intervals_of_spreads_cover_in_small_samples(size):
             estimate, lower, upper = intervals.percentile(before, percent)
             assert lower <= estimate <= upper
     assert (covered / REPEATS > 0.92).all()
+
+
+def test_the_smallest_samples_have_no_interval_of_their_spread():
+    x = np.random.default_rng(1).normal(size=9)
+    for estimate, lower, upper in (intervals.variance(x), intervals.variance_ratio(x, x[::-1] ** 2)):
+        assert estimate > 0 and np.isnan(lower) and np.isnan(upper)
 
 
 def random_poses(nominal, count, rng):
@@ -121,8 +127,10 @@ def test_fields_equal_the_plain_sums_over_realizations(magnitudes):
             assert np.abs(field[terms.FIELD_SIX_SIGMA][state, :, :3] - 6 * u[..., :3].std(axis=0, ddof=1)).max() < 1e-9
             assert np.abs(field[terms.FIELD_MEAN][state, :, 3] - few.mean(axis=0)).max() < 1e-9
             assert np.abs(field[terms.FIELD_SIX_SIGMA][state, :, 3] - 6 * few.std(axis=0, ddof=1)).max() < 1e-9
-            expected = [intervals.standard_deviation(few[:, v], times=6)[1:] for v in range(0, few.shape[1], 50)]
-            assert np.allclose(field[terms.FIELD_INTERVAL][state, ::50], expected, rtol=1e-6, atol=1e-9)
+            moments = (((few - few.mean(axis=0)) ** power).mean(axis=0)[::50] for power in (2, 4))
+            expected = 6 * np.sqrt(intervals.variance_from_moments(magnitudes, *moments)[1:])
+            found = field[terms.FIELD_INTERVAL][state, ::50]
+            assert np.allclose(found, expected.T, rtol=1e-6, atol=1e-9, equal_nan=magnitudes == 2)
 
 
 def test_sums_of_fields_go_on_from_where_they_were():

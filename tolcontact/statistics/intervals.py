@@ -200,7 +200,10 @@ def variance_ratio(sample: np.ndarray | Sample, baseline: np.ndarray | Sample) -
 
 
 def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `variance` from the second and the fourth central moment of samples, arrays of any shape."""
+    """Return variances from the second and the fourth central moment of samples, arrays of any shape.
+
+    The intervals are Bonett's (2006): on the log scale, standard errors from the fourth moment. The smallest samples have none.
+    """
     moment2, moment4 = np.asarray(moment2), np.asarray(moment4)
     with np.errstate(invalid="ignore", divide="ignore"):
         kurtosis = np.where(moment2 > 0, moment4 / moment2**2, 1.0)
@@ -208,6 +211,8 @@ def variance_from_moments(count: int, moment2: ArrayLike, moment4: ArrayLike) ->
     error = correction * np.sqrt(np.maximum(kurtosis - 1 + 3 / count, 0) / (count - 1))
     estimate = moment2 * count / (count - 1)
     middle = correction * estimate
+    if count < MIN_VARIANCE:
+        return estimate, np.full(estimate.shape, np.nan), np.full(estimate.shape, np.nan)
     return estimate, np.minimum(middle * np.exp(-_Z * error), estimate), middle * np.exp(_Z * error)
 
 
