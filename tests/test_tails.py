@@ -12,46 +12,78 @@ import tolcontact as tc
 from tests import cases
 from tests.helpers import PAPER, SEATED, call, nightly
 from tolcontact.analyses.engine import Engine
-from tolcontact.analyses.tails import BISECTIONS, INFLATIONS, not_assemblable, simulated_scores
+from tolcontact.analyses.tails import not_assemblable
 from tolcontact.simulation import map_blocks
-from tolcontact.statistics.rare_events import REPLICATES, mean_probability, tail_probability
+from tolcontact.statistics.intervals import Estimate
+from tolcontact.statistics.rare import Tail, either, tail_probability
 from tolcontact.variation.plans import uniform
 
 TWELVE = np.ones(12) / np.sqrt(12)
+SLOPES = np.geomspace(0.1, 1.0, 20)
 TAILS = {
     "plane": (lambda u: u @ TWELVE - 4.5, 12, stats.norm.sf(4.5)),
     "two sides": (lambda u: np.abs(u[:, 0]) - 4, 12, 2 * stats.norm.sf(4)),
     "corner": (lambda u: np.minimum(u[:, 0] - 2, u[:, 1] - 2.5), 6, stats.norm.sf(2) * stats.norm.sf(2.5)),
     "steps": (lambda u: np.floor(2 * (u @ TWELVE - 4)) + 0.5, 12, stats.norm.sf(4)),
-}
+    # The way that moves in large units hides the likely one.
+    "two ways": (lambda u: np.maximum(0.1 * u[:, 0], u[:, 1] - 3.5) - 0.5, 2, 1 - stats.norm.cdf(5) * stats.norm.cdf(4)),
+    "twenty regions": (
+        lambda u: (SLOPES * (np.hstack([u, -u]) - 4.5)).max(axis=1), 10, 1 - (1 - 2 * stats.norm.sf(4.5)) ** 10,
+    ),
+    "yes or no": (lambda u: np.where(np.abs(u[:, :3].sum(axis=1)) > 4.9 * np.sqrt(3), 1.0, -1.0), 6, 2 * stats.norm.sf(4.9)),
+    "parabola": (
+        lambda u: u[:, 1] + 0.5 * (u[:, 0] - 0.1) ** 2 - 9, 2,
+        stats.norm.expect(lambda x: stats.norm.sf(9 - 0.5 * (x - 0.1) ** 2), lb=-12, ub=12, epsabs=0, limit=500),
+    ),
+}  # fmt: skip
+NIGHTLY = [name for name in TAILS if name not in ("two ways", "twenty regions", "yes or no")]
 
 
-@pytest.mark.nightly
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["corner", *nightly(*(name for name in TAILS if name != "corner"))])
+@pytest.mark.parametrize("name", ["two ways", "twenty regions", "yes or no", *nightly(*NIGHTLY)])
 def test_intervals_cover_known_tails(name):
-    """Estimates from 40 000 realizations each; of 500, two standard errors of a coverage of 95 % are 2 %."""
+    """Estimates from 100 000 realizations each, 100 of them: a coverage of 95 % is then above 88 % in 999 of 1000 tests."""
     score, dimensions, truth = TAILS[name]
-    repeats = 500 if name == "plane" else 120
-    found = np.array(
-        [tail_probability(score, dimensions, samples=40_000, rng=np.random.default_rng(seed)) for seed in range(repeats)]
-    )
-    covered = ((found[:, 1] <= truth) & (truth <= found[:, 2])).mean()
-    assert abs(covered - 0.95) <= 3 * np.sqrt(0.95 * 0.05 / repeats)
-    error = found[:, 0].std() / np.sqrt(repeats)
-    assert abs(found[:, 0].mean() - truth) < 3 * error + 0.02 * truth
-    assert np.median(found[:, 2] - found[:, 1]) / 2 < 0.35 * truth
+    leads, found = name != "yes or no", []
+    for seed in range(100):
+        tail = tail_probability(score, dimensions, samples=100_000, rng=np.random.default_rng(seed), leads=leads)
+        found.append([*tail.probability, tail.disagreement])
+    estimate, lower, upper, disagreement = np.array(found).T
+    is_covered = (lower <= truth) & (truth <= upper)
+    assert (is_covered | (disagreement > 1)).mean() >= 0.88 and (disagreement > 1).mean() < 0.15
+    assert abs(np.median(estimate) / truth - 1) < 0.03 and np.median(upper / estimate) < 1.15
+
+
+def test_searches_that_disagree_say_so():
+    """A box that inflation does not see beside a plane that it sees: P = 5e-5, nearly all of it in the box."""
+
+    def score(u):
+        box = np.minimum(np.minimum(-3.85 - u[:, 0], u[:, 0] + 4.1), 1.0 - np.abs(u[:, 1:3]).max(axis=1))
+        return np.maximum(u[:, 0] - 5.2, box)
+
+    truth = stats.norm.sf(5.2) + (stats.norm.sf(3.85) - stats.norm.sf(4.1)) * (1 - 2 * stats.norm.sf(1)) ** 2
+    tails = [tail_probability(score, 3, samples=20_000, rng=np.random.default_rng(seed)) for seed in range(40)]
+    missed = [tail for tail in tails if not tail.probability.lower <= truth <= tail.probability.upper]
+    assert sum(tail.disagreement == 1 for tail in missed) <= 4
+
+
+def test_probabilities_of_sides_add_up():
+    tails = [Tail(Estimate(3e-5, 2e-5, 5e-5), 1.0), Tail(Estimate(4e-5, 1e-5, 8e-5), 1.7), Tail(Estimate(0.0, 0.0, 0.0), 1.0)]
+    assert either(tails[:1]).probability == pytest.approx(tails[0].probability)
+    probability, disagreement = either(tails)
+    assert probability == pytest.approx((7e-5, 7e-5 - np.hypot(1e-5, 3e-5), 7e-5 + np.hypot(2e-5, 4e-5)))
+    assert disagreement == 1.7
 
 
 def test_what_is_not_rare_is_counted():
     rng = np.random.default_rng(1)
-    _, lower, upper = tail_probability(lambda u: u[:, 0] + 0.5, 3, samples=20_000, rng=rng)
+    (_, lower, upper), _ = tail_probability(lambda u: u[:, 0] + 0.5, 3, samples=20_000, rng=rng)
     assert lower < stats.norm.cdf(0.5) < upper and upper - lower < 0.02
 
 
 def test_what_is_never_seen_is_at_most_what_no_hit_says():
     rng = np.random.default_rng(1)
-    estimate, lower, upper = tail_probability(lambda u: np.full(len(u), -1.0), 3, samples=20_000, rng=rng)
+    (estimate, lower, upper), _ = tail_probability(lambda u: np.full(len(u), -1.0), 3, samples=20_000, rng=rng)
     assert (estimate, lower) == (0, 0) and 1e-4 < upper < 1e-3
 
 
@@ -85,24 +117,31 @@ def test_ra1_as_a_run_counts_it(samples):
 
 
 @pytest.mark.slow
-def test_parts_are_led_to_where_they_do_not_go_together():
-    """CASES C6, rotations alone: the least inflation of all deviations at which parts do not go together, by looking at all."""
+def test_normal_scores_are_drawn_as_in_a_run():
+    """CASES C6, rotations alone; larger deviations do not make assembly possible again."""
     program = tc.build(cases.square_pins("rotations"), solver="daqp", method=SEATED)
-    engine = Engine(program, map_blocks)
-    score = not_assemblable(engine)
+    score = not_assemblable(Engine(program, map_blocks))
     u = np.random.default_rng(3).standard_normal((24, len(program.draws.varying)))
-    every = np.stack([score_of(engine, factor * u) for factor in INFLATIONS])
-    assert (every[1:] >= every[:-1]).all()  # what does not go together does not with larger deviations either
-    assert score(u) == pytest.approx(0.5 - np.where(every.any(axis=0), every.argmax(axis=0), len(every)))
-    assert 2**BISECTIONS == len(INFLATIONS) + 1
+    stuck = np.stack([score(factor * u) for factor in 1.3 ** np.arange(7)])
+    assert (stuck[1:] >= stuck[:-1]).all() and set(np.unique(stuck)) == {-1.0, 1.0}
     of_run = program.draws(seed=1, start=0, stop=24)
     again = program.draws.from_numbers(lambda label: uniform(1, label, 0, 24), 24)
     assert np.array_equal(again, of_run)
 
 
-def score_of(engine, u):
-    _, status = simulated_scores(engine, u)
-    return status == tc.Status.NOT_ASSEMBLABLE
+@pytest.mark.slow
+@pytest.mark.parametrize("limits", [(0.0, 4.0), (0.0, None)])
+def test_a_limit_at_a_stop_hides_nothing(limits):
+    """CASES C1: the height max(0, g), g ~ N(0, 1), is never below 0, and how seldom it is above 4 does not depend on that."""
+    a = cases.one_dimensional(0)
+    a.measure("kept", a.parts[1].point(5, 5, 10), along="z", limits=limits)
+    found = tc.tails(a, samples=8000, solver="daqp", method=PAPER)
+    estimate, lower, upper = found.probability.values[0]
+    assert found.stop.values.tolist() == [1]
+    if limits[1] is None:
+        assert estimate == 0 and upper < 2e-3
+    else:
+        assert lower < stats.norm.sf(4) < upper < 1.5 * estimate
 
 
 def test_what_has_no_rare_event_is_refused():
@@ -152,12 +191,3 @@ def test_the_command_prints_a_table_json_and_csv(tmp_path):
     assert {"event", "estimate", "lower", "upper"} <= set(table)
     assert call(tmp_path, *options, "--csv", "--json").returncode == 2
     assert call(tmp_path, "tails", model, "--samples", "10").returncode == 2
-
-
-@pytest.mark.parametrize("count", [3, REPLICATES])
-def test_the_interval_of_estimates_is_that_of_their_logarithm(count):
-    """Student's t for as many estimates as there are, less one; at most 1."""
-    for scale in (1e-6, 0.6):
-        values = np.linspace(0.5, 1.5, count)
-        reach = np.exp(stats.t.ppf(0.975, count - 1) * stats.sem(values))
-        assert mean_probability(scale * values) == pytest.approx((scale, scale / reach, min(scale * reach, 1.0)))

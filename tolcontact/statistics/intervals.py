@@ -66,7 +66,9 @@ def from_standardized_influence(x: Sample, estimate: float, influence: Callable[
     scale = np.sqrt(x.moments[0])
     influences = x.map(lambda piece: influence((piece - x.mean) / scale))
     squares = sum(float((piece**2).sum()) for piece in influences.pieces())
-    return from_influence(estimate, squares * influences.widening**2, x.count)
+    fourths = sum(float((piece**4).sum()) for piece in influences.pieces())
+    widening = influences.widening
+    return from_influence(estimate, squares * widening**2, x.count, fourths * widening**4)
 
 
 def is_shape_known(x: Sample) -> bool:
