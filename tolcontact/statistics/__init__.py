@@ -24,23 +24,33 @@ distribution, because contact truncates distributions.
 | estimate | interval |
 |---|---|
 | mean | Student's t |
-| standard deviation, 6 sigma, variance | Bonett's, from the fourth moment |
+| standard deviation, 6 sigma, variance | Hall's (1992), from the sixth moment; below 1000 realizations Bonett's if wider |
+| magnitude of displacement fields | Bonett's (2006), from the fourth moment |
 | percentiles 0.135, 5, 50, 95, 99.865 | order statistics; a bound is infinite if the sample is too small |
 | share below, above and outside the limits, touched by contact, not assemblable | Clopper-Pearson |
-| Pp, Ppk by percentiles (ISO 22514-2) | joint ranks of three percentiles, from the multinomial distribution |
+| Pp, Ppk by percentiles (ISO 22514-2) | order statistics about three percentiles, on the safe side |
 | skewness, kurtosis, Pp and Ppk for a normal distribution | influence functions (delta method) |
 | Sobol' indices, share that linear sensitivities miss | influence functions of ratios of means |
-| probabilities of rare events (`tc.tails`) | Student's t over 16 subset simulations |
+| probabilities of rare events (`tc.tails`) | that of importance sampling, or of two searches |
 | change: shift of the mean | Student's t on the differences of the same draws |
 | change: ratio of 6 sigma, ratio of variance | from the same draws, on the log scale |
 
 For a run with a sampling plan and 16 replicates or more, the intervals of the mean, the standard deviation, percentiles,
 shares outside, shape and changes follow from the differences between replicates (their design effect).
 
-Shares outside and capability are given only for measures with limits. Skewness and kurtosis need many realizations: with 10
-000 realizations of a skewed distribution, their intervals cover the true value in about 90 % of runs, not 95 %. A measure that
-evaluates to NaN does not stop the run; its statistics are NaN, and the table shows "-". Statistics always cover all finished
-realizations, whatever their status.
+Shares outside and capability are given only for measures with limits. Contact often keeps a measure exactly at a stop, and
+solvers find it to some 1e-13 mm, on either side. So a value counts as beyond a limit only if it is beyond by more than the
+accuracy of the measure: 1e-8 mm, the accuracy of gaps in a certified realization, times what such a gap does to the measure
+where that is more (`measure_accuracy` in the archive). `tc.summarize`, `--until`, `compare`, `tails`, `allocate` and
+`relocate` all use this rule. If the outer percentile of the values is the limit itself, and none lies beyond, the limit is a
+stop: capability leaves this side out, and the table says so. What varies by less than its accuracy is constant.
+
+Some estimates have no interval, "[-]" in tables: spreads of fewer than 10 realizations; skewness and kurtosis, unless there
+are 1000 realizations with a kurtosis below 3.5, since heavy tails show in few realizations; and Sobol' indices if fewer than
+100 realizations carry the variance, as of a measure that contact holds at a stop. An infinite bound needs more realizations: a
+bound of Ppk some 2800. `studies/verification` shows how often each interval covers the truth. COVERAGE
+A measure that evaluates to NaN does not stop the run; its statistics are NaN, and the table shows "-". Statistics always cover
+all finished realizations, whatever their status.
 
 >>> change = summary.change.sel(measure="height", change_of="ratio of 6 sigma")
 >>> bool(change.sel(interval="upper") < 1)  # contact reduces the spread, at 95 % confidence

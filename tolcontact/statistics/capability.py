@@ -11,6 +11,7 @@ are 3 and 6 standard deviations.
 """
 
 import math
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -80,11 +81,13 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
     pp, ppk = UNDEFINED, UNDEFINED
     if np.isfinite(limits.lower) and np.isfinite(limits.upper):
         worst, best = _pp(least[0], most[2], limits), _pp(most[0], least[2], limits)
-        pp = _with_interval(_pp(low, high, limits), worst, best)
+        pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
-        worst = np.fmin(*(_ppk(least[0], median_, most[2], limits) for median_ in (least[1], most[1])))
-        best = np.fmax(*(_ppk(most[0], median_, least[2], limits) for median_ in (least[1], most[1])))
-        ppk = _with_interval(_ppk(low, median, high, limits), worst, best)
+        # Sides that are equally near must not make the least of them look worse: of the upper bounds of all, it is the least.
+        worst = np.stack([_sides(least[0], middle, most[2], limits) for middle in (least[1], most[1])])
+        best = np.stack([_sides(most[0], middle, least[2], limits) for middle in (least[1], most[1])])
+        worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
+        ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, list(np.fmax.reduce(best, axis=0)))
     return pp, ppk
 
 
@@ -116,22 +119,23 @@ def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np
         return np.divide(limits.upper - limits.lower, np.maximum(np.subtract(high, low), 0.0))
 
 
-def _ppk(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np.ndarray:
+def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
+    """Return the index of each side that has a limit."""
     lower, upper, _ = limits
+    above, below = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        upper_index = np.divide(upper - median, np.maximum(np.subtract(high, median), 0.0)) if np.isfinite(upper) else np.inf
-        lower_index = (
-            np.divide(np.subtract(median, lower), np.maximum(np.subtract(median, low), 0.0)) if np.isfinite(lower) else np.inf
-        )
-    return np.fmin(upper_index, lower_index)
+        sides = [(lower, np.divide(np.subtract(median, lower), below)), (upper, np.divide(np.subtract(upper, median), above))]
+    return [index for limit, index in sides if np.isfinite(limit)]
 
 
-def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: np.ndarray) -> Estimate:
+def _with_interval(estimate: np.ndarray, worst: np.ndarray, best: Sequence[np.ndarray]) -> Estimate:
     """Return an estimate with the interval that covers 95 % of simulated indices, of which the worst and the best are known."""
-    worst, best = np.where(np.isnan(worst), 0.0, worst), np.where(np.isnan(best), np.inf, best)
-    low = np.quantile(worst, 0.5 - CONFIDENCE / 2, method="inverted_cdf")
-    high = np.quantile(best, 0.5 + CONFIDENCE / 2, method="inverted_cdf")
-    return Estimate(float(estimate), float(min(low, estimate)), float(max(high, estimate)))
+    low = np.quantile(np.where(np.isnan(worst), 0.0, worst), 0.5 - CONFIDENCE / 2, method="inverted_cdf")
+    highs = [
+        np.quantile(np.where(np.isnan(of_side), np.inf, of_side), 0.5 + CONFIDENCE / 2, method="inverted_cdf")
+        for of_side in best
+    ]
+    return Estimate(float(estimate), float(min(low, estimate)), float(max(min(highs), estimate)))
 
 
 def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:

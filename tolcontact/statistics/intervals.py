@@ -62,7 +62,12 @@ def from_influence(estimate: float, squares: float, count: int, fourths: float |
 
 
 def from_standardized_influence(x: Sample, estimate: float, influence: Callable[[np.ndarray], np.ndarray]) -> Estimate:
-    """Return an estimate whose influence function is given as a function of the standardized values."""
+    """Return an estimate whose influence function is given as a function of the standardized values.
+
+    It has no interval if the sample is too small.
+    """
+    if x.count < MIN_VARIANCE:
+        return Estimate(float(estimate), math.nan, math.nan)
     scale = np.sqrt(x.moments[0])
     influences = x.map(lambda piece: influence((piece - x.mean) / scale))
     squares = sum(float((piece**2).sum()) for piece in influences.pieces())

@@ -17,7 +17,7 @@ from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import APART, contact_lines, measure_rows, overview_cells, pair_columns, pair_rows
+from tolcontact.report.text.summary import contact_lines, measure_rows, notes, overview_cells, pair_columns, pair_rows
 from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
@@ -155,8 +155,8 @@ def _details(summary: xr.Dataset) -> list[dict[str, Any]]:
     """Return all estimates of each measure as rows of texts."""
     details = []
     for measure in summary["measure"].values:
-        rows, is_marked = measure_rows(summary.sel(measure=measure))
-        details.append({"name": str(measure), "rows": rows, "note": APART if is_marked else ""})
+        rows = measure_rows(summary.sel(measure=measure))
+        details.append({"name": str(measure), "rows": rows, "note": "; ".join(notes(rows))})
     return details
 
 

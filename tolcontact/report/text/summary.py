@@ -1,7 +1,7 @@
 """The summary of a run as text."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import xarray as xr
@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
-from tolcontact.report.figures import grouped, limits_text, number, percent, share
+from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, share
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
     ABOVE,
@@ -33,6 +33,7 @@ CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIA
 SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
 PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
 APART = "* differs from the index by percentiles: the measure is not normally distributed"
+WITHOUT = f"{NO_INTERVAL} no interval: spreads need 10 realizations; shapes need 1000, and light tails"
 
 
 def summary_text(summary: xr.Dataset) -> Group:
@@ -75,10 +76,9 @@ def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
         measure = summary.sel(measure=name)
         yield Text(f"\n{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}", style="bold")
         if limits_text(measure):
-            rows, is_marked = measure_rows(measure.sel(statistic=[*SHARES, *CAPABILITY]))
+            rows = measure_rows(measure.sel(statistic=[*SHARES, *CAPABILITY]))
             yield FigureTable(["", RAW, CORRECTED], [row[:-1] for row in rows])
-            if is_marked:
-                yield Text(APART)
+            yield from map(Text, notes(rows))
 
 
 def _overview(summary: xr.Dataset) -> FigureTable:
@@ -101,15 +101,21 @@ def _measure_section(measure: xr.Dataset, name: str) -> Iterator[Text | FigureTa
     units, quantity = str(measure["measure_units"].values), str(measure["measure_quantity"].values)
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
     yield Text(f"\n{name} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
-    rows, is_marked = measure_rows(measure)
+    rows = measure_rows(measure)
     yield FigureTable(["", RAW, CORRECTED, "change"], rows)
-    if is_marked:
-        yield Text(APART)
+    yield from map(Text, notes(rows))
 
 
-def measure_rows(measure: xr.Dataset) -> tuple[list[list[str]], bool]:
-    """Return rows of label, raw, corrected and change of a measure, and True if one is marked by * (see APART)."""
-    rows, is_marked = [], False
+def notes(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return what marks in the cells of `measure_rows` mean."""
+    cells = [cell for row in rows for cell in row]
+    marks = {APART: any(cell.startswith("*") for cell in cells), WITHOUT: any(NO_INTERVAL in cell for cell in cells)}
+    return [note for note, is_there in marks.items() if is_there]
+
+
+def measure_rows(measure: xr.Dataset) -> list[list[str]]:
+    """Return rows of label, raw, corrected and change of a measure; an index apart from that by percentiles is marked by *."""
+    rows = []
     for statistic in measure["statistic"].values:
         values = [measure["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
         if statistic in (*SHARES, *CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
@@ -122,13 +128,13 @@ def measure_rows(measure: xr.Dataset) -> tuple[list[list[str]], bool]:
             counterpart = measure["statistic_value"].sel(statistic=PERCENTILE_COUNTERPART[statistic])
             for k, state in enumerate((RAW, CORRECTED)):
                 if _are_disjoint(values[k], counterpart.sel(state=state).values):
-                    figures[k], is_marked = f"* {figures[k]}", True
+                    figures[k] = f"* {figures[k]}"
         change = ""
         if statistic in CHANGE_OF_STATISTIC:
             ratio = measure["change"].sel(change_of=CHANGE_OF_STATISTIC[statistic]).values
             change = number(ratio, sign=True) if statistic == "mean" else percent(ratio - 1, sign=True)
         rows.append([label, *figures, change])
-    return rows, is_marked
+    return rows
 
 
 def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
