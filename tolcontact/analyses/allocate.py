@@ -25,6 +25,7 @@ STEP = 0.1  # of ranges, for differences
 BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS = 24  # of one search
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
+COMMON_FACTORS = np.geomspace(0.1, 3.0, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
 VERIFICATION_FACTOR = 4  # realizations of a verification, times samples
@@ -45,6 +46,8 @@ def allocate(
         kept         (requirement, stage, interval)      the share outside of the limits, or the Ppk, in a fresh run of
                                                          4 samples realizations, with its 95 % interval
         required     (requirement)                       the share or the Ppk that is required
+        met          (requirement)                       1: kept in the fresh run after; 0: it cannot be met, and `kept` is the
+                                                         best that was reached
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
@@ -76,13 +79,14 @@ def allocate(
     curves = _curves(costs, groups)
     trials = ScaledTrials(analysis.engine(), list(groups.values()), seed, samples)
     prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
-    logs, estimates = _allocated(trials, requirements, prices, progress)
+    logs, estimates, is_met = _allocated(trials, requirements, prices, progress)
     factors = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
     values = {
         "range": np.array(_ranges(program, groups))[:, None] * factors,
         "factor": factors[:, 1],
         "cost": [[_cost(curve, factor) for factor in row] for curve, row in zip(prices.curves, factors, strict=True)],
         "kept": np.array(estimates).swapaxes(0, 1),
+        "met": np.array(is_met, dtype=np.int8),
         "required": [requirement.value for requirement in requirements],
         "effect": _effects(trials, program),
     }
@@ -174,8 +178,11 @@ def _cost(curve: Cost, factor: float) -> float:
 
 def _allocated(
     trials: ScaledTrials, requirements: Sequence[Requirement], prices: Prices, progress: Progress | None
-) -> tuple[np.ndarray, list[list[Estimate]]]:
-    """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after."""
+) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
+    """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after.
+
+    The last one is whether each requirement is kept after (requirement,).
+    """
     search, logs = Search(trials, requirements, prices), np.zeros(len(trials))
     corrected = trials.corrected(np.ones(len(trials)), verification=1)
     before = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
@@ -189,7 +196,11 @@ def _allocated(
         if (margins >= 0).all():
             break
         aims += np.maximum(-margins, 0.0)
-    return logs, [before, [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]]
+    else:
+        logs = search.least_missing(logs)
+        corrected = trials.corrected(np.exp(logs), verification=2 + VERIFICATIONS)
+    after = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
+    return logs, [before, after], _margins(requirements, corrected) >= 0
 
 
 def _margins(requirements: Sequence[Requirement], corrected: np.ndarray) -> np.ndarray:
@@ -226,6 +237,18 @@ class Search:
             else:
                 radius /= 2
         return logs
+
+    def least_missing(self, logs: np.ndarray) -> np.ndarray:
+        """Return the point that misses the requirements least: `logs`, or all ranges that may change times one factor.
+
+        Margins lead to where a quantile is near its limit, which may be far from where most values are.
+        """
+        common = [np.where(self.prices.is_free, log, 0.0) for log in np.log(COMMON_FACTORS)]
+        return min([logs, *common], key=self._missing)
+
+    def _missing(self, logs: np.ndarray) -> float:
+        corrected = self.trials.corrected(np.exp(logs))
+        return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
 
     def _margins(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
         return _margins(self.requirements, self.trials.corrected(np.exp(logs))) - aims

@@ -67,6 +67,12 @@ class Requirement:
         ]
         return float(min(sides))
 
+    def shortfall(self, x: np.ndarray) -> float:
+        """Return by how much of the required value values (n,) miss it; 0 if they keep it."""
+        reached = self.estimate(x).value
+        missing = reached - self.value if self.is_share else self.value - reached
+        return max(missing / self.value, 0.0) if np.isfinite(missing) else np.inf
+
     def estimate(self, x: np.ndarray) -> Estimate:
         """Return the share outside, or the Ppk, of values (n,), with its 95 % interval."""
         sample = Sample.of(x)

@@ -47,7 +47,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | exit code | meaning |
 |---|---|
 | 0 | done |
-| 1 | the run finished, but more than 0.1 % of its realizations are not converged, not assemblable, or doubtful |
+| 1 | done, but more than 0.1 % of the realizations are not resolved, or what `--until` or `--require` states is not met |
 | 2 | invalid input: one message, nothing written |
 | 130, 143 | stopped by Ctrl-C or SIGTERM; finished realizations are in the archive |
 

@@ -90,6 +90,10 @@ class AnalysisCommand:
             typer.echo(self.frame(dataset).to_csv(lineterminator="\n"), nl=False)
         else:
             console().print(analysis_text(self.record, dataset))
+        if "met" in dataset and not dataset["met"].all():
+            names = ", ".join(f'"{name}"' for name in dataset["requirement"].values[dataset["met"].values == 0])
+            typer.echo(f"error: not met: {names}", err=True)
+            raise typer.Exit(1)
 
 
 def _intervals(name: str) -> Frame:

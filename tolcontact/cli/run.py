@@ -30,6 +30,7 @@ from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.models import DEFAULT_SOLVER
 from tolcontact.workflow.run import SURFACES, run as run_model, summarize
+from tolcontact.workflow.until import Target
 
 Until = Annotated[
     str | None,
@@ -74,7 +75,8 @@ def run(
 ) -> None:
     """Simulate a model with and without contact, and print the statistics of its measures.
 
-    The exit code is 1 if more than 0.1 % of the realizations were not resolved: not converged, not assemblable, or doubtful.
+    The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
+    and if an interval is not as narrow as --until states.
     """
     if out is None and (overwrite or resume):
         raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
@@ -101,6 +103,11 @@ def run(
         summary = summarize(results)
         if report is not None:
             write_page(results, summary, report)
+        shortfall = Target.of(until).shortfall(results) if until is not None else ""
         print_summary(summary)
     if out is not None:
         typer.echo(f"\narchive: {shown(str(out))}")
+    if shortfall:
+        if quiet:  # else the log has said it
+            typer.echo(shortfall, err=True)
+        raise typer.Exit(1)

@@ -236,6 +236,12 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
         *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
     ]
     notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals.\n"]
+    met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
+    for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
+        text = share if f": {terms.PPM}" in str(name) else number
+        notes.append(
+            f'"{name}" is not met by ranges from a tenth to three times the present ones; the best found: {text(values[1])}.\n'
+        )
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
 
 

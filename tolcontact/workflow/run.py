@@ -1,5 +1,6 @@
 """Runs: from a declared assembly to an archive in one call, and the statistics of its results."""
 
+import logging
 import tempfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -21,6 +22,8 @@ from tolcontact.workflow.until import Target, announce
 
 SURFACES = 64
 Progress = Callable[[int], None]
+
+log = logging.getLogger(__name__)
 
 
 def run(
@@ -53,7 +56,8 @@ def run(
     `plan` is the sampling plan: "monte-carlo", "latin hypercube" or "sobol" (see tolcontact.variation). The latter two draw
     replicates of 256 realizations; from 16 replicates on, intervals come from the replicates and are narrower.
     `until` states how narrow the 95 % interval of a corrected measure must become, for example "corner height: 6 sigma +-1 %",
-    "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until it is.
+    "gap: mean +-0.001" or "gap: ppm +-20 %". The run then starts with `samples` realizations and adds more until it is. If that
+    takes too many, it stops, and a warning is logged.
     `client` is a client of dask.distributed. Its workers simulate, this process writes, and the results are the same to the
     last bit (see tolcontact.simulation).
     `surfaces` is the number of certified realizations that are checked against the surfaces between contact points at the end.
@@ -76,10 +80,14 @@ def run(
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
 
     if out is None:
-        return _results_in_memory(write, overwrite=overwrite, resume=resume)
-    with taken(out, overwrite=overwrite, resume=resume) as path:
-        write(path)
-    return opened(path)
+        results = _results_in_memory(write, overwrite=overwrite, resume=resume)
+    else:
+        with taken(out, overwrite=overwrite, resume=resume) as path:
+            write(path)
+        results = opened(path)
+    if target and (sentence := target.shortfall(results)):
+        log.warning(sentence)
+    return results
 
 
 def _results_in_memory(write: Callable[[Path], None], **archive_options: bool) -> xr.DataTree:

@@ -6,6 +6,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+import xarray as xr
+
 from tolcontact.archive import bytes_of_rows, opened, size_in_words
 from tolcontact.child import peak_memory
 from tolcontact.compilation import Program
@@ -19,6 +21,7 @@ log = logging.getLogger(__name__)
 MIN_GROWTH, MAX_GROWTH = 1.25, 16.0
 MARGIN = 1.05  # times the realizations that the interval seems to need
 MAX_REALIZATIONS = 100_000_000
+MAX_WITHOUT_INTERVAL = 10_000  # realizations: an estimate that has no interval then will not have one
 EXAMPLES = ("corner height: 6 sigma +-1 %", "gap: mean +-0.001")
 
 
@@ -54,24 +57,36 @@ class Target:
         """
         with opened(path) as results:
             samples = int(results.attrs["samples"])
-            estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
-        if math.isnan(estimate):
-            log.warning(
-                "%s of %s has no value (are there limits?); no more realizations are added", self.statistic, self.measure
-            )
+            estimate, half, target_half = self._widths(results)
+        is_hopeless = math.isnan(half) and samples >= MAX_WITHOUT_INTERVAL
+        if math.isnan(estimate) or half <= target_half or is_hopeless:
             return None
-        half, target_half = (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
-        if half <= target_half:
-            return None
-        growth = MARGIN * (half / target_half) ** 2 if target_half > 0 and math.isfinite(half) else MAX_GROWTH
+        growth = self._growth(half, target_half)
         if not samples * growth <= MAX_REALIZATIONS:
-            log.warning(
-                "stopped at %d realizations: %s of %s is %.6g +- %.2g; an interval of +- %.2g needs more than %d",
-                samples, self.statistic, self.measure, estimate, half, target_half, MAX_REALIZATIONS,
-            )  # fmt: skip
             return None
         rows = block_rows(program)
         return -(-int(samples * min(max(growth, MIN_GROWTH), MAX_GROWTH)) // rows) * rows
+
+    def shortfall(self, results: xr.DataTree) -> str:
+        """Return a sentence that says why the interval of finished results is not narrow enough; empty if it is."""
+        estimate, half, target_half = self._widths(results)
+        if math.isnan(estimate):
+            return f"{self.statistic} of {self.measure} has no value (are there limits?); no more realizations were added"
+        if half <= target_half:
+            return ""
+        stated = f"{estimate:.6g} without an interval" if math.isnan(half) else f"{estimate:.6g} +- {half:.2g}"
+        return f"stopped at {results.attrs['samples']} realizations: {self.statistic} of {self.measure} is {stated}; " + (
+            "more will not give one" if math.isnan(half) else f"+- {target_half:.2g} needs more than {MAX_REALIZATIONS}"
+        )
+
+    def _widths(self, results: xr.DataTree) -> tuple[float, float, float]:
+        """Return the estimate, the half-width of its interval, and the half-width that it may have."""
+        estimate, lower, upper = estimate_of(results, self.measure, self.statistic)
+        return estimate, (upper - lower) / 2, self.half * (abs(estimate) if self.is_relative else 1.0)
+
+    @staticmethod
+    def _growth(half: float, target_half: float) -> float:
+        return MARGIN * (half / target_half) ** 2 if target_half > 0 and math.isfinite(half) else MAX_GROWTH
 
 
 FIRST_TRIAL_ROWS = 4
