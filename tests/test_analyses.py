@@ -42,7 +42,7 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
         page = page_of(results, tc.summarize(results))
     assert "What matters" in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
-    assert "beyond the bound: so much is of second order" in page
+    assert "beyond the bound, which is of first order" in page
     assert "Allocation" in page and "Cost 2 before" in page
     drawn = data_of(page)["scene"]["realizations"]
     assert drawn["names"][:2] == [f"worst case: {end} corner height" for end in ("least", "largest")]

@@ -229,9 +229,17 @@ def test_summaries_are_printed_as_json_and_csv(tmp_path):
     assert found["data_vars"]["statistic_value"]["data"][0][0][lower] == [None] * 3
     done = call(tmp_path, "summary", path, "--csv")
     rows = list(csv.reader(done.stdout.splitlines()))
-    assert rows[0] == ["measure", "state", "statistic", "estimate", "lower", "upper"]
+    assert rows[0] == ["measure", "state", "statistic", "estimate", "lower", "upper", "units"]
     (row,) = [row for row in rows if row[:3] == ["height", "raw", "6 sigma"]]
-    assert [float(cell) for cell in row[3:]] == expected.tolist()
+    assert [float(cell) for cell in row[3:6]] == expected.tolist()
+    units = {row[2]: row[6] for row in rows if row[:2] == ["height", "raw"]}
+    assert (units["6 sigma"], units["variance"], units["5 %"], units["Ppk"], units["kurtosis"]) == (
+        "mm",
+        "mm^2",
+        "mm",
+        "1",
+        "1",
+    )
     done = call(tmp_path, "summary", path, "--csv", "--json")
     assert (done.returncode, done.stdout) == (2, "") and "choose one" in done.stderr
 

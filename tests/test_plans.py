@@ -136,6 +136,19 @@ def test_what_cannot_be_reached_is_said(tmp_path, caplog):
     assert results.sizes["realization"] == 64 and "needs more than 100000000" in caplog.text
     free = cases.one_dimensional(0)
     assert tc.run(free, until="height: ppm +-20 %", **options).sizes["realization"] == 64 and "limits" in caplog.text
+    free.variable("rare", tc.Tolerance(distribution=stats.t(3)), drives={"block.Z": 1.0})
+    assert tc.run(free, until="height: kurtosis +-1 %", **options).sizes["realization"] < 200_000
+    assert "more will not give one" in caplog.text  # heavy tails never have an interval
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("quiet", [(), ("--quiet",)])
+def test_the_command_says_that_an_interval_is_not_reached(quiet, tmp_path):
+    options = ("run", cases.MODELS / "ra1.py", "--samples", "64", "--surfaces", "0", "--out", "a.nc", *quiet)
+    done = call(tmp_path, *options, "--until", "corner height: mean +-1e-9")
+    assert done.returncode == 1 and "needs more than 100000000" in done.stderr and "archive: a.nc" in done.stdout
+    with tc.open_archive(tmp_path / "a.nc") as results:
+        assert results.sizes["realization"] == 64
 
 
 @pytest.mark.parametrize(

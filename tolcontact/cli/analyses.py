@@ -97,8 +97,13 @@ class AnalysisCommand:
 
 
 def _intervals(name: str) -> Frame:
-    """Return a maker of frames with the estimates of a variable, and their intervals as columns."""
-    return lambda dataset: dataset[name].to_dataset("interval").to_dataframe()[list(terms.ESTIMATE)]
+    """Return a maker of frames with the estimates of a variable, their intervals, and the units of labels as columns."""
+
+    def frame(dataset: xr.Dataset) -> Any:
+        values = dataset[name].to_dataset("interval").to_dataframe()
+        return values[[*terms.ESTIMATE, *(column for column in values if str(column).endswith("_units"))]]
+
+    return frame
 
 
 def _columns(names: list[str], dim: str) -> Frame:
@@ -179,7 +184,7 @@ COMMANDS = (
         terms.WORST_CASE,
         "Number of random combinations; searches begin at the best of them.",
         ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
-        lambda dataset: dataset[["worst", "bound", "random", "ends", "unseen"]].drop_vars("measure_units").to_dataframe(),
+        lambda dataset: dataset[["worst", "bound", "random", "ends", "unseen"]].to_dataframe(),
     ),
     AnalysisCommand(
         "allocate",

@@ -10,6 +10,7 @@ from tolcontact.cli.app import Archive, AsCsv, AsJson, app, examples, only_one
 from tolcontact.cli.output import check_page, console, print_data, print_summary
 from tolcontact.errors import shown
 from tolcontact.report import capability_text, write_page
+from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 from tolcontact.workflow.run import summarize
 
 
@@ -25,7 +26,9 @@ def summary(
     with open_archive(archive) as results:
         if as_csv:
             values = summarize(results)["statistic_value"].to_dataset("interval").to_dataframe()
-            typer.echo(values[["estimate", "lower", "upper"]].to_csv(lineterminator="\n"), nl=False)
+            statistics = values.index.get_level_values(STATISTIC)
+            values["units"] = [units_of(*each) for each in zip(statistics, values[MEASURE_UNITS.name], strict=True)]
+            typer.echo(values[[*ESTIMATE, "units"]].to_csv(lineterminator="\n"), nl=False)
         elif as_json:
             print_data(summarize(results))
         elif limits:

@@ -23,14 +23,17 @@ def console() -> Console:
 
 
 def print_data(dataset: xr.Dataset) -> None:
-    """Print a dataset as JSON; NaN and infinity, which JSON does not have, are null."""
+    """Print a dataset as JSON, which has no NaN or infinity: they are null, and the texts "Infinity" and "-Infinity"."""
     data = dataset.reset_coords()
-    finite = {
-        name: values.astype(object).where(np.isfinite(values), None)
-        for name, values in data.items()
-        if values.dtype.kind == "f"
-    }
-    typer.echo(json.dumps(data.assign(finite).to_dict(), allow_nan=False, default=_plain))
+    numbers = {name: xr.apply_ufunc(_as_json, values) for name, values in data.items() if values.dtype.kind == "f"}
+    typer.echo(json.dumps(data.assign(numbers).to_dict(), allow_nan=False, default=_plain))
+
+
+def _as_json(values: np.ndarray) -> np.ndarray:
+    objects = values.astype(object)
+    for word, places in ((None, np.isnan(values)), ("Infinity", values == np.inf), ("-Infinity", values == -np.inf)):
+        objects[places] = word
+    return objects
 
 
 def _plain(value: object) -> object:

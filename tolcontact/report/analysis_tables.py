@@ -10,6 +10,7 @@ import xarray as xr
 from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.errors import ArchiveError
+from tolcontact.limits import GAP_ACCURACY
 from tolcontact.report.figures import grouped, number, percent, share
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
@@ -185,8 +186,8 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
             rows.append([f"{state}, {end}", *cells, f"{100 * float(extreme['unseen']):.0f} %"])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
-    if beyond > 0:
-        remarks.append(f"Up to {beyond:.2g} beyond the bound: so much is of second order in the deviations.")
+    if beyond > GAP_ACCURACY:
+        remarks.append(f"Up to {beyond:.2g} beyond the bound, which is of first order in the deviations.")
     if float(dataset["unseen"].max()) > LARGE_UNSEEN:
         remarks.append("Searches ended at several values, so there may be worse ones; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"

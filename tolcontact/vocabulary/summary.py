@@ -35,6 +35,14 @@ MIDDLES = ("median", "largest")  # labels of `of_iterations`
 MEASURE_LIMITS = (*(f"measure_{bound}" for bound in BOUNDS), "measure_accuracy")  # coordinates: see Limits
 MEASURE_STOPS = "measure_stops"  # coordinate: the sides at which corrected values stop, such as "lower"
 
+
+def units_of(statistic: str, measure: str) -> str:
+    """Return the units of a statistic of a measure with some units."""
+    if statistic in (*SHARES, *CAPABILITY, SKEWNESS, KURTOSIS):
+        return "1"
+    return f"{measure}^2" if statistic == VARIANCE else measure
+
+
 STATISTIC_VALUE = ArchiveVariable(
     "statistic_value", (MEASURE, STATE, STATISTIC, INTERVAL), "f8", "estimate, in the measure's units; shares are of 1"
 )
