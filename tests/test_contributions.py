@@ -164,7 +164,7 @@ def test_what_is_drawn_together_is_one_group():
     a.correlate(["upper.A1", "middle.A1"], [[1, 0.8], [0.8, 1]])
     program = tc.build(a, solver="daqp")
     labels = list(program.nominal.contributors)
-    groups = independent_groups(program.draws, labels)
+    groups = independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool))
     assert "middle.A1 + upper.A1" in groups or "upper.A1 + middle.A1" in groups
     assert sorted(k for columns in groups.values() for k in columns) == list(range(len(labels)))
     by_part = tc.contributions(a, samples=16, solver="daqp", by="part")
@@ -231,7 +231,9 @@ def test_released_draws_do_not_depend_on_blocks_and_keep_correlations():
     program = tc.build(a, solver="daqp")
     labels = list(program.nominal.contributors)
     columns = [labels.index(label) for label in CORRELATED]
-    released = ReleasedDraws(program.draws, independent_groups(program.draws, labels, correlated=False))
+    released = ReleasedDraws(
+        program.draws, independent_groups(program.draws, labels, np.ones(len(labels), dtype=bool), correlated=False)
+    )
     whole = released(seed=2, start=0, stop=19 * 3000)
     assert np.array_equal(whole[37:777], released(seed=2, start=37, stop=777))
     rows = whole.reshape(3000, 19, -1)
@@ -288,3 +290,59 @@ def test_an_option_that_cannot_act_is_refused():
         with pytest.raises(tc.OptionError, match="a Program has its solver and method"):
             answer(program, solver="daqp")
         assert answer(program, samples=16).attrs["solver"] == "daqp"
+
+
+def shelf(weights, own=0.0):
+    """A block that shared causes lift off a table: the height is max(0, sum of weight * cause)."""
+    a = tc.Assembly("shelf")
+    table, block = a.part("table", tc.Box(100, 50, 10), fixed=True), a.part("block", tc.Box(50, 25, 10), at=(25, 12.5, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=own)
+    for name, weight in weights.items():
+        a.variable(name, tc.Tolerance(0.6), drives={f"block.A{k}": weight for k in (1, 2, 3)})
+    a.contact("under", moving=block.face("-z"), reference=table.face("+z"), points=12)
+    a.measure("height", block.point(25, 12.5, 10), along="z", tolerance=1)
+    return a
+
+
+@pytest.mark.slow
+def test_independent_causes_of_the_same_locators_have_shares_of_their_own():
+    found = tc.contributions(shelf({"a": 1.0, "b": -0.5}), samples=2048, solver="daqp").sel(measure="height")
+    assert found.group.values.tolist() == ["a", "b"]
+    assert found.linear.values == pytest.approx([0.8, 0.2], abs=0.01)
+    for name in ("first", "total"):
+        for group, share in (("a", 0.8), ("b", 0.2)):
+            _, lower, upper = found[name].sel(state="raw", group=group).values
+            assert lower - 0.02 < share < upper + 0.02
+    assert found.missed.sel(state="raw", interval="estimate") < 1e-6
+
+
+@pytest.mark.slow
+def test_a_cause_and_what_varies_by_itself_stay_apart():
+    """z of the middle is a + (A1 + A2 + A3) / 3 or so: each locator keeps its own share."""
+    found = tc.contributions(shelf({"a": 1.0}, own=0.3), samples=2048, solver="daqp").sel(measure="height", state="raw")
+    groups = found.group.values.tolist()
+    assert "a" in groups and {"block.A1", "block.A2", "block.A3"} <= set(groups)
+    first = found["first"].sel(interval="estimate")
+    assert float(first.sum()) == pytest.approx(1.0, abs=0.06)
+    slopes = tc.sensitivities(shelf({"a": 1.0}, own=0.3), samples=64, solver="daqp").sel(measure="height")
+    assert float(slopes.nominal.sel(contributor="a")) == pytest.approx(1.0, abs=1e-6)
+    lifted = slopes.nominal.sel(contributor=["block.A1", "block.A2", "block.A3"])
+    variance = float((lifted**2).sum()) * 0.05**2
+    assert float(first.sel(group="a")) == pytest.approx(0.1**2 / (0.1**2 + variance), abs=0.06)
+
+
+@pytest.mark.slow
+def test_a_cause_is_stepped_with_what_it_drives():
+    """height = max(0, v): the mean derivative is 1 raw, and the share of realizations above the table corrected."""
+    found = tc.sensitivities(shelf({"v": 1.0}), samples=2000, solver="daqp").sel(measure="height")
+    assert found.contributor.values.tolist() == ["v"]
+    raw, corrected = found.sensitivity.sel(contributor="v").values
+    assert raw[0] == pytest.approx(1.0, abs=1e-6) and corrected[1] <= 0.5 <= corrected[2]
+
+
+def test_what_varies_by_less_than_its_accuracy_has_no_shares():
+    rng = np.random.default_rng(1)
+    f = -0.15 + 1e-9 * rng.standard_normal((500, 4))
+    first, total = sobol_indices(f, 1e-8)
+    assert np.isnan(first).all() and np.isnan(total).all() and np.isnan(missed(f[:, 0], f[:, 1], 1e-8)).all()
+    assert not np.isnan(sobol_indices(f, 0.0)[0][0].value)

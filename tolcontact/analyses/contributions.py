@@ -12,7 +12,7 @@ from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.grouping import check_grouping, independent_groups, owners
-from tolcontact.analyses.linear_model import linear_model
+from tolcontact.analyses.linear_model import total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
@@ -34,7 +34,9 @@ def contributions(
         by_status (status_meaning)                  number of realizations
 
     `by` is "contributor", "feature" or "part". Contributors that are not independent of each other (correlated, drawn together,
-    driven by one cause) always form one group. Contributors that do not vary are left out.
+    or one following from another) always form one group. A shared cause is a contributor like others, together with what it
+    adds to those that it drives; these have groups of their own if they also vary by themselves. Contributors that do not vary
+    are left out.
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
     effects. `progress` is called with the number of finished realizations, and of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
@@ -44,7 +46,8 @@ def contributions(
         terms.CONTRIBUTIONS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    program, deviations = analysis.program, analysis.sampled_deviations()
+    program = analysis.program
+    deviations = program.draws.own(analysis.sampled_deviations())
     groups, units = (_varying_groups(program, by, deviations, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
     mixed, released = MixedDraws(program.draws, list(groups.values())), ReleasedDraws(program.draws, units)
@@ -54,16 +57,19 @@ def contributions(
     shapley = np.empty((measured.shape[3], measured.shape[2], 0, len(terms.ESTIMATE)))
     if has_units:
         shapley = _shapley_effects(engine, released, samples, seed)
-    slopes = linear_model(program).by_deviations
-    indices = [[sobol_indices(f) for f in states] for states in measured.transpose(3, 2, 0, 1)]
+    slopes, A = total_derivatives(program), program.draws.own(A[:, 0])
+    indices = [
+        [sobol_indices(f, accuracy) for f in states]
+        for states, accuracy in zip(measured.transpose(3, 2, 0, 1), program.accuracies, strict=True)
+    ]
     values = {
         "first": [[first for first, _ in states] for states in indices],
         "total": [[total for _, total in states] for states in indices],
         "shapley": shapley,
         "linear": [_linear_shares(deviations, row, groups.values()) for row in slopes],
         "missed": [
-            [missed(f, A[:, 0] @ row) for f in states]
-            for states, row in zip(measured[:, 0].transpose(2, 1, 0), slopes, strict=True)
+            [missed(f, A @ row, accuracy) for f in states]
+            for states, row, accuracy in zip(measured[:, 0].transpose(2, 1, 0), slopes, program.accuracies, strict=True)
         ],
         "by_status": engine.statuses,
     }
@@ -73,17 +79,19 @@ def contributions(
 
 
 def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correlated: bool) -> dict[str, np.ndarray]:
-    """Return the columns that vary among deviations (n, contributor), by independent group."""
+    """Return the columns that vary among own deviations (n, contributor), by independent group."""
     varies = np.ptp(deviations, axis=0) > 0
-    groups = independent_groups(program.draws, owners(program, by), correlated=correlated)
-    return {name: columns[varies[columns]] for name, columns in groups.items() if varies[columns].any()}
+    return independent_groups(program.draws, owners(program, by), varies, correlated=correlated)
 
 
 def _shapley_effects(engine: Engine, released: ReleasedDraws, samples: int, seed: int) -> np.ndarray:
     """Return Shapley effects (measure, state, unit, interval)."""
     measured, _ = engine.simulate_design(released, samples, seed=seed)
     places = released.places(seed, 0, samples)
-    return np.array([[shapley_effects(f, places) for f in states] for states in measured.transpose(3, 2, 0, 1)])
+    return np.array([
+        [shapley_effects(f, places, accuracy) for f in states]
+        for states, accuracy in zip(measured.transpose(3, 2, 0, 1), engine.program.accuracies, strict=True)
+    ])  # fmt: skip
 
 
 def _linear_shares(deviations: np.ndarray, slopes: np.ndarray, groups: Any) -> np.ndarray:

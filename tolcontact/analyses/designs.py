@@ -40,10 +40,14 @@ class Design(ABC):
 
 
 class SteppedDraws(Design):
-    """Each realization itself, then with each of `columns` stepped up by `steps` (column,) in its units, then stepped down."""
+    """Each realization itself, then with each of `columns` stepped up by `steps` (column,) in its units, then stepped down.
+
+    A shared cause takes along what it drives.
+    """
 
     def __init__(self, draws: Draws, columns: np.ndarray, steps: np.ndarray) -> None:
         self._draws, self._columns, self._steps = draws, columns, steps
+        self._drive = draws.drive_matrix
 
     @property
     def size(self) -> int:
@@ -57,11 +61,14 @@ class SteppedDraws(Design):
         for k, (column, step) in enumerate(zip(self._columns, self._steps, strict=True), start=1):
             members[:, k, column] += step
             members[:, count + k, column] -= step
+            for driven in np.flatnonzero(self._drive[column]):
+                members[:, k, driven] += step * self._drive[column, driven]
+                members[:, count + k, driven] -= step * self._drive[column, driven]
         return members
 
 
 class MixedDraws(Design):
-    """A, B, and A with the columns of each of `groups` from B; columns of different groups are independent."""
+    """A, B, and A with the columns of each of `groups` from B; own deviations of different groups are independent."""
 
     def __init__(self, draws: Draws, groups: Sequence[np.ndarray]) -> None:
         self._draws, self._groups = draws, groups
@@ -73,13 +80,13 @@ class MixedDraws(Design):
 
     def members(self, seed: int, start: int, stop: int) -> np.ndarray:
         """Return deviations (base, member, contributor) of base realizations `start` to `stop`."""
-        A = self._draws(seed=seed, start=start, stop=stop)
-        B = self._draws(seed=seed, start=REDRAWN_START + start, stop=REDRAWN_START + stop)
+        A = self._draws.own(self._draws(seed=seed, start=start, stop=stop))
+        B = self._draws.own(self._draws(seed=seed, start=REDRAWN_START + start, stop=REDRAWN_START + stop))
         members = np.repeat(A[:, None], self.size, axis=1)
         members[:, 1] = B
         for member, columns in enumerate(self._groups, start=2):
             members[:, member, columns] = B[:, columns]
-        return members
+        return self._draws.driven(members)
 
 
 class ReleasedDraws(Design):

@@ -28,8 +28,10 @@ def owners(program: Program, by: str) -> list[str]:
     return [owner_of.get(label, label) for label in labels]
 
 
-def independent_groups(draws: Draws, owners: Sequence[str], *, correlated: bool = True) -> dict[str, np.ndarray]:
-    """Return columns by owner, with owners joined whose columns are drawn together, so that groups are independent.
+def independent_groups(
+    draws: Draws, owners: Sequence[str], varies: np.ndarray, *, correlated: bool = True
+) -> dict[str, np.ndarray]:
+    """Return columns that vary by owner, with owners joined whose columns are drawn together, so that groups are independent.
 
     Without `correlated`, groups that are correlated by declaration stay apart.
     """
@@ -47,6 +49,6 @@ def independent_groups(draws: Draws, owners: Sequence[str], *, correlated: bool 
             lower, upper = sorted((find(int(columns[0])), find(int(column))))
             leader[upper] = lower
     members: dict[int, list[int]] = {}
-    for column in range(len(owners)):
+    for column in np.flatnonzero(varies).tolist():
         members.setdefault(find(column), []).append(column)
     return {" + ".join(dict.fromkeys(owners[k] for k in columns)): np.array(columns) for columns in members.values()}

@@ -56,6 +56,13 @@ def linear_model(program: Program) -> LinearModel:
     )  # fmt: skip
 
 
+def total_derivatives(program: Program) -> np.ndarray:
+    """Return derivatives (measure, contributor) of the raw measures at the nominal assembly; of causes with what they drive."""
+    by_deviations = linear_model(program).by_deviations
+    matrix = program.draws.drive_matrix
+    return by_deviations + by_deviations @ matrix.T if matrix.any() else by_deviations
+
+
 def leverages(program: Program) -> np.ndarray:
     """Return the leverage (contributor,) of each locator; NaN for other contributors.
 

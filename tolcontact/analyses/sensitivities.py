@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.designs import SteppedDraws
 from tolcontact.analyses.engine import Progress
-from tolcontact.analyses.linear_model import leverages, linear_model
+from tolcontact.analyses.linear_model import leverages, total_derivatives
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
 from tolcontact.statistics import intervals
@@ -38,10 +38,10 @@ def sensitivities(
                                                                by contact, and those touched
         step         (contributor)                             a hundredth of its standard deviation, up and down
 
-    Each contributor is stepped alone, even if it is drawn together with others. Where the same points carry before and after
-    the step, and both sides of the step agree within a tenth (or a hundredth of the largest derivative), the central
-    difference is the derivative to second order. Elsewhere it is a mean of both sides and of a jump between them. The
-    linearized resolution may cause jumps, and so may points that join the objective "active points".
+    Each contributor is stepped alone, even if it is drawn together with others; a shared cause with what it drives. Where the
+    same points carry before and after the step, and both sides of the step agree within a tenth (or a hundredth of the largest
+    derivative), the central difference is the derivative to second order. Elsewhere it is a mean of both sides and of a jump
+    between them. The linearized resolution may cause jumps, and so may points that join the objective "active points".
     (2 contributors + 1) samples are simulated. `progress` is called with the number of finished realizations, and of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
     """
@@ -49,7 +49,8 @@ def sensitivities(
         terms.SENSITIVITIES, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    program, deviation = analysis.program, analysis.sampled_deviations().std(axis=0)
+    program = analysis.program
+    deviation = program.draws.own(analysis.sampled_deviations()).std(axis=0)
     columns = np.flatnonzero(deviation > 0)
     analysis.check_varies(columns.size)
     steps = STEP * deviation[columns]
@@ -61,7 +62,7 @@ def sensitivities(
     ahead = (measured[:, up] - measured[:, :1]) / steps[:, None, None]
     behind = (measured[:, :1] - measured[:, down]) / steps[:, None, None]
     slopes = (ahead + behind) / 2
-    nominal = linear_model(program).by_deviations[:, columns]
+    nominal = total_derivatives(program)[:, columns]
     carries_otherwise = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
     changes = carries_otherwise | _has_kink(ahead, behind, np.abs(nominal))
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+import xarray as xr
 
 from tolcontact.cli.app import (
     Model,
@@ -99,6 +100,11 @@ def run(
             overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until, client=client,
             fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip
+    _print_results(results, out, report, until, quiet=quiet)
+
+
+def _print_results(results: xr.DataTree, out: Path | None, report: Path | None, until: str | None, *, quiet: bool) -> None:
+    """Print the summary of results, and write their page. Raises typer.Exit with code 1 if they lack something."""
     with results:
         summary = summarize(results)
         if report is not None:

@@ -31,31 +31,34 @@ MIN_EFFECTIVE = 100  # realizations that carry the variance: from fewer an index
 CONSTANT = 1e-24  # of the square of the mean: less variance than that is rounding
 
 
-def sobol_indices(f: np.ndarray) -> tuple[list[Estimate], list[Estimate]]:
-    """Return first-order and total indices of each group, for values f (n, 2 + group) of A, B, and A with each group from B."""
+def sobol_indices(f: np.ndarray, accuracy: float = 0.0) -> tuple[list[Estimate], list[Estimate]]:
+    """Return first-order and total indices of each group, for values f (n, 2 + group) of A, B, and A with each group from B.
+
+    What spreads by less than its accuracy has none.
+    """
     mean = f[:, :2].mean()
     A, B, mixed = f[:, 0] - mean, f[:, 1] - mean, f[:, 2:] - mean
     v = (A**2 + B**2) / 2
-    if not np.isfinite(f).all() or not v.mean() > CONSTANT * mean**2:
+    if not np.isfinite(f).all() or not v.mean() > max(CONSTANT * mean**2, accuracy**2):
         return [UNDEFINED] * mixed.shape[1], [UNDEFINED] * mixed.shape[1]
     first_order, total = B[:, None] * (mixed - A[:, None]), (A[:, None] - mixed) ** 2 / 2
     return [ratio(u, v) for u in first_order.T], [ratio(u, v) for u in total.T]
 
 
-def shapley_effects(f: np.ndarray, places: np.ndarray) -> list[Estimate]:
+def shapley_effects(f: np.ndarray, places: np.ndarray, accuracy: float = 0.0) -> list[Estimate]:
     """Return each group's Shapley effect, for values f (n, 1 + group) with ever more groups of A, at `places` (n, group)."""
     remaining = (f[:, -1:] - f) ** 2
-    if not np.isfinite(f).all() or not remaining[:, 0].mean() > CONSTANT * f.mean() ** 2:
+    if not np.isfinite(f).all() or not remaining[:, 0].mean() > max(CONSTANT * f.mean() ** 2, accuracy**2):
         return [UNDEFINED] * places.shape[1]
     reductions = np.take_along_axis(remaining[:, :-1] - remaining[:, 1:], places, axis=1)
     return [ratio(u, remaining[:, 0]) for u in reductions.T]
 
 
-def missed(f: np.ndarray, linear: np.ndarray) -> Estimate:
+def missed(f: np.ndarray, linear: np.ndarray, accuracy: float = 0.0) -> Estimate:
     """Return the share of the variance of f (n,) that a prediction (n,) misses; it exceeds 1 if the mean predicts better."""
     mean, errors = f.mean(), f - linear
     f = f - mean
-    if not np.isfinite(f).all() or not (f**2).mean() > CONSTANT * mean**2:
+    if not np.isfinite(f).all() or not (f**2).mean() > max(CONSTANT * mean**2, accuracy**2):
         return UNDEFINED
     return ratio((errors - errors.mean()) ** 2, f**2)
 

@@ -18,6 +18,7 @@ from tolcontact.variation.plans import STREAM, Numbers, Plan
 from tolcontact.vocabulary import MONTE_CARLO
 
 MIN_UNIFORM = 1e-16  # smallest distance of a number from 0 and 1
+ROUNDING = 1e-12  # of a column: own deviations that are no larger are what sums leave over
 
 
 class Draws:
@@ -142,16 +143,35 @@ class Draws:
         return [f"population {k}: {', '.join(population.columns)}" for k, population in populations]
 
     def dependent(self, *, correlated: bool = True) -> list[list[int]]:
-        """Return sets of columns that depend on each other: drawn together, driven by one cause, or `correlated`."""
+        """Return sets of columns that depend on each other: drawn together, or `correlated`; but for sums (see own)."""
         assembly = self._assembly
         sets = [[self._column[label] for label in labels] for labels, _ in self.correlated if correlated]
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
         sets += [[int(column) for column in joint.columns] for joint in self.contributors.joint_draws]
-        sets += [[column, *map(int, np.flatnonzero(lean.extremes.any(axis=0)))] for column, lean in self.leans.items()]
-        sets += [[bonus.size, *(int(column) for column in bonus.columns)] for bonus in self.contributors.bonuses]
-        return sets + [
-            [self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables
-        ]
+        together = [[column, *map(int, np.flatnonzero(lean.extremes.any(axis=0)))] for column, lean in self.leans.items()]
+        together += [[bonus.size, *(int(column) for column in bonus.columns)] for bonus in self.contributors.bonuses]
+        # What follows from others by more than a sum also follows from the causes that drive them.
+        followed = {column for columns in together for column in columns}
+        driven = [[self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables]
+        return sets + together + [columns for columns in driven if followed & set(columns[1:])]
+
+    def own(self, deviations: np.ndarray) -> np.ndarray:
+        """Return deviations (..., contributor) without what shared causes add to them: independent of these."""
+        matrix = self.drive_matrix
+        driven = matrix.any(axis=0)
+        own = deviations.copy()
+        own[..., driven] -= deviations @ matrix[:, driven]
+        rest = np.abs(own) <= ROUNDING * np.abs(deviations).max(axis=tuple(range(deviations.ndim - 1)), initial=0.0)
+        own[driven & rest] = 0.0
+        return own
+
+    def driven(self, own: np.ndarray) -> np.ndarray:
+        """Return deviations (..., contributor) of `own` ones, with what shared causes among them add to others."""
+        matrix = self.drive_matrix
+        columns = matrix.any(axis=0)
+        deviations = own.copy()
+        deviations[..., columns] += own @ matrix[:, columns]
+        return deviations
 
     @property
     def drive_matrix(self) -> np.ndarray:
