@@ -79,15 +79,19 @@ def run(
             target.check(program)
         write_archive(path, program, settings, target, client, progress, is_resumed=resume and path.exists())
 
-    if out is None:
-        results = _results_in_memory(write, overwrite=overwrite, resume=resume)
-    else:
-        with taken(out, overwrite=overwrite, resume=resume) as path:
-            write(path)
-        results = opened(path)
+    results = _results_of(write, out, overwrite=overwrite, resume=resume)
     if target and (sentence := target.shortfall(results)):
         log.warning(sentence)
     return results
+
+
+def _results_of(write: Callable[[Path], None], out: str | Path | None, *, overwrite: bool, resume: bool) -> xr.DataTree:
+    """Return the results of `write` from the archive `out`, or from memory."""
+    if out is None:
+        return _results_in_memory(write, overwrite=overwrite, resume=resume)
+    with taken(out, overwrite=overwrite, resume=resume) as path:
+        write(path)
+    return opened(path)
 
 
 def _results_in_memory(write: Callable[[Path], None], **archive_options: bool) -> xr.DataTree:
