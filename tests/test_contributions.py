@@ -11,7 +11,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import call
+from tests.helpers import PAPER, call
 from tests.test_ra1 import MEASURED, TOP, plane_weights
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.grouping import independent_groups
@@ -308,7 +308,7 @@ def shelf(weights, own=0.0):
 def test_independent_causes_of_the_same_locators_have_shares_of_their_own():
     found = tc.contributions(shelf({"a": 1.0, "b": -0.5}), samples=2048, solver="daqp").sel(measure="height")
     assert found.group.values.tolist() == ["a", "b"]
-    assert found.linear.values == pytest.approx([0.8, 0.2], abs=0.01)
+    assert found.linear.values == pytest.approx([0.8, 0.2], abs=1e-6)  # exact, not of draws
     for name in ("first", "total"):
         for group, share in (("a", 0.8), ("b", 0.2)):
             _, lower, upper = found[name].sel(state="raw", group=group).values
@@ -346,3 +346,20 @@ def test_what_varies_by_less_than_its_accuracy_has_no_shares():
     first, total = sobol_indices(f, 1e-8)
     assert np.isnan(first).all() and np.isnan(total).all() and np.isnan(missed(f[:, 0], f[:, 1], 1e-8)).all()
     assert not np.isnan(sobol_indices(f, 0.0)[0][0].value)
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "variance"),
+    [
+        (tc.Tolerance(0.6), 0.01),
+        (tc.Tolerance(0.6, "uniform"), 0.03),
+        (tc.Tolerance(0.6, "triangular"), 0.015),
+        (tc.Tolerance(distribution=stats.t(5, scale=0.1)), 0.01 * 5 / 3),
+        (tc.Tolerance(distribution=stats.lognorm(0.5)), stats.lognorm(0.5).var()),
+    ],
+)
+def test_the_variance_of_a_contributor_is_that_of_its_distribution(tolerance, variance):
+    a = shelf({})
+    a.variable("v", tolerance, drives={"block.A1": 1.0})
+    contributors = tc.build(a, solver="daqp", method=PAPER).draws.contributors
+    assert next(c for c in contributors if c.label == "v").variance == pytest.approx(variance, rel=2e-4)

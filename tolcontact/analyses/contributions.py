@@ -29,7 +29,8 @@ def contributions(
         total   (measure, state, group, interval)   share of variance by a group and its interactions with others
         shapley (measure, state, unit, interval)    Shapley effects, if contributors are correlated; units are the groups
                                                     that there would be without the correlations
-        linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2
+        linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2,
+                                                    exact for contributors that are drawn by themselves
         missed  (measure, state, interval)          share of variance that a prediction by these sensitivities misses
         by_status (status_meaning)                  number of realizations
 
@@ -66,7 +67,7 @@ def contributions(
         "first": [[first for first, _ in states] for states in indices],
         "total": [[total for _, total in states] for states in indices],
         "shapley": shapley,
-        "linear": [_linear_shares(deviations, row, groups.values()) for row in slopes],
+        "linear": [_linear_shares(program, deviations, row, groups.values()) for row in slopes],
         "missed": [
             [missed(f, A @ row, accuracy) for f in states]
             for states, row, accuracy in zip(measured[:, 0].transpose(2, 1, 0), slopes, program.accuracies, strict=True)
@@ -94,9 +95,22 @@ def _shapley_effects(engine: Engine, released: ReleasedDraws, samples: int, seed
     ])  # fmt: skip
 
 
-def _linear_shares(deviations: np.ndarray, slopes: np.ndarray, groups: Any) -> np.ndarray:
-    """Return the share (group,) of each group in the variance of a linear measure with slopes (contributor,)."""
-    variances = np.array([(deviations[:, columns] @ slopes[columns]).var() for columns in groups])
+def _linear_shares(program: Program, deviations: np.ndarray, slopes: np.ndarray, groups: Any) -> np.ndarray:
+    """Return the share (group,) of each group in the variance of a linear measure with slopes (contributor,).
+
+    The variance of a group is exact if it is one contributor that is drawn by itself, else it is that of own deviations
+    (n, contributor).
+    """
+    draws = program.draws
+    together = {column for columns in draws.dependent() for column in columns}
+    alone = {k for k, label in enumerate(draws.labels) if label in draws.varying and k not in together}
+
+    def variance(columns: np.ndarray) -> float:
+        if len(columns) == 1 and int(columns[0]) in alone:
+            return float(slopes[columns[0]] ** 2 * draws.contributors[int(columns[0])].variance)
+        return float((deviations[:, columns] @ slopes[columns]).var())
+
+    variances = np.array([variance(columns) for columns in groups])
     return variances / variances.sum() if variances.sum() > 0 else np.full(len(variances), np.nan)
 
 

@@ -17,6 +17,7 @@ from tolcontact.variation import zones
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
 JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
 LOCATOR, FEATURE, DATUM, VARIABLE = "locator", "feature", "datum", "variable"  # sources
+MAX_SCORE, SCORES = 8.0, 4001  # normal scores that a variance is summed over
 TAIL = float(ndtr(-3))
 # Quantiles of the named distributions for a zone of width 1.
 QUANTILES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -73,6 +74,15 @@ class Contributor(NamedTuple):
             return ""
         name = self.tolerance.distribution
         return name if isinstance(name, str) else str(name.dist.name)
+
+    @property
+    def variance(self) -> float:
+        """The variance of its distribution by itself, by the trapezoidal rule in normal scores."""
+        z = np.linspace(-MAX_SCORE, MAX_SCORE, SCORES)
+        weights = np.exp(-(z**2) / 2)
+        weights /= weights.sum()
+        x = self.deviations(ndtr(z))
+        return float(weights @ (x - weights @ x) ** 2)
 
     def deviations(self, u: np.ndarray) -> np.ndarray:
         """Return its deviations for numbers between 0 and 1."""
