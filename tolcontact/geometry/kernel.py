@@ -58,27 +58,27 @@ def _leaning(body, corner, n):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def corner_on_facet(A, B, first, second, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
+def corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, x):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of a corner, now at x, of the moving body on a facet of the reference body."""
-    n = row(B.normals, second)
-    height = dot(n, minus(x, row_of(B.facets, second, 0)))
-    if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, second, x, spare)):
+    n = row(B.normals, number_B)
+    height = dot(n, minus(x, row_of(B.facets, number_B, 0)))
+    if not (-reach[0] <= height <= reach[1]) or (plane < 0 and not is_over(B.facets, B.inward, number_B, x, spare)):
         return NOWHERE
-    if _leaning(A, first, scaled(-1.0, turn_back(X, n))) > LEANING:
+    if _leaning(A, number_A, scaled(-1.0, turn_back(X, n))) > LEANING:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(B.triangles, x):
         return NOWHERE
-    return height, row(A.vertices, first), along(x, -height, n), n
+    return height, row(A.vertices, number_A), along(x, -height, n), n
 
 
 @inlined_uncounted
-def facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
+def facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, y):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of a facet of the moving body on a corner of the reference body.
 
     flat   the facet of the reference body along whose normal facing planes touch
     y      the corner in the frame of the moving body
     """
-    down = row(A.normals, first)
+    down = row(A.normals, number_A)
     if plane < 0:
         d = scaled(-1.0, down)
         n = turn(X, d)
@@ -86,19 +86,19 @@ def facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, y):  # ty
         n = row(B.normals, flat)
         d = turn_back(X, n)
     fall = dot(d, down)
-    height = -dot(down, minus(y, row_of(A.facets, first, 0))) / fall
+    height = -dot(down, minus(y, row_of(A.facets, number_A, 0))) / fall
     if not (fall < -0.5 and -reach[0] <= height <= reach[1]):
         return NOWHERE
     place = along(y, height, d)
-    if (plane < 0 and not is_over(A.facets, A.inward, first, place, spare)) or _leaning(B, second, n) > LEANING:
+    if (plane < 0 and not is_over(A.facets, A.inward, number_A, place, spare)) or _leaning(B, number_B, n) > LEANING:
         return NOWHERE
     if plane < 0 and height < -INSIDE and not is_inside(A.triangles, y):
         return NOWHERE
-    return height, place, row(B.vertices, second), n
+    return height, place, row(B.vertices, number_B), n
 
 
 @inlined_uncounted
-def _rises(A, B, first, second, X, n):  # type: ignore[no-untyped-def]
+def _rises(A, B, number_A, number_B, X, n):  # type: ignore[no-untyped-def]
     """Return how far n and -n lean towards the facets beside two edges, if they point from the reference to the moving body.
 
     Both are sines of the largest angle.
@@ -106,7 +106,7 @@ def _rises(A, B, first, second, X, n):  # type: ignore[no-untyped-def]
     y = turn_back(X, n)
     rises, falls = -1.0, -1.0
     for f in range(2):
-        on_B, on_A = dot(n, row_of(B.into, second, f)), dot(y, row_of(A.into, first, f))
+        on_B, on_A = dot(n, row_of(B.into, number_B, f)), dot(y, row_of(A.into, number_A, f))
         rises, falls = max(rises, on_B, -on_A), max(falls, -on_B, on_A)
     return rises, falls
 
@@ -117,8 +117,8 @@ def _inner(x, share, d, n, height, normals, edge):  # type: ignore[no-untyped-de
 
     It lies inside the other body if x is below that edge by -height along n. Where facets meet sharply, x may lie outside.
     """
-    one, other = row_of(normals, edge, 0), row_of(normals, edge, 1)
-    rise, run = dot(n, one) - dot(n, other), dot(d, one) - dot(d, other)
+    normal_1, normal_2 = row_of(normals, edge, 0), row_of(normals, edge, 1)
+    rise, run = dot(n, normal_1) - dot(n, normal_2), dot(d, normal_1) - dot(d, normal_2)
     s = 0.0 if run == 0 else -height * rise / run
     return along(x, min(max(s, -share), 1 - share), d)
 
@@ -131,14 +131,14 @@ def _is_past(share, edge, spare):  # type: ignore[no-untyped-def]
 
 
 @inlined_uncounted
-def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
+def edge_on_edge(A, B, number_A, number_B, flat, plane, spare, reach, X, x, d):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of an edge of the moving body across one of the reference body.
 
     The edge, now at x + s d, meets q + u e where s = (q - x) x e . m / c . m and u = (q - x) x d . m / c . m, with c = d x e,
     seen along m: their common normal, or the normal of the reference plane; then the gap's slope is c / c . m.
     """
-    q = row_of(B.edges, second, 0)
-    e, w = minus(row_of(B.edges, second, 1), q), minus(q, x)
+    q = row_of(B.edges, number_B, 0)
+    e, w = minus(row_of(B.edges, number_B, 1), q), minus(q, x)
     c = cross(d, e)
     m = c if plane < 0 else row(B.normals, flat)
     crossing = dot(c, m)
@@ -151,7 +151,7 @@ def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, x, d):  # ty
     if not abs(crossing) > (PARALLEL if plane < 0 else MIN_CROSSING) * lengths:
         return NOWHERE
     if plane < 0:
-        rises, falls = _rises(A, B, first, second, X, m)
+        rises, falls = _rises(A, B, number_A, number_B, X, m)
         if min(rises, falls) > LEANING:
             return NOWHERE
         if falls < rises:
@@ -163,8 +163,8 @@ def edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, x, d):  # ty
     if plane < 0 and height < -INSIDE:
         back, up, under = turn_back(X, e), turn_back(X, scaled(-1.0, m)), move_back(X, foot)
         if not (
-            is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, second))
-            and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, first))
+            is_inside(B.triangles, _inner(y, s, d, m, height, B.edge_normals, number_B))
+            and is_inside(A.triangles, _inner(under, u, back, up, height, A.edge_normals, number_A))
         ):
             return NOWHERE
     is_slanted = plane >= 0 and MIN_SLANT * abs(crossing) < length < MAX_SLANT * abs(crossing)

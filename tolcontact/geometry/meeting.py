@@ -142,9 +142,13 @@ class Meeting:
         return np.unique((self.moving.vertices @ np.vstack([DIRECTIONS, CORNERS]).T).argmax(axis=0))
 
     def at(
-        self, X_RM: Float[Array, "n 12"], kept: Int[Array, "n k"] | None = None, error: float = 0.0, nearness: float = NEARNESS
+        self,
+        X_RM: Float[Array, "n 12"],
+        retained: Int[Array, "n k"] | None = None,
+        error: float = 0.0,
+        nearness: float = NEARNESS,
     ) -> Places:
-        """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `kept` (n, k), -1 for none.
+        """Return the places that may matter at poses X_RM (n, 12), among them the candidates in `retained` (n, k), -1 for none.
 
         Where bodies are beyond reach, these are places of the `farther` meeting, whose numbers follow those of this one.
 
@@ -153,38 +157,40 @@ class Meeting:
         """
         beyond = np.flatnonzero(~self.covers(X_RM))
         if beyond.size and self.farther is not None:
-            return self._beyond(beyond, X_RM, kept, error, nearness)
-        return self._near(X_RM, kept, error, nearness)
+            return self._beyond(beyond, X_RM, retained, error, nearness)
+        return self._near(X_RM, retained, error, nearness)
 
-    def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, kept: np.ndarray | None, error: float, nearness: float) -> Places:
+    def _beyond(self, rows: np.ndarray, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
         """Return places at poses of which some `rows` are beyond reach."""
         assert self.farther is not None
         count = len(self)
-        near = self._near(X_RM, kept, error, nearness)
-        far_kept = None if kept is None else np.maximum(kept[rows] - count, -1)
-        far = self.farther.at(X_RM[rows], far_kept, error, nearness)
-        far = far._replace(labels=np.where(far.labels >= 0, far.labels + count, -1))
-        room = max(near.gaps.shape[1], far.gaps.shape[1])
+        nearby = self._near(X_RM, retained, error, nearness)
+        far_kept = None if retained is None else np.maximum(retained[rows] - count, -1)
+        farther_places = self.farther.at(X_RM[rows], far_kept, error, nearness)
+        farther_places = farther_places._replace(labels=np.where(farther_places.labels >= 0, farther_places.labels + count, -1))
+        room = max(nearby.gaps.shape[1], farther_places.gaps.shape[1])
         padded = []
-        for empty, of_all, of_some in zip((-1, np.inf, 0.0, 0.0, 0.0), near, far, strict=True):
+        for empty, of_all, of_some in zip((-1, np.inf, 0.0, 0.0, 0.0), nearby, farther_places, strict=True):
             values = np.full((len(X_RM), room, *of_all.shape[2:]), empty, dtype=of_all.dtype)
             values[:, : of_all.shape[1]] = of_all
             values[rows], values[rows, : of_some.shape[1]] = empty, of_some
             padded.append(values)
         return Places(*padded)
 
-    def _near(self, X_RM: np.ndarray, kept: np.ndarray | None, error: float, nearness: float) -> Places:
+    def _near(self, X_RM: np.ndarray, retained: np.ndarray | None, error: float, nearness: float) -> Places:
         """Return places at poses that are within reach."""
         room = max(min(len(self), MAX_PLACES), 1)
         shape = (len(X_RM), room)
         places = Places(np.empty(shape, dtype=np.int64), np.empty(shape), *(np.zeros((*shape, 3)) for _ in range(3)))
         # Bodies that were beyond reach before may have kept candidates of the farther meeting.
-        kept = np.zeros((len(X_RM), 0), dtype=np.int64) if kept is None else np.where(kept < len(self), kept, -1)
+        retained = (
+            np.zeros((len(X_RM), 0), dtype=np.int64) if retained is None else np.where(retained < len(self), retained, -1)
+        )
         places_kernel.find(
             _touching_parts(self.moving), _touching_parts(self.reference), self.candidates,
             np.array([self.reach.depth, self.reach.height]), kernel.MARGIN * self.size,
             np.array([error, self.reach.depth, nearness]),
-            np.ascontiguousarray(X_RM), kept, DIRECTIONS, *places,
+            np.ascontiguousarray(X_RM), retained, DIRECTIONS, *places,
         )  # fmt: skip
         return places
 
@@ -254,14 +260,14 @@ def _on_facets(
     low, high = facets.facets.min(axis=1) - travel, facets.facets.max(axis=1) + travel
     candidates = []
     for corner in range(len(corners.vertices)):
-        near = np.flatnonzero(((corners.vertices[corner] >= low) & (corners.vertices[corner] <= high)).all(axis=1))
+        nearby = np.flatnonzero(((corners.vertices[corner] >= low) & (corners.vertices[corner] <= high)).all(axis=1))
         directions = corners.directions[corners.cones[corner] : corners.cones[corner + 1]]
-        near = near[(directions @ facets.normals[near].T).min(axis=0, initial=0) >= -leaning]
-        plane = facing[corners.vertex_planes[corner]][:, facets.facet_planes[near]].max(axis=0, initial=-1)
+        nearby = nearby[(directions @ facets.normals[nearby].T).min(axis=0, initial=0) >= -leaning]
+        plane = facing[corners.vertex_planes[corner]][:, facets.facet_planes[nearby]].max(axis=0, initial=-1)
         # Facets of facing planes count together.
-        _, one = np.unique(np.where(plane >= 0, plane, -1 - near), return_index=True)
-        near, plane = near[one], plane[one]
-        pair = (np.full(len(near), corner), near)
+        _, distinct = np.unique(np.where(plane >= 0, plane, -1 - nearby), return_index=True)
+        nearby, plane = nearby[distinct], plane[distinct]
+        pair = (np.full(len(nearby), corner), nearby)
         first, second = pair if kind == CORNER_ON_FACET else pair[::-1]
         candidates.append(np.stack([first, second, plane], axis=1))
     return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
@@ -273,15 +279,15 @@ def _across_edges(A: Polyhedron, B: Polyhedron, facing: np.ndarray, travel: floa
     arcs_A, arcs_B = _arcs(A), _arcs(B)
     candidates = []
     for edge in range(len(A.edges)):
-        near = np.flatnonzero(((A.edges[edge].max(axis=0) >= low) & (A.edges[edge].min(axis=0) <= high)).all(axis=1))
-        plane = np.full(len(near), -1)
+        nearby = np.flatnonzero(((A.edges[edge].max(axis=0) >= low) & (A.edges[edge].min(axis=0) <= high)).all(axis=1))
+        plane = np.full(len(nearby), -1)
         for plane_A in A.edge_planes[edge]:
             for side in range(2):
-                plane = np.maximum(plane, facing[plane_A, B.edge_planes[near, side]])
-        cosine = -np.einsum("ai,eki->eak", arcs_A[edge], arcs_B[near]).min(axis=(1, 2))
-        meets = (cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))) & B.convex[near].astype(bool)
-        kept = (plane >= 0) | (meets & bool(A.convex[edge]))
-        candidates.append(np.stack([np.full(kept.sum(), edge), near[kept], plane[kept]], axis=1))
+                plane = np.maximum(plane, facing[plane_A, B.edge_planes[nearby, side]])
+        cosine = -np.einsum("ai,eki->eak", arcs_A[edge], arcs_B[nearby]).min(axis=(1, 2))
+        meets = (cosine >= np.cos(min(np.arcsin(leaning) + ARC_SPACING, np.pi))) & B.convex[nearby].astype(bool)
+        retained = (plane >= 0) | (meets & bool(A.convex[edge]))
+        candidates.append(np.stack([np.full(retained.sum(), edge), nearby[retained], plane[retained]], axis=1))
     return np.concatenate([np.zeros((0, 3), dtype=int), *candidates])
 
 

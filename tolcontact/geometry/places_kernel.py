@@ -74,45 +74,47 @@ def _keep_shallowest(candidates, touching, gaps):  # type: ignore[no-untyped-def
 def _is_over_plane(candidates, plane, body, x, spare):  # type: ignore[no-untyped-def]
     """Return whether x, in the frame of a body (0: moving, 1: reference), lies over one of two facing planes."""
     outline, frames = 2 * plane + body, candidates.frames
-    first = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
-    second = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
+    coordinate_1 = frames[plane, body, 0, 0] * x[0] + frames[plane, body, 0, 1] * x[1] + frames[plane, body, 0, 2] * x[2]
+    coordinate_2 = frames[plane, body, 1, 0] * x[0] + frames[plane, body, 1, 1] * x[1] + frames[plane, body, 1, 2] * x[2]
     start, end = candidates.outlines[outline], candidates.outlines[outline + 1]
     middle, tallest = candidates.outline_middles[outline], candidates.tallest[outline]
-    return is_within(candidates.segments, start, middle, end, tallest, first, second, spare)
+    return is_within(candidates.segments, start, middle, end, tallest, coordinate_1, coordinate_2, spare)
 
 
 @inlined_uncounted
 def _place(A, B, candidates, s, spare, reach, X, moved):  # type: ignore[no-untyped-def]
     """Return gap, place, foot and normal of candidate s, which may lie `spare` [mm] beside edges."""
     corners, lines, back = moved
-    kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     flat = 0 if plane < 0 else candidates.facing[plane, 1]
     if kind == EDGE_ON_EDGE:
-        return edge_on_edge(A, B, first, second, flat, plane, spare, reach, X, row_of(lines, first, 0), row_of(lines, first, 1))
+        return edge_on_edge(
+            A, B, number_A, number_B, flat, plane, spare, reach, X, row_of(lines, number_A, 0), row_of(lines, number_A, 1)
+        )
     if kind == CORNER_ON_FACET:
-        found = corner_on_facet(A, B, first, second, plane, spare, reach, X, row(corners, first))
-        is_over = plane < 0 or found[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, first), spare)
+        results = corner_on_facet(A, B, number_A, number_B, plane, spare, reach, X, row(corners, number_A))
+        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 1, row(corners, number_A), spare)
     else:
-        found = facet_on_corner(A, B, first, second, flat, plane, spare, reach, X, row(back, second))
-        is_over = plane < 0 or found[0] == np.inf or _is_over_plane(candidates, plane, 0, found[1], spare)
-    return found if is_over else NOWHERE
+        results = facet_on_corner(A, B, number_A, number_B, flat, plane, spare, reach, X, row(back, number_B))
+        is_over = plane < 0 or results[0] == np.inf or _is_over_plane(candidates, plane, 0, results[1], spare)
+    return results if is_over else NOWHERE
 
 
 @inlined_uncounted
-def _write(found, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
+def _write(results, s, gaps, places, feet, normals):  # type: ignore[no-untyped-def]
     """Write gap, place, foot and normal of candidate s."""
-    gaps[s] = found[0]
-    for vectors, vector in ((places, found[1]), (feet, found[2]), (normals, found[3])):
+    gaps[s] = results[0]
+    for vectors, vector in ((places, results[1]), (feet, results[2]), (normals, results[3])):
         vectors[s, 0], vectors[s, 1], vectors[s, 2] = vector
 
 
 @uncounted
 def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: ignore[no-untyped-def]
     """Return whether a place of facing planes is no farther than `distance` from another one at which they touch."""
-    for other in touching:
-        if candidates.planes[other] == candidates.planes[s] and gaps[other] < np.inf:
-            away = minus(row(feet, other), foot)
-            if dot(away, away) <= distance * distance:
+    for neighbour in touching:
+        if candidates.planes[neighbour] == candidates.planes[s] and gaps[neighbour] < np.inf:
+            difference = minus(row(feet, neighbour), foot)
+            if dot(difference, difference) <= distance * distance:
                 return True
     return False
 
@@ -121,27 +123,27 @@ def _is_near(candidates, s, foot, feet, touching, gaps, distance):  # type: igno
 def _range(A, candidates, s, moved, spare):  # type: ignore[no-untyped-def]
     """Return least and largest coordinates of the corner or edge of candidate s in the plane that faces it."""
     corners, lines, back = moved
-    kind, first, second, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
+    kind, number_A, number_B, plane = candidates.kinds[s], candidates.firsts[s], candidates.seconds[s], candidates.planes[s]
     body = 0 if kind == FACET_ON_CORNER else 1
-    one, other = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
+    axis_1, axis_2 = row_of(candidates.frames[plane], body, 0), row_of(candidates.frames[plane], body, 1)
     if kind == EDGE_ON_EDGE:
-        start, vector = row_of(lines, first, 0), row_of(lines, first, 1)
-        low, high, low_2, high_2 = dot(one, start), dot(one, vector), dot(other, start), dot(other, vector)
+        start, vector = row_of(lines, number_A, 0), row_of(lines, number_A, 1)
+        low, high, low_2, high_2 = dot(axis_1, start), dot(axis_1, vector), dot(axis_2, start), dot(axis_2, vector)
         return (
             low + min(high, 0.0) - spare, low_2 + min(high_2, 0.0) - spare,
             low + max(high, 0.0) + spare, low_2 + max(high_2, 0.0) + spare,
         )  # fmt: skip
     shear = spare
     if kind == FACET_ON_CORNER:
-        x, facet = row(back, second), candidates.facing[plane, 0]
+        x, facet = row(back, number_B), candidates.facing[plane, 0]
         shear += MAX_SHEAR * abs(dot(row(A.normals, facet), minus(x, row_of(A.facets, facet, 0))))
     else:
-        x = row(corners, first)
-    return dot(one, x) - shear, dot(other, x) - shear, dot(one, x) + shear, dot(other, x) + shear
+        x = row(corners, number_A)
+    return dot(axis_1, x) - shear, dot(axis_2, x) - shear, dot(axis_1, x) + shear, dot(axis_2, x) + shear
 
 
 @uncounted
-def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touching, gaps, all_places):  # type: ignore
+def _find_at(A, B, candidates, reach, margins, nearness, retained, X, moved, touching, gaps, all_places):  # type: ignore
     """Write gap, places and normal of the candidates that touch at one pose X_RM (12,); return how many there are.
 
     Of facing planes, candidates that are kept count a little beside their edges: there, near a corner of the overlap, the
@@ -149,7 +151,7 @@ def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touchin
 
     margins       (p + 1,) [mm] by which places may lie beside edges: those that are kept, of each two facing planes; all others
     nearness      in margins: how far from a place where the planes touch such a place may lie
-    kept          (k,): numbers of the candidates that are kept, or -1
+    retained      (k,): numbers of the candidates that are kept, or -1
     moved         corners (v, 3), and starts and vectors of edges (e, 2, 3), of the moving body in the reference frame, and
                   corners of the reference body in the moving frame
     touching      (c,): numbers of the candidates that touch
@@ -174,33 +176,33 @@ def _find_at(A, B, candidates, reach, margins, nearness, kept, X, moved, touchin
             s += 1
     _keep_shallowest(candidates, touching[:count], gaps)
     strict = count
-    for s in kept:
+    for s in retained:
         if s >= 0 and candidates.planes[s] >= 0 and gaps[s] == np.inf:
             spare = margins[candidates.planes[s]]
-            found = _place(A, B, candidates, s, spare, reach, X, moved)
-            if found[0] < np.inf and _is_near(candidates, s, found[2], feet, touching[:strict], gaps, nearness * spare):
-                _write(found, s, gaps, places, feet, normals)
+            results = _place(A, B, candidates, s, spare, reach, X, moved)
+            if results[0] < np.inf and _is_near(candidates, s, results[2], feet, touching[:strict], gaps, nearness * spare):
+                _write(results, s, gaps, places, feet, normals)
                 touching[count], count = s, count + 1
     return count
 
 
 @uncounted
-def _choose(touching, gaps, feet, kept, directions, taken, labels):  # type: ignore[no-untyped-def]
+def _choose(touching, gaps, feet, retained, directions, is_chosen, labels):  # type: ignore[no-untyped-def]
     """Write the labels (p,) of places that may matter: those kept, those of the least gaps, and the outermost; -1 for none."""
     number = 0
     for s in touching:
-        taken[s] = gaps[s] == np.inf
-    for s in kept:
-        if s >= 0 and gaps[s] < np.inf and not taken[s]:
-            labels[number], taken[s], number = s, True, number + 1
+        is_chosen[s] = gaps[s] == np.inf
+    for s in retained:
+        if s >= 0 and gaps[s] < np.inf and not is_chosen[s]:
+            labels[number], is_chosen[s], number = s, True, number + 1
     while number < labels.size - directions.shape[0]:
-        least, gap = -1, np.inf
+        shallowest, gap = -1, np.inf
         for s in touching:
-            if gaps[s] < gap and not taken[s]:
-                least, gap = s, gaps[s]
-        if least < 0:
+            if gaps[s] < gap and not is_chosen[s]:
+                shallowest, gap = s, gaps[s]
+        if shallowest < 0:
             break
-        labels[number], taken[least], number = least, True, number + 1
+        labels[number], is_chosen[shallowest], number = shallowest, True, number + 1
     for direction in directions:
         outermost, farthest = -1, -np.inf
         for s in touching:
@@ -208,8 +210,8 @@ def _choose(touching, gaps, feet, kept, directions, taken, labels):  # type: ign
                 distance = dot(direction, row(feet, s))
                 if distance > farthest:
                     outermost, farthest = s, distance
-        if outermost >= 0 and not taken[outermost]:
-            labels[number], taken[outermost], number = outermost, True, number + 1
+        if outermost >= 0 and not is_chosen[outermost]:
+            labels[number], is_chosen[outermost], number = outermost, True, number + 1
     labels[number:] = -1
 
 
@@ -230,10 +232,10 @@ def _move(A, B, facing, X, corners, lines, back, sines):  # type: ignore[no-unty
 
 
 @uncounted
-def _find_at_each(A, B, candidates, reach, margin, error, poses, kept, directions, found, scratch):  # type: ignore
+def _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch):  # type: ignore
     """Write what `find` writes, found = (labels, gaps, places, feet, normals)."""
-    corners, lines, back, margins, touching, taken, all_gaps, all_places = scratch
-    labels, gaps, places, feet, normals = found
+    corners, lines, back, margins, touching, is_chosen, all_gaps, all_places = scratch
+    labels, gaps, places, feet, normals = results
     places_at, feet_at, normals_at = all_places
     count, room, facing = candidates.kinds.size, labels.shape[1], candidates.facing
     for k in range(poses.shape[0]):
@@ -243,12 +245,12 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, kept, direction
         for j in range(facing.shape[0]):
             margins[j] = max(margin, min(error[0] / max(margins[j], TINY), error[1]))
         moved = (corners, lines, back)
-        number = _find_at(A, B, candidates, reach, margins, error[2], kept[k], X, moved, touching, all_gaps, all_places)
+        number = _find_at(A, B, candidates, reach, margins, error[2], retained[k], X, moved, touching, all_gaps, all_places)
         if count <= room:
             for p in range(room):
                 labels[k, p] = p if p < count else -1
         else:
-            _choose(touching[:number], all_gaps, feet_at, kept[k], directions, taken, labels[k])
+            _choose(touching[:number], all_gaps, feet_at, retained[k], directions, is_chosen, labels[k])
         for p in range(room):
             s = labels[k, p]
             gaps[k, p] = np.inf if s < 0 else all_gaps[s]
@@ -260,11 +262,11 @@ def _find_at_each(A, B, candidates, reach, margin, error, poses, kept, direction
 
 
 @compiled
-def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels, gaps, places, feet, normals):  # type: ignore
+def find(A, B, candidates, reach, margin, error, poses, retained, directions, labels, gaps, places, feet, normals):  # type: ignore
     """Write the places at which bodies can touch, at poses X_RM (n, 12): of all candidates those that may matter.
 
-    These are first those in `kept` (n, k), then the ones with the least gaps, then the outermost in each of the `directions`
-    (direction, 3). All are written if there is room for them.
+    These are first those in `retained` (n, k), then the ones with the least gaps, then the outermost in each of the
+    `directions` (direction, 3). All are written if there is room for them.
 
     A, B          Body, the moving and the reference one
     candidates    Candidates
@@ -282,5 +284,5 @@ def find(A, B, candidates, reach, margin, error, poses, kept, directions, labels
         np.empty(candidates.facing.shape[0] + 1), np.empty(count, dtype=np.int64), np.zeros(count, dtype=np.bool_),
         np.full(count, np.inf), np.empty((3, count, 3)),
     )  # fmt: skip
-    found = (labels, gaps, places, feet, normals)
-    _find_at_each(A, B, candidates, reach, margin, error, poses, kept, directions, found, scratch)
+    results = (labels, gaps, places, feet, normals)
+    _find_at_each(A, B, candidates, reach, margin, error, poses, retained, directions, results, scratch)

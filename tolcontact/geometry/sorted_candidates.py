@@ -65,12 +65,12 @@ def _sorted(lows: Float[Array, " n"], highs: Float[Array, " n"], keys: Int[Array
     _, run = np.unique(keys, axis=1, return_inverse=True)
     run = run.reshape(-1)
     count = int(run.max()) + 1
-    first, last = np.full(count, np.inf), np.full(count, -np.inf)
-    np.minimum.at(first, run, lows)
+    lowest, last = np.full(count, np.inf), np.full(count, -np.inf)
+    np.minimum.at(lowest, run, lows)
     np.maximum.at(last, run, highs)
-    is_finite = np.isfinite(last - first)[run]
+    is_finite = np.isfinite(last - lowest)[run]
     widths = np.where(is_finite, highs, 0.0) - np.where(is_finite, lows, 0.0)
-    is_wide = ~is_finite | (widths > WIDE_SHARE * (np.where(is_finite, (last - first)[run], 0.0)))
+    is_wide = ~is_finite | (widths > WIDE_SHARE * (np.where(is_finite, (last - lowest)[run], 0.0)))
     narrowest = np.zeros(count)
     np.maximum.at(narrowest, run[~is_wide], widths[~is_wide])
     lengths, wide = np.bincount(run, minlength=count), np.bincount(run[is_wide], minlength=count)
@@ -88,6 +88,6 @@ def _outline(body: Polyhedron, facet: int) -> Float[Array, "segment 2 3"]:
 
 def _across(normal: Float[Array, "3"]) -> Float[Array, "2 3"]:
     """Return two unit vectors across a normal."""
-    first = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
+    direction = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
+    direction /= np.linalg.norm(direction)
+    return np.stack([direction, np.cross(normal, direction)])

@@ -77,15 +77,15 @@ def by_percentiles(x: Sample, limits: Limits) -> tuple[Estimate, Estimate]:
         return UNDEFINED, UNDEFINED
     limits, x = without_stops(x, limits), x.map(limits.settled)
     low, median, high = (percentile.value for percentile in percentiles(x, PERCENTS))
-    least, most = _simulated_percentiles(x)
+    lows, highs = _simulated_percentiles(x)
     pp, ppk = UNDEFINED, UNDEFINED
     if np.isfinite(limits.lower) and np.isfinite(limits.upper):
-        worst, best = _pp(least[0], most[2], limits), _pp(most[0], least[2], limits)
+        worst, best = _pp(lows[0], highs[2], limits), _pp(highs[0], lows[2], limits)
         pp = _with_interval(_pp(low, high, limits), worst, [best])
     if not limits.are_open:
         # Sides that are equally near must not make the least of them look worse: of the upper bounds of all, it is the least.
-        worst = np.stack([_sides(least[0], middle, most[2], limits) for middle in (least[1], most[1])])
-        best = np.stack([_sides(most[0], middle, least[2], limits) for middle in (least[1], most[1])])
+        worst = np.stack([_sides(lows[0], middle, highs[2], limits) for middle in (lows[1], highs[1])])
+        best = np.stack([_sides(highs[0], middle, lows[2], limits) for middle in (lows[1], highs[1])])
         worst_of_all = np.fmin.reduce(worst, axis=(0, 1))
         ppk = _with_interval(np.min(_sides(low, median, high, limits)), worst_of_all, list(np.fmax.reduce(best, axis=0)))
     return pp, ppk
@@ -122,9 +122,12 @@ def _pp(low: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> np
 def _sides(low: np.ndarray | float, median: np.ndarray | float, high: np.ndarray | float, limits: Limits) -> list[np.ndarray]:
     """Return the index of each side that has a limit."""
     lower, upper, _ = limits
-    above, below = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
+    upper_width, lower_width = np.maximum(np.subtract(high, median), 0.0), np.maximum(np.subtract(median, low), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):
-        sides = [(lower, np.divide(np.subtract(median, lower), below)), (upper, np.divide(np.subtract(upper, median), above))]
+        sides = [
+            (lower, np.divide(np.subtract(median, lower), lower_width)),
+            (upper, np.divide(np.subtract(upper, median), upper_width)),
+        ]
     return [index for limit, index in sides if np.isfinite(limit)]
 
 
@@ -142,11 +145,11 @@ def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:
     """Return order statistics at or below, and at or above, simulated percentiles of the distribution, (percentile, trial)."""
     numbers = values_below(x.count)
     ranks, places = np.unique(np.stack([numbers, numbers + 1]), return_inverse=True)
-    known = (ranks >= 1) & (ranks <= x.count)
+    is_within = (ranks >= 1) & (ranks <= x.count)
     values = np.where(ranks < 1, -np.inf, np.inf)
-    values[known] = x.ordered((ranks[known] - 1).tolist())
-    least, most = values[places.reshape(2, *numbers.shape)]
-    return least, most
+    values[is_within] = x.ordered((ranks[is_within] - 1).tolist())
+    lows, highs = values[places.reshape(2, *numbers.shape)]
+    return lows, highs
 
 
 @lru_cache

@@ -52,16 +52,16 @@ def fitted(groups: Sequence[np.ndarray], rng: np.random.Generator) -> Mixture:
 
     It has as many centres as make one half of the groups likeliest for the other half.
     """
-    some = MAX_FITTED // len(groups)
-    groups = [group[rng.choice(len(group), min(len(group), some), replace=False)] for group in groups]
+    limit = MAX_FITTED // len(groups)
+    groups = [group[rng.choice(len(group), min(len(group), limit), replace=False)] for group in groups]
     number = 4
     if len(groups) > 1:
-        one, other = np.concatenate(groups[::2]), np.concatenate(groups[1::2])
+        training, validation = np.concatenate(groups[::2]), np.concatenate(groups[1::2])
         best = -np.inf
         for candidate in NUMBERS:
-            if candidate > max(len(one) // MIN_PER_CENTRE, 1):
+            if candidate > max(len(training) // MIN_PER_CENTRE, 1):
                 break
-            likelihood = float(_clustered(one, candidate, rng).log_ratio(other).mean())
+            likelihood = float(_clustered(training, candidate, rng).log_ratio(validation).mean())
             if likelihood > best + MIN_GAIN:
                 best, number = likelihood, candidate
     return _clustered(np.concatenate(groups), number, rng)

@@ -44,23 +44,25 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     searches = [_replicates(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
     if leads:
         searches.insert(0, _replicates(score, dimensions, budgets[0], rng, inflates=False))
-    said = [_mean([found.probability for found in search]) for search in searches]
-    drawn = int((1 - PILOT - sum(SEARCHES)) * samples)
+    answers = [_mean([found.probability for found in search]) for search in searches]
+    budget_drawn = int((1 - PILOT - sum(SEARCHES)) * samples)
     groups = [[found.points for found in search if len(found.points) >= MIN_GROUP] for search in searches]
     groups = [group for group in groups if group]
     if not groups:
-        if not any(estimate.value for estimate in said):
-            return Tail(_counted(score, dimensions, drawn, rng), 1.0)
-        return _agreed(said)
-    weights = _importance(score, dimensions, groups, drawn, rng)
+        if not any(estimate.value for estimate in answers):
+            return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
+        return _agreed(answers)
+    weights = _importance(score, dimensions, groups, budget_drawn, rng)
     if not _suffices(weights):
-        return _agreed(said)
+        return _agreed(answers)
     mean = float(weights.mean())
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
     estimate = Estimate(mean, mean / reach, min(mean * reach, 1.0))
-    for other in said:
-        if other.value > 0 and math.log(other.value / mean) > SIGNIFICANT * math.hypot(_log_width(other), _log_width(estimate)):
-            return Tail(estimate._replace(upper=max(estimate.upper, other.upper)), other.value / mean)
+    for alternative in answers:
+        if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
+            _log_width(alternative), _log_width(estimate)
+        ):
+            return Tail(estimate._replace(upper=max(estimate.upper, alternative.upper)), alternative.value / mean)
     return Tail(estimate, 1.0)
 
 
@@ -71,8 +73,8 @@ def either(tails: Sequence[Tail]) -> Tail:
     """
     estimates = np.array([tail.probability for tail in tails])
     total = float(estimates[:, 0].sum())
-    below, above = (math.sqrt(float(((estimates[:, k] - estimates[:, 0]) ** 2).sum())) for k in (1, 2))
-    bounds = max(total - below, 0.0), min(total + above, 1.0)
+    reach_below, reach_above = (math.sqrt(float(((estimates[:, k] - estimates[:, 0]) ** 2).sum())) for k in (1, 2))
+    bounds = max(total - reach_below, 0.0), min(total + reach_above, 1.0)
     return Tail(Estimate(total, *bounds), max(tail.disagreement for tail in tails))
 
 
@@ -101,9 +103,9 @@ def _replicates(score: Score, dimensions: int, budget: int, rng: np.random.Gener
         def search(count: int) -> Found:
             return by_levels(counting, dimensions, count, rng)
 
-    trial, before = max(budget // 100, MIN_LEVEL_SAMPLES), used
+    trial, used_before = max(budget // 100, MIN_LEVEL_SAMPLES), used
     search(trial)
-    cost = max((used - before) / trial, 1.0)  # the number of levels
+    cost = max((used - used_before) / trial, 1.0)  # the number of levels
     count = max(int((budget - used) / REPLICATES / cost), MIN_LEVEL_SAMPLES)
     return [search(count) for _ in range(REPLICATES)]
 
@@ -115,16 +117,16 @@ def _importance(
     around_zero = Mixture(np.zeros((1, dimensions)), np.ones(1))
     shares = [(1 - AROUND_ZERO) / len(groups)] * len(groups)
     mixtures = [fitted(group, rng).flattened() for group in groups]
-    mixture, some = joined([*mixtures, around_zero], [*shares, AROUND_ZERO]), int(ROUND * count)
+    mixture, batch = joined([*mixtures, around_zero], [*shares, AROUND_ZERO]), int(ROUND * count)
     points = np.concatenate([points for group in groups for points in group])
     for _ in range(REFITS):
         mixture = _completed(mixture, points, np.exp(-mixture.log_ratio(points)), rng)
     for _ in range(ROUNDS):
-        u, w = mixture.weights(score, some, dimensions, rng)
+        u, w = mixture.weights(score, batch, dimensions, rng)
         hits = np.flatnonzero(w)
         if len(hits) > MIN_REFIT:
             mixture = _completed(mixture, u[hits], w[hits], rng)
-    return mixture.weights(score, count - ROUNDS * some, dimensions, rng)[1]
+    return mixture.weights(score, count - ROUNDS * batch, dimensions, rng)[1]
 
 
 def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Generator) -> Mixture:
@@ -157,20 +159,20 @@ def _mean(probabilities: Sequence[float]) -> Estimate:
     return Estimate(mean, mean / reach, min(mean * reach, 1.0))
 
 
-def _agreed(said: Sequence[Estimate]) -> Tail:
+def _agreed(answers: Sequence[Estimate]) -> Tail:
     """Return the mean of what the searches say if they agree, else the larger with an interval that covers both."""
-    best = max(said, key=lambda estimate: estimate.value)
-    if len(said) == 1:
+    best = max(answers, key=lambda estimate: estimate.value)
+    if len(answers) == 1:
         return Tail(best, 1.0)
-    one, other = said
-    if not (one.value > 0 and other.value > 0):
+    answer, alternative = answers
+    if not (answer.value > 0 and alternative.value > 0):
         return Tail(best._replace(lower=0.0), math.inf)
-    widths = _log_width(one), _log_width(other)
-    if abs(math.log(one.value / other.value)) > math.hypot(*widths):
-        bounds = min(one.lower, other.lower), max(one.upper, other.upper)
-        return Tail(Estimate(best.value, *bounds), max(one.value / other.value, other.value / one.value))
-    mean = (one.value + other.value) / 2
-    reach = math.exp(math.hypot(one.value * widths[0], other.value * widths[1]) / 2 / mean)
+    widths = _log_width(answer), _log_width(alternative)
+    if abs(math.log(answer.value / alternative.value)) > math.hypot(*widths):
+        bounds = min(answer.lower, alternative.lower), max(answer.upper, alternative.upper)
+        return Tail(Estimate(best.value, *bounds), max(answer.value / alternative.value, alternative.value / answer.value))
+    mean = (answer.value + alternative.value) / 2
+    reach = math.exp(math.hypot(answer.value * widths[0], alternative.value * widths[1]) / 2 / mean)
     return Tail(Estimate(mean, mean / reach, min(mean * reach, 1.0)), 1.0)
 
 

@@ -118,8 +118,8 @@ def _nested(score: Score, dimensions: int, count: int, rng: np.random.Generator,
     for _ in range(MAX_LEVELS):
         if s == 1.0 or not len(z):
             break
-        some = z[rng.choice(len(z), min(LOOKS, len(z)), replace=False)]
-        t = _least(lambda t: (score(t * some) > 0).mean() >= GOAL, s, BISECTIONS)  # noqa: B023  is called at once
+        sample = z[rng.choice(len(z), min(LOOKS, len(z)), replace=False)]
+        t = _least(lambda t: (score(t * sample) > 0).mean() >= GOAL, s, BISECTIONS)  # noqa: B023  is called at once
         hits = score(t * z) > 0
         z = z[hits]
         if not len(z):
