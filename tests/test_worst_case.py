@@ -12,8 +12,10 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
+from tests.cases import toleranced
 from tests.cases.fasteners import fasteners
 from tests.helpers import PAPER, call, nightly
+from tests.test_datums import plate
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.analysis import Analysis
@@ -177,6 +179,30 @@ def test_a_zone_grows_with_the_size_that_it_is_left():
     direction[size] = -10
     far = found.exactly_farthest(direction)
     assert far[size] == pytest.approx(-0.2) and far[shifts] @ (0.6, 0.8) == pytest.approx(0.1 / 2, abs=1e-8)
+
+
+@pytest.mark.parametrize("weight", [1.0, -1.0])
+def test_a_zone_grows_with_the_size_that_a_cause_drives(weight):
+    zone = tc.Position(0.1, "A|B", material="M", rule="translation")
+    a = toleranced.ring_with("bore", tc.Size(10, 0.2, -0.2), zone)
+    a.variable("wear", 0.1, drives={"ring.bore.size": weight})
+    found, labels = region(a)
+    direction = np.zeros(len(labels))
+    direction[[labels.index(f"ring.bore.shift {axis}") for axis in "xy"]] = 0.6, 0.8
+    far = found.exactly_farthest(direction)
+    assert direction @ far == pytest.approx((0.1 + 0.4 + 0.05) / 2, abs=1e-6)
+    assert far[labels.index("wear")] == pytest.approx(0.05 * weight, abs=1e-6)
+    assert found.is_inside(found.farthest(np.random.default_rng(0).standard_normal((50, len(labels))))).all()
+
+
+def test_the_shift_of_a_datum_is_bounded_with_what_causes_add_to_its_tilt():
+    a = plate("outside")
+    a.variable("warp", 0.2, drives={"plate.side.tilt z": 1.0})
+    found, labels = region(a)
+    shift = labels.index("plate.far.datum B of A|B|C")
+    assert found.upper[shift] == pytest.approx(0.15 + 0.1)
+    reached = found.deviations(found.scattered(np.random.default_rng(0), 500))[:, shift]
+    assert 0.2 < reached.max() <= found.upper[shift] + 1e-12
 
 
 @pytest.mark.slow

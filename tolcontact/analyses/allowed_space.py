@@ -41,7 +41,7 @@ class Region:
         for zone in self.zones:
             self._enclose(zone)
         for column, lean in draws.leans.items():
-            self.lower[column], self.upper[column] = lean.bounds(self.lower, self.upper)
+            self.lower[column], self.upper[column] = lean.bounds(*self._driven_bounds())
         self._joined = [(np.array(columns), values) for columns, values in self._populations]
         rng = np.random.default_rng(seed)
         for columns in self._joint_columns():
@@ -147,7 +147,7 @@ class Region:
         """Bound each component by the extent of its zone."""
         widest = zone.width
         if zone.size is not None:
-            ends = np.array([self.lower, self.upper])[:, zone.size]
+            ends = np.array(self._driven_bounds())[:, zone.size]
             widest += float((zone.growth * (ends - zone.limit)).max())
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
         extent = np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2
@@ -155,11 +155,18 @@ class Region:
         columns = zone.columns[~is_bounded]
         self.lower[columns], self.upper[columns] = (zone.middle - extent)[~is_bounded], (zone.middle + extent)[~is_bounded]
 
+    def _driven_bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds (contributor,), (contributor,) of deviations, with all that shared causes may add to them."""
+        ends = np.stack([self.lower, self.upper])[:, :, None] * self._drive
+        return ends.min(axis=0).sum(axis=0), ends.max(axis=0).sum(axis=0)
+
     def _joint_columns(self) -> list[np.ndarray]:
-        """Return sets of columns: zones with common columns are one set, with the sizes that they grow with."""
+        """Return sets of columns: zones with common columns are one set, with sizes that they grow with and causes of these."""
         sets: list[set[int]] = []
         for zone in self.zones:
-            joined = {int(column) for column in zone.columns} | (set() if zone.size is None else {zone.size})
+            joined = {int(column) for column in zone.columns}
+            if zone.size is not None:
+                joined |= {int(column) for column in np.flatnonzero(self._drive[:, zone.size])}
             for overlapping in [columns for columns in sets if columns & joined]:
                 sets.remove(overlapping)
                 joined |= overlapping
