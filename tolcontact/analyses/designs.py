@@ -64,6 +64,9 @@ class SteppedDraws(Design):
             for driven in np.flatnonzero(self._drive[column]):
                 members[:, k, driven] += step * self._drive[column, driven]
                 members[:, count + k, driven] -= step * self._drive[column, driven]
+            if self._drive[column].any():  # a datum follows the tilts that a cause drives
+                self._draws.add_shifts(members[:, k])
+                self._draws.add_shifts(members[:, count + k])
         return members
 
 
@@ -86,7 +89,9 @@ class MixedDraws(Design):
         members[:, 1] = B
         for member, columns in enumerate(self._groups, start=2):
             members[:, member, columns] = B[:, columns]
-        return self._draws.driven(members)
+        members = self._draws.driven(members)
+        self._draws.add_shifts(members.reshape(-1, members.shape[2]))
+        return members
 
 
 class ReleasedDraws(Design):
