@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from llvmlite import binding
 
-from tolcontact.compilation.functions import code_cache, native
+from tolcontact import code_cache
+from tolcontact.compilation.functions import native
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS, AdaptiveFunction
 from tolcontact.compilation.functions.native import NativeFunction, host_description, key_of
 

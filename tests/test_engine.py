@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly, recompiled
+from tolcontact.code_cache import cache_folder
 from tolcontact.compilation import contact_qp
 from tolcontact.compilation.contact_qp import is_convex
 from tolcontact.compilation.functions import InterpretedFunction
-from tolcontact.compilation.functions.code_cache import cache_folder
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin

@@ -1,16 +1,28 @@
-"""Functions compiled by Numba and kept on disk between runs, if that can be done: a cache only saves time.
+"""Functions compiled by Numba, whose machine code is kept in the cache of machine code.
 
-Compiled functions lie in the package's own `__pycache__`, else in the user's cache folder. Numba alone refuses to import
-if neither can be written, and to continue once a file there has been cut off.
+Numba's own cache would trust whatever lies in its folders, does not notice a change in a function that another one calls, and
+refuses to import if no folder can be written.
 """
 
-import contextlib
 import functools
-from collections.abc import Callable
+import hashlib
+import pickle
+import sys
+from collections.abc import Callable, Iterator
+from types import CodeType
 from typing import Any
 
+import numba
+import numpy as np
 from numba import njit
-from numba.core.caching import FunctionCache
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.dispatcher import Dispatcher
+from numba.core.serialize import dumps
+
+from tolcontact import code_cache
+
+CONSTANTS = (bool, int, float, str, bytes, tuple, type(None))
 
 
 def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True) -> Any:
@@ -21,8 +33,7 @@ def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool
     """
     # `_nrt` is Numba's own option for code without reference counts, as on graphics processors.
     dispatcher = njit(nogil=True, error_model="numpy", forceinline=inline, _nrt=counts)(function)
-    with contextlib.suppress(RuntimeError):  # there is no folder to write to
-        dispatcher._cache = _Cache(function)  # what njit(cache=True) does, with Numba's own class
+    dispatcher._cache = _Cache(dispatcher)
     return dispatcher
 
 
@@ -31,15 +42,50 @@ uncounted = functools.partial(compiled, counts=False)
 inlined_uncounted = functools.partial(compiled, counts=False, inline=True)
 
 
-class _Cache(FunctionCache):  # type: ignore[misc]
+class _Cache(NullCache):  # type: ignore[misc]
+    """What a dispatcher asks for the code that it needs, and gives the code that it compiled."""
+
+    def __init__(self, dispatcher: Dispatcher) -> None:
+        self._dispatcher = dispatcher
+
     def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()  # as Numba does before it uses code
+        code = code_cache.load(self._key(sig, target_context.codegen()))
         try:
-            return super().load_overload(sig, target_context)
-        except Exception:  # unpickling a damaged file may raise anything
-            with contextlib.suppress(OSError):
-                self.flush()  # else the damaged index would be read again, to be added to
+            return None if code is None else CompileResult._rebuild(target_context, *pickle.loads(code))
+        except Exception:  # another build of the same version may lack anything
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        with contextlib.suppress(OSError):  # the disk is full, or the folder was writable once
-            super().save_overload(sig, data)
+        if not (data.library.has_dynamic_globals or any(not part.can_cache for part in data.lifted)):  # addresses of a process
+            code_cache.store(self._key(sig, data.codegen), dumps(data._reduce()))
+
+    def _key(self, sig: Any, codegen: Any) -> str:
+        parts = [numba.__version__, sys.version, repr(sig), repr(codegen.magic_tuple()), *_description(self._dispatcher, set())]
+        return hashlib.blake2b("\n".join(parts).encode(), digest_size=20).hexdigest()
+
+
+def _description(dispatcher: Dispatcher, known: set[Dispatcher]) -> Iterator[str]:
+    """Yield texts on which the code of a function depends: its instructions, and those of compiled functions that it calls."""
+    known.add(dispatcher)
+    function = dispatcher.py_func
+    cells = [cell.cell_contents for cell in function.__closure__ or ()]
+    yield f"{function.__module__}.{function.__qualname__} {sorted(dispatcher.targetoptions.items())}"
+    for code in _codes(function.__code__):
+        yield code.co_code.hex()
+        values = [function.__globals__.get(name, name) for name in code.co_names]
+        for value in (*(constant for constant in code.co_consts if not isinstance(constant, CodeType)), *values, *cells):
+            if isinstance(value, Dispatcher):
+                yield from () if value in known else _description(value, known)
+            elif isinstance(value, np.ndarray):
+                yield value.tobytes().hex()
+            else:
+                yield repr(value) if isinstance(value, CONSTANTS) else getattr(value, "__name__", type(value).__name__)
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    """Yield the code of a function, and of those inside it."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _codes(constant)

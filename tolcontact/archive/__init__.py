@@ -139,7 +139,7 @@ from tolcontact.archive.reader import model_of, open_archive, opened
 from tolcontact.archive.settings import Run, run_settings
 from tolcontact.archive.stored_rows import check_rows, row_values, stored
 from tolcontact.archive.variables import labelled, sizes_of_rows
-from tolcontact.archive.writer import ArchiveWriter
+from tolcontact.archive.writer import ArchiveWriter, replacing_archive
 
 __all__ = [
     "ArchiveWriter",
@@ -152,6 +152,7 @@ __all__ = [
     "model_of",
     "open_archive",
     "opened",
+    "replacing_archive",
     "row_values",
     "run_settings",
     "size_in_words",

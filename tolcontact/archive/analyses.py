@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.archive_lock import taken
 from tolcontact.archive.inspection import inspect
 from tolcontact.archive.resuming import check_same_model
-from tolcontact.archive.writer import opened_locked, replacing
+from tolcontact.archive.writer import opened_locked, replacing_archive
 from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.errors import ArchiveError
@@ -36,7 +36,7 @@ def keep(path: str | Path, record: terms.AnalysisRecord, dataset: xr.Dataset, pr
     """
     with taken(path, resume=True) as archive:
         check_room_for(archive, record, program)
-        with replacing(archive) as part:
+        with replacing_archive(archive) as part:
             shutil.copyfile(archive, part)
             stored = dataset.copy()
             for array in stored.variables.values():

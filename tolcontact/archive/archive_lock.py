@@ -9,6 +9,7 @@ from filelock import FileLock, Timeout
 
 from tolcontact.archive.inspection import check_name
 from tolcontact.errors import ArchiveError, OptionError
+from tolcontact.replacing import remove_abandoned
 
 
 @contextlib.contextmanager
@@ -30,6 +31,7 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
     holding = FileLock(lock, timeout=0)
     try:
         _acquire(holding, lock, path)
+        remove_abandoned(real)
         if real.exists():
             _check_replaceable(path, real, is_allowed=overwrite or resume)
         yield real
@@ -43,7 +45,8 @@ def taken(path: str | Path, *, overwrite: bool = False, resume: bool = False) ->
 
 def _acquire(holding: FileLock, lock: Path, path: str | Path) -> None:
     try:
-        lock.touch()  # fails with a reason if it cannot be made
+        # Fails with a reason if it cannot be made. The lock itself does not say one.
+        os.close(os.open(lock, os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_RDWR | os.O_CLOEXEC, 0o666))
         holding.acquire()
     except Timeout as error:
         raise ArchiveError(f'archive "{path}" is being written by another run; wait, or write to a new file') from error

@@ -31,6 +31,7 @@ from tolcontact.checksums import crc32
 from tolcontact.compilation import Program
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
+from tolcontact.replacing import replacing
 
 _XARRAYS_LOCK = combine_locks([NETCDFC_LOCK, HDF5_LOCK])  # its engine "netcdf4" holds it while it reads and closes
 
@@ -49,7 +50,7 @@ class ArchiveWriter:
         Raises ArchiveError if it cannot be written, or if there is no room for it.
         """
         check_room(path, program.nominal, kept_rows(run.keep), run.samples)
-        with replacing(path) as part, opened_locked(part, "w") as file:
+        with replacing_archive(path) as part, opened_locked(part, "w") as file:
             write_header(file, program, run, sums)
             lay_out_rows(file, 0, min(run.samples, terms.FIRST_ROWS))
         self._go_on(path, program.nominal, run.checkpoint_interval)
@@ -62,7 +63,7 @@ class ArchiveWriter:
         """
         inspect(path)
         writer = cls.__new__(cls)
-        with replacing(path) as copy:
+        with replacing_archive(path) as copy:
             # Only the copy is opened: the old file may be open in this process, and HDF5 does not open a file twice.
             shutil.copyfile(path, copy)
             with opened(copy) as results:
@@ -127,7 +128,7 @@ class ArchiveWriter:
     def _make_room_for_all(self) -> None:
         self._values.close()
         try:
-            with replacing(self._path) as part:
+            with replacing_archive(self._path) as part:
                 shutil.copyfile(self._path, part)
                 with opened_locked(part, "r+") as file:
                     lay_out_rows(file, self._length, self.samples)
@@ -199,15 +200,10 @@ class ArchiveWriter:
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
-    """Yield a temporary path to write to; the complete file then replaces `path`."""
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with _as_archive_error(path):
-            yield part
-            part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
+def replacing_archive(path: Path) -> Iterator[Path]:
+    """Yield the path of a new file to write to, which then replaces `path`. Raises ArchiveError if that cannot be done."""
+    with _as_archive_error(path), replacing(path) as part:
+        yield part
 
 
 @contextlib.contextmanager

@@ -61,6 +61,7 @@ Objective = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the estimates as CSV.")]
 Into = Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Also store the result in an archive of the same model.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace the files to write if they exist, whatever they are.")]
 Workers = Annotated[int | None, typer.Option(metavar="N", help="Number of worker processes (with dask).")]
 Scheduler = Annotated[
     str | None,
@@ -105,8 +106,7 @@ def command_line(arguments: list[str] | None = None) -> None:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
     except OSError as error:
-        report = shown(str(error))
-        typer.echo(f"error: the operating system reports: {report}; continue an unfinished archive with --resume", err=True)
+        typer.echo(f"error: the operating system reports: {shown(str(error))}", err=True)
         sys.exit(2)
 
 

@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Archive, AsCsv, AsJson, app, examples, only_one
+from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
 from tolcontact.cli.output import check_page, console, print_data, print_summary
 from tolcontact.errors import shown
 from tolcontact.report import capability_text, write_page
@@ -41,10 +41,11 @@ def summary(
 def report(
     archive: Archive,
     out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: beside the archive.")] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a self-contained page for a browser from an archive."""
     path = out or Path(archive).with_suffix(".html")
-    check_page(path)
+    check_page(path, overwrite=overwrite)
     with open_archive(archive) as results:
         write_page(results, summarize(results), path)
     typer.echo(f"report: {shown(str(path))}")

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 import xarray as xr
 
-from tolcontact.archive import open_archive, taken
-from tolcontact.cli.app import AsJson, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_
+from tolcontact.archive import open_archive, replacing_archive, taken
+from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_
 from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
@@ -49,6 +49,7 @@ def compare(
     report: Annotated[
         Path | None, typer.Option(metavar="FILE.html", help="For archives: also write a page for a browser.")
     ] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.
 
@@ -63,8 +64,8 @@ def compare(
     if report is not None:
         if not all(are_archives):
             raise OptionError("--report applies to archives; write an archive for each solver (run --out), and compare these")
-        check_page(report)
-    with contextlib.nullcontext() if out is None else taken(out) as path:
+        check_page(report, overwrite=overwrite)
+    with contextlib.nullcontext() if out is None else taken(out, overwrite=overwrite) as path:
         if all(are_archives):
             comparison = _compare_archives(inputs, report)
         else:
@@ -76,7 +77,8 @@ def compare(
         if path is not None:
             # Texts as characters: HDF5's texts of free length crash some versions of the netCDF library.
             texts = {name: {"dtype": "S1"} for name in comparison.variables if comparison[name].dtype.kind == "U"}
-            comparison.to_netcdf(path, engine="netcdf4", encoding=texts)
+            with replacing_archive(path) as part:
+                comparison.to_netcdf(part, engine="netcdf4", encoding=texts)
     if as_json:
         print_data(comparison)
     else:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Model, Objective, Resolution, Seed, Solver, app, chosen, examples
+from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples
 from tolcontact.cli.output import check_page, console
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -36,7 +36,12 @@ def new(name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the mo
     text = text.replace(" (NAME is this file without its ending)", "")
     try:
         with path.open("x", encoding="utf-8") as file:
-            file.write(text)
+            try:
+                file.write(text)
+                file.flush()
+            except BaseException:  # the disk may be full
+                path.unlink()
+                raise
     except FileExistsError as error:
         raise OptionError(f'"{path}" exists already, and was not changed; choose another name') from error
     except OSError as error:
@@ -91,13 +96,14 @@ def view(
         Path | None,
         typer.Option(metavar="FILE.html", help="Page to write. Default: a temporary page, opened in the browser."),
     ] = None,
+    overwrite: Overwrite = False,
 ) -> None:
     """Show an assembly before a run: faces with their selectors, locators, contact points and nominal gaps.
 
     The page lists the faults of a model. For an archive it is the report.
     """
     if out is not None:
-        check_page(out)
+        check_page(out, overwrite=overwrite)
     path = out or temporary_page(source)
     if source.suffix.lower() == ".nc":
         with open_archive(source) as results:

@@ -10,7 +10,7 @@ import xarray as xr
 from rich.console import Console
 
 from tolcontact.errors import OptionError
-from tolcontact.report import summary_text
+from tolcontact.report import is_page, summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
@@ -41,12 +41,14 @@ def _plain(value: object) -> object:
     return value.item() if isinstance(value, np.generic) else str(value)
 
 
-def check_page(path: Path) -> None:
-    """Raise OptionError unless `path` may be a page, so that no other file is ever replaced."""
+def check_page(path: Path, *, overwrite: bool = False) -> None:
+    """Raise OptionError unless a page may be written to `path`: no other file is replaced without `overwrite`."""
     if path.suffix.lower() not in (".html", ".htm"):
         raise OptionError(f'"{path}" is not the name of a page; expected one that ends in .html')
     if not path.parent.is_dir():
         raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+    if not overwrite and path.exists() and not is_page(path):
+        raise OptionError(f'"{path}" exists, and is no page of tolcontact; choose another name, or replace it with --overwrite')
 
 
 def print_summary(summary: xr.Dataset) -> None:

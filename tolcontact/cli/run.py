@@ -10,6 +10,7 @@ import xarray as xr
 from tolcontact.cli.app import (
     Model,
     Objective,
+    Overwrite,
     Quiet,
     Resolution,
     Samples,
@@ -57,7 +58,7 @@ def run(
     resolution: Resolution = None,
     objective: Objective = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="Archive to write.")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace the archive if it exists.")] = False,
+    overwrite: Overwrite = False,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the archive if it exists.")] = False,
     keep: Annotated[str, typer.Option(help=f"Variables to archive for each realization: {or_(KEPT)}.")] = "all",
     fields: Annotated[
@@ -79,10 +80,10 @@ def run(
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.
     """
-    if out is None and (overwrite or resume):
+    if out is None and (resume or (overwrite and report is None)):
         raise OptionError("--overwrite and --resume need an archive; name one: --out FILE.nc")
     if report is not None:
-        check_page(report)
+        check_page(report, overwrite=overwrite)
     method = chosen(resolution=resolution, objective=objective)
     # Stopping first gives the cursor back.
     with (
@@ -97,8 +98,8 @@ def run(
 
         results = run_model(
             functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
-            overwrite=overwrite, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until, client=client,
-            fields=int(fields) if fields.isdigit() else fields, progress=progress,
+            overwrite=overwrite and out is not None, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until,
+            client=client, fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip
     _print_results(results, out, report, until, quiet=quiet)
 

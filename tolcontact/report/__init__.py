@@ -39,10 +39,10 @@ says so.
 """
 
 from tolcontact.report.figures import grouped
-from tolcontact.report.html import write_comparison, write_page, write_view
+from tolcontact.report.html import is_page, write_comparison, write_page, write_view
 from tolcontact.report.text import analysis_text, capability_text, comparison_text, population_text, runs_text, summary_text
 
 __all__ = [
-    "analysis_text", "capability_text", "comparison_text", "grouped", "population_text", "runs_text", "summary_text",
+    "analysis_text", "capability_text", "comparison_text", "grouped", "is_page", "population_text", "runs_text", "summary_text",
     "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

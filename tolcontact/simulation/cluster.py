@@ -6,12 +6,14 @@ that are lost are simulated again by others, as dask has it. Shards that a resta
 """
 
 import logging
+import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.metadata import version
 from importlib.util import find_spec
+from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 import lazy_loader
@@ -37,6 +39,7 @@ log = logging.getLogger(__name__)
 SHARDS_AHEAD = 4  # under way for each thread of a worker
 SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
 WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
+LOOPBACK = "127.0.0.1:0"  # any port; by default, pages of a cluster are served on all interfaces
 SCHEDULER_TIMEOUT = 5.0  # s: for an answer of the scheduler
 
 T = TypeVar("T")
@@ -64,7 +67,7 @@ def local_cluster(workers: int) -> Iterator[Any]:
     if isinstance(workers, bool) or not isinstance(workers, int) or workers < 1:
         raise OptionError(f"workers is {workers!r}; expected a whole number, at least 1")
     with needs_dask():
-        started = distributed.LocalCluster
+        started, security = distributed.LocalCluster, distributed.Security.temporary()
         usual = dask.config.get("distributed.nanny.pre-spawn-environ")
     settings = {
         # Dask makes workers give back every freed array to the system at once, which takes them half as long again.
@@ -75,14 +78,34 @@ def local_cluster(workers: int) -> Iterator[Any]:
         "distributed.deploy.lost-worker-timeout": "1000 days",
         "distributed.worker.profile.enabled": False,  # which takes a twentieth of their time
     }
-    with dask.config.set(settings):
+    with dask.config.set(settings), _event_loop() as loop:
         cluster = started(
-            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, dashboard_address=":0",
-            silence_logs=logging.CRITICAL,
+            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, silence_logs=logging.CRITICAL, loop=loop,
+            # Any user of this machine can reach the scheduler, which runs the code of whoever has the credentials.
+            security=security, dashboard_address=LOOPBACK, worker_dashboard_address=LOOPBACK,
         )  # fmt: skip
         with cluster, distributed.Client(cluster) as client:
             _say_where(client)
             yield client
+
+
+@contextmanager
+def _event_loop() -> Iterator[Any]:
+    """Yield an event loop for a cluster. Ctrl-C in a terminal goes to its processes, too; there it is blocked.
+
+    A thread inherits the signals that are blocked in the thread that starts it, and a process those of its parent's thread.
+    """
+    runner = distributed.utils.LoopRunner()
+    resource_tracker.ensure_running()  # the thread that starts it has SIGINT unblocked
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        runner.start()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+    try:
+        yield runner.loop
+    finally:
+        runner.stop()
 
 
 def _say_where(client: Any) -> None:
@@ -96,8 +119,9 @@ def running_cluster(address: str) -> Iterator[Any]:
     with needs_dask():
         try:
             client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
-        except (OSError, ValueError) as error:
-            raise ClusterError(f'no dask scheduler answers at "{address}": {error}; start one with: dask scheduler') from error
+        except (OSError, ValueError, TypeError) as error:  # TypeError: dask has no certificates
+            advice = "start one with: dask scheduler; one that asks for certificates needs tls:// and those in dask's settings"
+            raise ClusterError(f'no dask scheduler answers at "{address}": {error}; {advice}') from error
     with client:
         _say_where(client)
         yield client

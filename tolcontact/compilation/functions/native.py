@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from llvmlite import binding, ir
 
-from tolcontact.compilation.functions import code_cache
+from tolcontact import code_cache
 
 LANES = 4
 _INDEX = ir.IntType(64)

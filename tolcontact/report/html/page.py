@@ -1,5 +1,7 @@
 """Pages from templates; each holds its styles, scripts, libraries and data."""
 
+import base64
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +14,7 @@ import xarray as xr
 from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ArchiveError
+from tolcontact.replacing import replacing
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
@@ -21,6 +24,7 @@ from tolcontact.report.text.summary import contact_lines, measure_rows, notes, o
 from tolcontact.vocabulary import STATES
 
 HERE = Path(__file__).parent
+GENERATOR = '<meta name="generator" content="tolcontact">'
 SCRIPTS = {
     "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "viewer.js", "charts.js", "report.js"),
     "view": ("vendor/three.min.js", "data.js", "viewer.js", "view.js"),
@@ -43,6 +47,14 @@ def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str
 def write_comparison(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset, path: Path) -> None:
     """Write the comparison of runs (see compare_runs). Raises ArchiveError if the file cannot be written."""
     _write(comparison_page(runs, comparison), path)
+
+
+def is_page(path: Path) -> bool:
+    """Return whether a file is a page that tolcontact wrote."""
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return GENERATOR.encode() in file.read(1000)
 
 
 def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
@@ -109,10 +121,13 @@ def summary_table(summary: xr.Dataset) -> str:
 
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
+    scripts = [_as_is(file) for file in SCRIPTS[kind]]
     return _template(kind).render(
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
-        scripts=[_as_is(file) for file in SCRIPTS[kind]],
+        generator=markupsafe.Markup(GENERATOR),
+        scripts=scripts,
+        allowed=" ".join(map(_hash, scripts)),  # no other script runs, whatever the data are
         **values,
     )
 
@@ -123,17 +138,20 @@ def _template(name: str) -> jinja2.Template:
 
 
 def _write(page: str, path: Path) -> None:
-    part = path.with_name(f".{path.name}.part")
     try:
-        part.write_text(page, encoding="utf-8")
-        part.replace(path)
+        with replacing(path) as part:
+            part.write_text(page, encoding="utf-8")
     except OSError as error:
-        part.unlink(missing_ok=True)
         raise ArchiveError(f'page "{path}" cannot be written: {error.strerror}') from error
 
 
-def _as_is(file: str) -> Any:
+def _as_is(file: str) -> markupsafe.Markup:
     return markupsafe.Markup((HERE / file).read_text(encoding="utf-8").replace("</script", "<\\/script"))
+
+
+def _hash(script: markupsafe.Markup) -> str:
+    """Return the hash of a script as a content security policy states it."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()}'"
 
 
 def _plain_json(data: Any, **_: Any) -> str:

@@ -1,0 +1,31 @@
+"""Files that appear under their names only when they are complete."""
+
+import contextlib
+import glob
+import os
+import secrets
+from collections.abc import Iterator
+from pathlib import Path
+
+
+@contextlib.contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the path of a new, empty file to write to, which then replaces `path`.
+
+    It stands beside `path`, under a name that nobody can have given to a file or link before.
+    Raises OSError if it cannot be made, or cannot replace `path`; then `path` stays as it is.
+    """
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_WRONLY | os.O_CLOEXEC, 0o666))
+    try:
+        yield part
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def remove_abandoned(path: Path) -> None:
+    """Remove the files that writers of `path` left when they were killed. Nobody may be writing it now."""
+    for part in path.parent.glob(f".{glob.escape(path.name)}.{'[0-9a-f]' * 8}.part"):
+        with contextlib.suppress(OSError):  # that of another user
+            part.unlink()
