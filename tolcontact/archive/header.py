@@ -9,7 +9,7 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
 from tolcontact.archive.stored_rows import empty_checks
-from tolcontact.archive.variables import define, labels_of_rows, lay_out, units_of_rows, write
+from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
@@ -22,7 +22,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
 
     `sums` is the length of the sums of each part's field, in one state.
     """
-    nominal = program.nominal
+    nominal, contents = program.nominal, Contents()
     file.setncatts(
         {
             "Conventions": terms.CONVENTIONS,
@@ -36,22 +36,23 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             **run_settings(program, run),
         }
     )
-    _write_labels(file, nominal)
-    _write_rows(file, program, kept_rows(run.keep))
-    _write_measures(file, program)
-    _write_model(file.createGroup("model"), nominal, declaration(program))
-    _write_contact(file.createGroup("contact"), program)
-    _write_sample(file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
+    _write_labels(contents, file, nominal)
+    _write_rows(contents, file, program, kept_rows(run.keep))
+    _write_measures(contents, file, program)
+    _write_model(contents, file.createGroup("model"), nominal, declaration(program))
+    _write_contact(contents, file.createGroup("contact"), program)
+    _write_sample(contents, file.createGroup("sample"), program, deviations=terms.DEVIATION in kept_rows(run.keep))
     file["contact"].createDimension(terms.BOUND, 2)
-    _lay_out_group(file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
+    _lay_out_group(contents, file["contact"], empty_touching(file["contact"].dimensions[terms.POINT].size))
     checked = file.createGroup("surface")
     checked.createDimension(terms.CHECKED, run.surfaces)
-    _lay_out_group(checked, empty_checks(run.surfaces, len(nominal.pairs)))
+    _lay_out_group(contents, checked, empty_checks(run.surfaces, len(nominal.pairs)))
     for part, numbers in zip(nominal.parts, sums, strict=True):
-        _write_field(file.createGroup(terms.field_of(part.name)), part, numbers)
+        _write_field(contents, file.createGroup(terms.field_of(part.name)), part, numbers)
+    contents.write()
 
 
-def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
+def _write_labels(contents: Contents, file: netCDF4.Dataset, nominal: Nominal) -> None:
     """Write the dimensions of the root and their labels."""
     labels = labels_of_rows(nominal)
     file.createDimension(terms.REALIZATION, None)
@@ -59,12 +60,12 @@ def _write_labels(file: netCDF4.Dataset, nominal: Nominal) -> None:
         file.createDimension(name, len(values))
     for coordinate in terms.COORDINATES:
         if coordinate.name in labels:
-            write(file, coordinate, labels[coordinate.name])
+            contents.add(file, coordinate, labels[coordinate.name])
         else:
             define(file, coordinate)
 
 
-def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveVariable]) -> None:
+def _write_rows(contents: Contents, file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveVariable]) -> None:
     """Define the variables of realizations, their checksums and checkpoints, all without values."""
     for variable in terms.ROWS:
         if variable in rows:
@@ -73,26 +74,26 @@ def _write_rows(file: netCDF4.Dataset, program: Program, rows: Sequence[ArchiveV
         file[variable.name].units = units
     file.createDimension(terms.BLOCK, None)
     file.createDimension(terms.ROW_VARIABLE, len(rows))
-    write(file, terms.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
+    contents.add(file, terms.ROW_VARIABLE_LABEL, [variable.name for variable in rows])
     define(file, terms.ROW_CHECKSUM)
     file.createDimension(terms.CHECKPOINT, 2)
-    lay_out(file, terms.SUMMED_ROWS, [terms.UNFINISHED] * 2)
+    contents.lay_out(file, terms.SUMMED_ROWS, [terms.UNFINISHED] * 2)
 
 
-def _write_measures(file: netCDF4.Dataset, program: Program) -> None:
+def _write_measures(contents: Contents, file: netCDF4.Dataset, program: Program) -> None:
     measures = program.nominal.measures
-    write(file, terms.MEASURE_NOMINAL, program.nominal_measures)
-    write(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
+    contents.add(file, terms.MEASURE_NOMINAL, program.nominal_measures)
+    contents.add(file, terms.MEASURE_TOLERANCE, [np.nan if measure.width is None else measure.width for measure in measures])
     bounds = np.array([m.bounds(nominal) for m, nominal in zip(measures, program.nominal_measures, strict=True)])
     bounds = np.where(np.isfinite(bounds), bounds, np.nan).reshape(-1, 2)
-    write(file, terms.LOWER_LIMIT, bounds[:, 0])
-    write(file, terms.UPPER_LIMIT, bounds[:, 1])
-    write(file, terms.MEASURE_ACCURACY, program.accuracies)
-    write(file, terms.QUANTITY, [measure.quantity for measure in measures])
-    write(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
+    contents.add(file, terms.LOWER_LIMIT, bounds[:, 0])
+    contents.add(file, terms.UPPER_LIMIT, bounds[:, 1])
+    contents.add(file, terms.MEASURE_ACCURACY, program.accuracies)
+    contents.add(file, terms.QUANTITY, [measure.quantity for measure in measures])
+    contents.add(file, terms.MEASURE_UNITS, [measure.units for measure in measures])
 
 
-def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
+def _write_field(contents: Contents, group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     """Write the surface of a part, and lay out its displacement field and its sums."""
     group.setncattr("part", part.name)
     sizes = {
@@ -105,13 +106,13 @@ def _write_field(group: netCDF4.Group, part: NominalPart, numbers: int) -> None:
     }
     for name, size in sizes.items():
         group.createDimension(name, size)
-    write(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
-    write(group, terms.FIELD_VERTICES, part.vertices)
-    write(group, terms.FIELD_FACES, part.faces)
-    write(group, terms.BOUND_LABEL, terms.BOUNDS)
-    _lay_out_group(group, empty_field(len(part.vertices)))
-    lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
-    lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
+    contents.add(group, terms.COMPONENT_LABEL, terms.COMPONENTS)
+    contents.add(group, terms.FIELD_VERTICES, part.vertices)
+    contents.add(group, terms.FIELD_FACES, part.faces)
+    contents.add(group, terms.BOUND_LABEL, terms.BOUNDS)
+    _lay_out_group(contents, group, empty_field(len(part.vertices)))
+    contents.lay_out(group, terms.FIELD_SUMS, np.full([2, len(terms.STATES), numbers], np.nan))
+    contents.lay_out(group, terms.SUMS_CHECKSUM, [terms.UNFINISHED] * 2)
 
 
 def empty_field(vertices: int) -> dict[ArchiveVariable, Any]:
@@ -134,14 +135,14 @@ def empty_touching(points: int) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _lay_out_group(group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
+def _lay_out_group(contents: Contents, group: netCDF4.Group, values: Mapping[ArchiveVariable, Any]) -> None:
     for variable, initial in values.items():
-        lay_out(group, variable, initial)
-    lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
+        contents.lay_out(group, variable, initial)
+    contents.lay_out(group, terms.GROUP_CHECKSUM, terms.UNFINISHED)
 
 
-def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
-    write(group, terms.DECLARATION, document)
+def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, document: str) -> None:
+    contents.add(group, terms.DECLARATION, document)
     for part in nominal.parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
@@ -149,23 +150,25 @@ def _write_model(group: netCDF4.Group, nominal: Nominal, document: str) -> None:
             mesh.createDimension(terms.VERTEX, len(part.mesh.vertices))
             mesh.createDimension(terms.FACE, len(part.mesh.faces))
             mesh.createDimension(terms.CORNER, 3)
-            write(mesh, terms.MESH_VERTICES, part.mesh.vertices)
-            write(mesh, terms.MESH_FACES, part.mesh.faces)
+            contents.add(mesh, terms.MESH_VERTICES, part.mesh.vertices)
+            contents.add(mesh, terms.MESH_FACES, part.mesh.faces)
             surfaces = known_surfaces(part.mesh)
             if surfaces is not None:
                 mesh.createDimension(terms.BREP_FACE, len(surfaces[1]))
-                write(mesh, terms.BREP_OF_FACE, surfaces[0])
-                _write_surfaces(mesh, terms.OF_BREP_FACE, surface_arrays(surfaces[1]))
+                contents.add(mesh, terms.BREP_OF_FACE, surfaces[0])
+                _write_surfaces(contents, mesh, terms.OF_BREP_FACE, surface_arrays(surfaces[1]))
                 if surfaces[2]:
-                    write(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
+                    contents.add(mesh, terms.NAME_OF_BREP_FACE, surfaces[2])
 
 
-def _write_surfaces(group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]) -> None:
+def _write_surfaces(
+    contents: Contents, group: netCDF4.Group, variables: Mapping[str, ArchiveVariable], arrays: Mapping[str, np.ndarray]
+) -> None:
     for name, variable in variables.items():
-        write(group, variable, arrays[name])
+        contents.add(group, variable, arrays[name])
 
 
-def _write_contact(group: netCDF4.Group, program: Program) -> None:
+def _write_contact(contents: Contents, group: netCDF4.Group, program: Program) -> None:
     nominal = program.nominal
     group.createDimension(terms.POINT, sum(len(pair.P_m) for pair in nominal.pairs))
     if any(pair.round for pair in nominal.pairs):
@@ -179,7 +182,7 @@ def _write_contact(group: netCDF4.Group, program: Program) -> None:
         for name, size in sizes.items():
             group.createDimension(name, size)
     for variable, values in contact_values(program).items():
-        write(group, variable, values)
+        contents.add(group, variable, values)
 
 
 def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
@@ -251,22 +254,22 @@ def _round_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     }
 
 
-def _write_sample(group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
+def _write_sample(contents: Contents, group: netCDF4.Group, program: Program, *, deviations: bool) -> None:
     nominal, contributors = program.nominal, program.draws.contributors
     group.createDimension(terms.CONTRIBUTOR, len(contributors))
     group.createDimension(terms.LOCATOR, len(nominal.locators))
     if deviations:
         define(group, terms.DEVIATION)
-    write(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
-    write(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
-    write(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
-    write(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
-    write(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
-    write(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
+    contents.add(group, terms.CONTRIBUTOR_LABEL, [contributor.label for contributor in contributors])
+    contents.add(group, terms.CONTRIBUTOR_SOURCE, [contributor.source for contributor in contributors])
+    contents.add(group, terms.CONTRIBUTOR_UNITS, [contributor.units for contributor in contributors])
+    contents.add(group, terms.TOLERANCE_RANGE, [contributor.range for contributor in contributors])
+    contents.add(group, terms.DISTRIBUTION, [contributor.description for contributor in contributors])
+    contents.add(group, terms.MEAN_SHIFT, [contributor.mean_shift for contributor in contributors])
     locators = nominal.locators
-    write(group, terms.LOCATOR_LABEL, locators.labels)
-    write(group, terms.STIFFNESS, locators.stiffness)
-    write(group, terms.ONE_SIDED, locators.one_sided)
-    write(group, terms.LOCATOR_POINT, locators.points)
-    write(group, terms.LOCATOR_DIRECTION, locators.directions)
-    write(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
+    contents.add(group, terms.LOCATOR_LABEL, locators.labels)
+    contents.add(group, terms.STIFFNESS, locators.stiffness)
+    contents.add(group, terms.ONE_SIDED, locators.one_sided)
+    contents.add(group, terms.LOCATOR_POINT, locators.points)
+    contents.add(group, terms.LOCATOR_DIRECTION, locators.directions)
+    contents.add(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])

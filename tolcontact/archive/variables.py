@@ -51,30 +51,43 @@ def _dimension(group: netCDF4.Dataset, name: str) -> netCDF4.Dimension:
     return _dimension(group.parent, name)
 
 
-def write(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """Write a variable with its final values and their checksum, in a group that has the dimensions."""
-    if variable.kind is str:
-        _write_text(group, variable, values)
-    else:
-        lay_out(group, variable, values)
-    group[variable.name].setncattr(terms.CHECKSUM, np.int64(crc32(variable, values)))
+class Contents:
+    """Variables that are defined one after the other, and whose values are written together.
 
+    The library goes through all definitions again before the first value that follows one.
+    """
 
-def lay_out(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """Write a variable of numbers whose values will be overwritten."""
-    define(group, variable)
-    if np.size(values):
-        group[variable.name][...] = values
+    def __init__(self) -> None:
+        self._values: list[tuple[netCDF4.Variable, Any]] = []
 
+    def add(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
+        """Add a variable with its final values and their checksum, in a group that has the dimensions."""
+        if variable.kind is str:
+            self._add_text(group, variable, values)
+        else:
+            self.lay_out(group, variable, values)
+        group[variable.name].setncattr(terms.CHECKSUM, np.int64(crc32(variable, values)))
 
-def _write_text(group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
-    """Write text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
-    text = np.char.encode(np.array(values, dtype=str), "utf-8")
-    length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
-    created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))
-    if text.size:
-        created[...] = text.reshape(*text.shape, 1).view("S1") if text.dtype.itemsize else ""
-    created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
+    def lay_out(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
+        """Add a variable of numbers whose values will be overwritten."""
+        define(group, variable)
+        if np.size(values):
+            self._values.append((group[variable.name], values))
+
+    def _add_text(self, group: netCDF4.Dataset, variable: ArchiveVariable, values: Any) -> None:
+        """Add text as characters. The netCDF library crashes if text of variable length is read through two open handles."""
+        text = np.char.encode(np.array(values, dtype=str), "utf-8")
+        length = group.createDimension(f"{variable.name}_length", max(text.dtype.itemsize, 1))
+        created = group.createVariable(variable.name, "S1", (*variable.dims, length.name))
+        if text.size:
+            letters = text.reshape(*text.shape, 1).view("S1") if text.dtype.itemsize else ""
+            self._values.append((created, letters))
+        created.setncatts({**variable.all_attributes, "_Encoding": "utf-8"})
+
+    def write(self) -> None:
+        """Write all values."""
+        for stored, values in self._values:
+            stored[...] = values
 
 
 def labels_of_rows(nominal: Nominal) -> dict[str, Sequence[str]]:

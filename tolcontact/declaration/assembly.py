@@ -25,7 +25,10 @@ from tolcontact.readable import Pictured
 T = TypeVar("T")
 
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
-LISTS = ("parts", "locations", "pairs", "measures", "forces", "variables", "correlations", "populations")
+MAX_COUNTS = {  # of what an assembly declares
+    "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
+    "populations": 1000,
+}  # fmt: skip
 
 
 class Declared(Generic[T]):
@@ -58,7 +61,7 @@ class Assembly(Pictured):
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         self.name = name
         self.method = method
-        self._declared: dict[str, list[Any]] = {name: [] for name in LISTS}
+        self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     def _add(self, name: str, thing: T) -> T:
         """Append a declaration to a list and return it."""
@@ -70,7 +73,7 @@ class Assembly(Pictured):
         copy = Assembly(self.name, method=self.method)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
-            raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(LISTS)}")
+            raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
         return copy
 
     @property
@@ -192,6 +195,9 @@ class Assembly(Pictured):
         if not self.measures:
             yield "it measures nothing; declare at least one measure with assembly.measure(...)"
         yield from text_faults("assembly", [self.name])
+        for name, most in MAX_COUNTS.items():
+            if (count := len(self._declared[name])) > most:
+                yield f"it has {count} {name}; expected at most {most}"
         keyed = {"part": "parts", "contact pair": "pairs", "measure": "measures", "force": "forces"}
         for kind, name in keyed.items():
             yield from key_faults(kind, [thing.name for thing in self._declared[name]])

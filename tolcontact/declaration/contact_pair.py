@@ -8,6 +8,7 @@ from tolcontact.declaration.part import Face
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
+MAX_POINTS = 100_000  # of a pair; more take minutes, and gigabytes
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,8 +36,8 @@ class ContactPair(Readable):
         yield from self.reference.faults()
         if self.moving.part is self.reference.part:
             yield f'both faces belong to part "{self.moving.part.name}"; a pair needs two parts'
-        if self.points not in (None, VERTICES) and not (type(self.points) is int and self.points >= 1):
-            yield f'points is {self.points!r}; expected a whole number, 1 or above, or "{VERTICES}"'
+        if self.points not in (None, VERTICES) and not (type(self.points) is int and 1 <= self.points <= MAX_POINTS):
+            yield f'points is {self.points!r}; expected a whole number from 1 to {MAX_POINTS}, or "{VERTICES}"'
         for option in ("spacing", "within"):
             length = getattr(self, option)
             if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):

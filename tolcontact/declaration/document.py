@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import msgspec
 from msgspec import UNSET, Meta, UnsetType
 
-from tolcontact.declaration.assembly import Assembly
+from tolcontact.declaration.assembly import MAX_COUNTS, Assembly
 from tolcontact.declaration.codec import CODECS, Choice, Inline, Items, Optional, Plain, Record
 from tolcontact.declaration.contact_pair import VERTICES, ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
@@ -227,6 +227,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     """Return the assembly of a document. Raises EntryError, which states the place of the first fault."""
     place = Place(sources)
     struct = place.converted(document, DOCUMENT)
+    for name, most in MAX_COUNTS.items():  # before all of them are read
+        if (count := len(getattr(struct, name))) > most:
+            raise place[name].error(f"it has {count} entries; expected at most {most}")
     for k, entry in enumerate(struct.parts):
         part = RECORDS["parts"].decode(entry, place["parts"][k])
         if part.name in sources.parts:

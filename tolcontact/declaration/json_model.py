@@ -1,6 +1,7 @@
 """Models as JSON files, and the JSON schema of these files."""
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,8 +15,9 @@ from tolcontact.declaration.geometry import Mesh
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face
 from tolcontact.declaration.place import EntryError, Sources
-from tolcontact.errors import ScriptError
+from tolcontact.errors import ScriptError, clipped
 
+MAX_BYTES = 1 << 26  # of a file
 SCHEMA_NAME = "model.schema.json"
 
 
@@ -26,13 +28,24 @@ def read_json(path: Path) -> Assembly:
     structure.
     """
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        if (size := path.stat().st_size) > MAX_BYTES:
+            raise ValueError(f"it has {size} bytes; expected at most {MAX_BYTES}")
+        document = json.loads(path.read_text(encoding="utf-8"), object_pairs_hook=_unique)
     except (OSError, ValueError, RecursionError) as error:
         raise ScriptError(f'model "{path}" cannot be read as JSON: {error}') from error
     try:
         return assembly_of(document, Sources({}, path.parent, path.name))
     except EntryError as error:
         raise ScriptError(f'model "{path}": {error}') from error
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the named values of an object. Raises ValueError for a name that it has twice."""
+    values = dict(pairs)
+    if len(values) < len(pairs):
+        name, _ = Counter(name for name, _ in pairs).most_common(1)[0]
+        raise ValueError(f'"{clipped(name, 40)}" stands twice among the same named values; expected it once')
+    return values
 
 
 def write_json(assembly: Assembly, path: Path, triangles: Callable[[Face], list[int]], tapes: Mapping[str, Tape]) -> None:

@@ -141,7 +141,7 @@ BINARY = (
     "atan2", "fmin", "fmax", "hypot", "if_else_zero",
 )  # fmt: skip
 OPERANDS = {"input": 1, "const": 1, **dict.fromkeys(UNARY, 1), **dict.fromkeys(BINARY, 2)}
-MAX_STEPS = 1_000_000  # a longer expression takes minutes to compile
+MAX_STEPS = 100_000  # a longer expression takes minutes to compile
 
 
 def tape_of(rows: list[list[Any]], place: Place, max_steps: int = MAX_STEPS) -> Tape:

@@ -1,6 +1,7 @@
 """The variation of a contributor: the range of its tolerance, and the distribution that fills this range."""
 
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,8 @@ import scipy
 from tolcontact.declaration.values import is_length
 from tolcontact.readable import Readable
 
+MAX_DRAW_SECONDS = 0.01
+DRAWN = (0.1, 0.4, 0.9)
 SHAPES = ("normal", "uniform", "triangular", "truncated normal")
 
 
@@ -43,21 +46,8 @@ class Tolerance(Readable):
                 )
             if not (isinstance(self.range, int | float) and math.isfinite(self.range) and self.range >= 0):
                 yield f"tolerance range is {self.range!r}; expected the full width of the zone in mm, 0 or above"
-        elif not (
-            hasattr(getattr(self.distribution, "dist", None), "pdf")
-            and hasattr(getattr(self.distribution, "dist", None), "name")
-        ):
-            yield (
-                f"distribution is a {type(self.distribution).__name__}; expected one of {', '.join(SHAPES)}, "
-                "or a frozen continuous distribution such as scipy.stats.norm(0, 0.1)"
-            )
-        elif fault := _not_archivable(self.distribution):
-            yield fault
-        elif self.range is not None:
-            yield "a range is given with a scipy.stats distribution, which has its own width; leave the range out"
-        elif not math.isfinite(median := float(self.distribution.ppf(0.5))):
-            yield f"the median of scipy.stats.{self.distribution.dist.name} is {median}; expected finite parameters [mm]"
-
+        else:
+            yield from self._scipy_faults()
         if not is_length(self.shift):
             yield f"shift is {self.shift!r}; expected a number in mm"
         for option, value in (("cp", self.cp), ("cpk", self.cpk)):
@@ -67,6 +57,25 @@ class Tolerance(Readable):
                 yield f"{option} is given, which goes with a normal distribution; leave it out"
         if self.cpk is not None and (self.cp is None or (is_length(self.cpk) and is_length(self.cp) and self.cpk > self.cp)):
             yield f"cpk is {self.cpk!r} with cp {self.cp!r}; expected cp, and cpk at most as large"
+
+    def _scipy_faults(self) -> Iterator[str]:
+        frozen = self.distribution
+        if not (hasattr(getattr(frozen, "dist", None), "pdf") and hasattr(getattr(frozen, "dist", None), "name")):
+            yield (
+                f"distribution is a {type(frozen).__name__}; expected one of {', '.join(SHAPES)}, "
+                "or a frozen continuous distribution such as scipy.stats.norm(0, 0.1)"
+            )
+        elif fault := _not_archivable(frozen):
+            yield fault
+        elif self.range is not None:
+            yield "a range is given with a scipy.stats distribution, which has its own width; leave the range out"
+        elif not math.isfinite(median := float(frozen.ppf(0.5))):
+            yield f"the median of scipy.stats.{frozen.dist.name} is {median}; expected finite parameters [mm]"
+        elif (seconds := _seconds_per_draw(frozen)) > MAX_DRAW_SECONDS:
+            yield (
+                f"a draw of scipy.stats.{frozen.dist.name} takes {1000 * seconds:.0f} ms of processor time, too long for a run; "
+                f"expected at most {1000 * MAX_DRAW_SECONDS:g} ms; choose a distribution with a quicker ppf"
+            )
 
     @property
     def mean_shift(self) -> float:
@@ -101,6 +110,14 @@ def scipy_distribution(name: str) -> Any | None:
     """Return the continuous distribution of scipy.stats with this name; None for an unknown name."""
     family = getattr(scipy.stats, name, None)
     return family if isinstance(family, scipy.stats.rv_continuous) and family.name == name else None
+
+
+def _seconds_per_draw(frozen: Any) -> float:
+    """Return the processor time [s] of a draw. The first one may load libraries, and does not count."""
+    began = time.process_time()
+    for u in DRAWN:
+        frozen.ppf(u)
+    return (time.process_time() - began) / len(DRAWN)
 
 
 def _not_archivable(frozen: Any) -> str:

@@ -12,25 +12,37 @@ from typing import Any
 
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
+MAX_NAME = 500  # characters
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
 
 def text_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
     """Yield the faults of names that are only shown."""
     for name in dict.fromkeys(names):
-        if not is_line(name):
+        if fault := _length_fault(kind, name):
+            yield fault
+        elif not is_line(name):
             yield f"{kind} {name!r}: a name must be text without control characters (the archive uses it)"
 
 
 def key_faults(kind: str, names: Sequence[Any]) -> Iterator[str]:
     """Yield the faults of names that identify things in the archive."""
     for name in dict.fromkeys(names):
-        if not (is_line(name) and _KEY.fullmatch(name)):
+        if fault := _length_fault(kind, name):
+            yield fault
+        elif not (is_line(name) and _KEY.fullmatch(name)):
             yield (
                 f"{kind} {name!r}: a name must be text that starts with a letter, digit or underscore, contains "
                 'no "/" and no control character, and does not end in a space (the archive uses it)'
             )
     yield from repetitions(kind, names)
+
+
+def _length_fault(kind: str, name: Any) -> str:
+    """Return the fault of a name that is too long; empty if it is not."""
+    if not isinstance(name, str) or len(name) <= MAX_NAME:
+        return ""
+    return f"{kind} {name[:40]!r}...: the name has {len(name)} characters; expected at most {MAX_NAME}"
 
 
 def repetitions(kind: str, names: Sequence[Any]) -> Iterator[str]:

@@ -1,6 +1,5 @@
 """Contact points of a pair of faces: points of the moving face, and their feet on the reference face."""
 
-import logging
 import math
 import warnings
 from collections.abc import Mapping
@@ -10,10 +9,11 @@ import numpy as np
 import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
+from tolcontact.declaration.contact_pair import MAX_POINTS
 from tolcontact.discretization.nominal import ContactPoints, NominalPart, Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.errors import ContactWarning, GeometryFault, designation, shown
+from tolcontact.errors import ContactWarning, GeometryFault, designation
 from tolcontact.features import FaceDeviation, Features
 from tolcontact.geometry.curvature import CHORD_SHARE, curvature_points, distinct, facet_error, is_flat, sampling_error
 from tolcontact.geometry.faces import Meshes, patch
@@ -23,11 +23,7 @@ from tolcontact.geometry.surface import Surface
 
 DEFAULT_REACH = 0.1  # of the moving part's size
 DEFAULT_POINTS = 200
-MAX_SILENT_POINTS = 100_000  # of a pair; more points are announced with a warning
-SECONDS_PER_POINT = 1e-4
 POINT_TOLERANCE = 1e-9  # of the part's size: points that are no farther apart are one point
-
-log = logging.getLogger(__name__)
 
 
 def contact_points(
@@ -90,7 +86,8 @@ def _candidates(
         points = distinct_vertices(mesh)
     else:
         count = DEFAULT_POINTS if _is_open(pair) else pair.points
-        _announce(pair, mesh.area, count)
+        if pair.spacing is not None:
+            _check_number(mesh.area / pair.spacing**2, f"a spacing of {pair.spacing:g} mm gives")
         points = spread(mesh, count, pair.spacing)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
     if is_flat(moving_face) and is_flat(reference_face):
@@ -124,6 +121,7 @@ def _touching(
             f"its faces {pair.moving} and {pair.reference} point the same way, so one cannot rest on the other; "
             "choose faces that face each other"
         )
+    _check_number(int(is_touching.sum()), "its faces have")
     return P_m[is_touching], P_r[is_touching], n_r[is_touching]
 
 
@@ -143,13 +141,12 @@ def _height_offsets(deviating: tuple[FaceDeviation | None, FaceDeviation | None]
     return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
 
 
-def _announce(pair: ContactPair, area: float, count: int | None) -> None:
-    points = count if pair.spacing is None else area / pair.spacing**2
-    log.log(
-        logging.WARNING if points and points > MAX_SILENT_POINTS else logging.INFO,
-        'contact pair "%s": about %d contact points, about %.0f s',
-        shown(pair.name), points or 0, SECONDS_PER_POINT * (points or 0),
-    )  # fmt: skip
+def _check_number(points: float, subject: str) -> None:
+    """Raise GeometryFault if there are too many contact points."""
+    if points > MAX_POINTS:
+        raise GeometryFault(
+            f"{subject} {points:.3g} contact points; expected at most {MAX_POINTS}; choose fewer with points=..."
+        )
 
 
 def _with_curvature(

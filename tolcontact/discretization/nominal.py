@@ -19,6 +19,8 @@ from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import triangles
 from tolcontact.geometry.surface import Surface
 
+GAPS_TOGETHER = 1 << 20  # that are computed at once
+
 
 @dataclass(frozen=True, eq=False)
 class NominalPart:
@@ -135,7 +137,11 @@ class ContactPoints:
 
     def least_gap(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12), above planes grown by `heights` (row,) [mm]."""
-        return ((pose.apply(X_RM, self.P_m) - self.P_r) * self.n_r).sum(axis=2).min(axis=1) - heights
+        gaps, together = np.empty(len(X_RM)), max(1, GAPS_TOGETHER // max(len(self.P_m), 1))
+        for k in range(0, len(X_RM), together):
+            X = X_RM[k : k + together]
+            gaps[k : k + together] = ((pose.apply(X, self.P_m) - self.P_r) * self.n_r).sum(axis=2).min(axis=1)
+        return gaps - heights
 
     @cached_property
     def weights(self) -> Float[Array, " point"]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -16,9 +17,9 @@ from tolcontact.statistics.sample import Sample, measured_sample
 class MeasuredValues:
     """The values of a measure in one state, with its limits; intermediate results of several statistics are computed once."""
 
-    def __init__(self, rows: xr.Dataset, measure: int, state: str) -> None:
+    def __init__(self, rows: xr.Dataset, measure: int, state: str, limits: Limits) -> None:
         self.sample: Sample = measured_sample(rows, measure, state)
-        self.limits = limits(rows)[measure]
+        self.limits = limits
 
     @cached_property
     def variance(self) -> Estimate:
@@ -61,36 +62,45 @@ STATISTICS: dict[str, Callable[[MeasuredValues], Estimate]] = {
 }
 
 
-def all_statistics(rows: xr.Dataset) -> np.ndarray:
-    """Return the estimates of all `STATISTICS`, (measure, state, statistic, interval)."""
-    values = [[MeasuredValues(rows, k, state) for state in terms.STATES] for k in range(rows.sizes[terms.MEASURE])]
-    return np.array([[[statistic(x) for statistic in STATISTICS.values()] for x in states] for states in values])
+class MeasureEstimates(NamedTuple):
+    """The estimates of all measures.
+
+    statistics  (measure, state, statistic, interval)  of all `STATISTICS`
+    changes     (measure, change_of, interval)         from raw to corrected
+    stops       (measure,)                             the sides, "lower" or "upper" or both, at which corrected values stop
+                                                       (see without_stops)
+    """
+
+    statistics: np.ndarray
+    changes: np.ndarray
+    stops: np.ndarray
 
 
-def stops(rows: xr.Dataset) -> list[str]:
-    """Return the sides, "lower" or "upper" or both, at which the corrected values of each measure stop (see without_stops)."""
-    sides = []
+def measure_estimates(rows: xr.Dataset) -> MeasureEstimates:
+    """Return the estimates of all measures; the values of one measure are in memory at a time."""
+    statistics, changes, stops = [], [], []
     for number, limits_of_measure in enumerate(limits(rows)):
-        sample = measured_sample(rows, number, terms.STATES[terms.CORRECTED])
-        kept = capability.without_stops(sample, limits_of_measure) if np.isfinite(sample.mean) else limits_of_measure
-        named = zip(terms.BOUNDS, limits_of_measure, kept, strict=False)
-        sides.append(" and ".join(side for side, limit, left in named if np.isfinite(limit) and not np.isfinite(left)))
-    return sides
+        raw, corrected = (MeasuredValues(rows, number, state, limits_of_measure) for state in terms.STATES)
+        statistics.append([[statistic(x) for statistic in STATISTICS.values()] for x in (raw, corrected)])
+        changes.append(_changes(raw.sample, corrected.sample))
+        stops.append(_stops(corrected))
+    return MeasureEstimates(np.array(statistics), np.array(changes), np.array(stops, dtype=object))
 
 
-def changes(rows: xr.Dataset) -> np.ndarray:
-    """Return the changes from raw to corrected measures, (measure, change_of, interval)."""
-    rows_of_changes = []
-    for measure in range(rows.sizes[terms.MEASURE]):
-        raw, corrected = (measured_sample(rows, measure, state) for state in terms.STATES)
-        ratio = intervals.variance_ratio(corrected, raw)
-        estimates = {
-            terms.SHIFT: intervals.mean(corrected - raw),
-            terms.SPREAD_RATIO: intervals.root(ratio),
-            terms.VARIANCE_RATIO: ratio,
-        }
-        rows_of_changes.append([estimates[name] for name in terms.CHANGES])
-    return np.array(rows_of_changes)
+def _stops(x: MeasuredValues) -> str:
+    kept = capability.without_stops(x.sample, x.limits) if np.isfinite(x.sample.mean) else x.limits
+    named = zip(terms.BOUNDS, x.limits, kept, strict=False)
+    return " and ".join(side for side, limit, left in named if np.isfinite(limit) and not np.isfinite(left))
+
+
+def _changes(raw: Sample, corrected: Sample) -> list[Estimate]:
+    ratio = intervals.variance_ratio(corrected, raw)
+    estimates = {
+        terms.SHIFT: intervals.mean(corrected - raw),
+        terms.SPREAD_RATIO: intervals.root(ratio),
+        terms.VARIANCE_RATIO: ratio,
+    }
+    return [estimates[name] for name in terms.CHANGES]
 
 
 def limits(rows: xr.Dataset) -> list[Limits]:

@@ -1,7 +1,7 @@
 """A sample that need not fit into memory: it is read piece by piece, as often as needed."""
 
-from collections.abc import Callable, Iterable, Sequence
-from functools import cached_property
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import cache, cached_property
 
 import numpy as np
 import xarray as xr
@@ -11,6 +11,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
 
 MAX_SORTED_VALUES = 1 << 18  # larger samples are not sorted in memory
+MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
 DIGIT = 16  # bits
 MIN_REPLICATES = 16
 
@@ -103,7 +104,7 @@ class Sample:
         if not np.isfinite(self.mean):
             return np.full(len(ranks), np.nan)
         if self.count <= self.max_sorted:
-            return np.sort(np.concatenate(list(self.pieces())))[list(ranks)]
+            return self._sorted[list(ranks)]
         # The leading digits of the wanted keys, and the rank of each key among the values with these leading digits.
         prefixes, inner_ranks = np.zeros(len(ranks), dtype=np.uint64), np.array(ranks, dtype=np.int64)
         for shift in range(64 - DIGIT, -1, -DIGIT):
@@ -114,6 +115,10 @@ class Sample:
                 inner_ranks[k] -= cumulative[prefix_number, digit - 1] if digit else 0
                 prefixes[k] = (prefixes[k] << np.uint64(DIGIT)) | np.uint64(digit)
         return _values(prefixes)
+
+    @cached_property
+    def _sorted(self) -> np.ndarray:
+        return np.sort(np.concatenate(list(self.pieces())))
 
     def _digit_counts(self, prefixes: np.ndarray, shift: int) -> np.ndarray:
         """Return how often each digit follows each prefix in the keys shifted by `shift` bits, (prefix, digit)."""
@@ -128,10 +133,18 @@ class Sample:
 
 
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:
-    """Return the values of a measure, given by number, in a state; they are read from the rows when needed."""
+    """Return the values of a measure, given by number, in a state; they are read from the rows when needed.
+
+    Not too many are read once, and kept for as long as the sample is.
+    """
     column = rows[[terms.MEASURED.name]].sel({terms.STATE: state}).isel({terms.MEASURE: measure})
     is_planned = rows.attrs.get("sampler", terms.MONTE_CARLO) != terms.MONTE_CARLO
-    return Sample(lambda: (piece[terms.MEASURED.name].values for piece in pieces(column)), terms.REPLICATE if is_planned else 1)
+
+    def read() -> Iterator[np.ndarray]:
+        return (piece[terms.MEASURED.name].values for piece in pieces(column))
+
+    is_kept = rows.sizes[terms.REALIZATION] <= MAX_KEPT_VALUES
+    return Sample(cache(lambda: list(read())) if is_kept else read, terms.REPLICATE if is_planned else 1)
 
 
 _SIGN = np.uint64(1 << 63)

@@ -13,7 +13,7 @@ from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, all_statistics, changes, limits, stops
+from tolcontact.statistics.measure_statistics import STATISTICS, MeasuredValues, limits, measure_estimates
 from tolcontact.vocabulary import ArchiveVariable
 
 MIN_REALIZATIONS = 2
@@ -64,9 +64,10 @@ def summarize(results: xr.DataTree) -> Summary:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
     combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
+    of_measures = measure_estimates(rows)
     values = {
-        terms.STATISTIC_VALUE: all_statistics(rows),
-        terms.CHANGE: changes(rows),
+        terms.STATISTIC_VALUE: of_measures.statistics,
+        terms.CHANGE: of_measures.changes,
         **_status_values(rows),
         **_contact_values(rows, combinations),
         terms.STEPS: _steps(rows),
@@ -77,7 +78,7 @@ def summarize(results: xr.DataTree) -> Summary:
     units = {terms.PAIR_REACTION: {"units": rows[terms.REACTION.name].attrs.get("units", "1")}}
     return Summary(
         {variable.name: variable.entry(array, **units.get(variable, {})) for variable, array in values.items()},
-        coords=_coordinates(rows, combinations),
+        coords=_coordinates(rows, combinations) | {terms.MEASURE_STOPS: (terms.MEASURE, of_measures.stops)},
         attrs={
             "title": results.attrs.get("title", ""),
             "realizations": count,
@@ -94,7 +95,7 @@ def estimate_of(results: xr.DataTree, measure: str, statistic: str) -> Estimate:
     """Return one of `STATISTICS` of a corrected measure."""
     rows = results.to_dataset().isel({terms.REALIZATION: slice(finished(results))})
     number = rows[terms.MEASURE].values.tolist().index(measure)
-    return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED]))
+    return STATISTICS[statistic](MeasuredValues(rows, number, terms.STATES[terms.CORRECTED], limits(rows)[number]))
 
 
 def in_conflict(rows: xr.Dataset) -> np.ndarray:
@@ -127,7 +128,6 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
             name: (terms.MEASURE, np.array(values))
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)
         },
-        terms.MEASURE_STOPS: (terms.MEASURE, np.array(stops(rows), dtype=object)),
         terms.QUANTITY.name: (terms.MEASURE, _quantities(rows)),
     }
 

@@ -84,16 +84,15 @@ def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
 def _overview(summary: xr.Dataset) -> FigureTable:
     """Return the figures of each measure that decide about it."""
     rows = []
-    for measure in summary["measure"].values:
+    for measure, states in zip(summary["measure"].values, summary["statistic_value"], strict=True):
         rows.append([str(measure), "", "", "", ""])
-        for state in (RAW, CORRECTED):
-            rows.append([f"  {state}", *overview_cells(summary["statistic_value"].sel(measure=measure, state=state))])
+        rows += [[f"  {name}", *overview_cells(of_state)] for name, of_state in zip((RAW, CORRECTED), states, strict=True)]
     return FigureTable(["", "mean", "6 sigma", PPK, "outside"], rows)
 
 
 def overview_cells(statistics: xr.DataArray) -> list[str]:
     """Return mean, 6 sigma, Ppk and share outside of a measure in one state."""
-    mean, spread, ppk, outside = (statistics.sel(statistic=name).values for name in ("mean", "6 sigma", PPK, OUTSIDE))
+    mean, spread, ppk, outside = statistics.sel(statistic=["mean", "6 sigma", PPK, OUTSIDE]).values
     return [number(mean), number(spread), number(ppk), share(outside)]
 
 
@@ -116,8 +115,11 @@ def notes(rows: Sequence[Sequence[str]]) -> list[str]:
 def measure_rows(measure: xr.Dataset) -> list[list[str]]:
     """Return rows of label, raw, corrected and change of a measure; an index apart from that by percentiles is marked by *."""
     rows = []
-    for statistic in measure["statistic"].values:
-        values = [measure["statistic_value"].sel(statistic=statistic, state=state).values for state in (RAW, CORRECTED)]
+    estimates = dict(
+        zip(measure["statistic"].values, measure["statistic_value"].transpose("statistic", ...).values, strict=True)
+    )
+    changes = dict(zip(measure["change_of"].values, measure["change"].values, strict=True))
+    for statistic, values in estimates.items():
         if statistic in (*SHARES, *CAPABILITY) and not any(math.isfinite(value[0]) for value in values):
             continue
         if statistic in SHARES:
@@ -125,15 +127,15 @@ def measure_rows(measure: xr.Dataset) -> list[list[str]]:
             continue
         label, figures = SHORT_LABELS.get(statistic, statistic), [number(value) for value in values]
         if statistic in PERCENTILE_COUNTERPART:
-            counterpart = measure["statistic_value"].sel(statistic=PERCENTILE_COUNTERPART[statistic])
-            for k, state in enumerate((RAW, CORRECTED)):
-                if _are_disjoint(values[k], counterpart.sel(state=state).values):
+            counterpart = estimates[PERCENTILE_COUNTERPART[statistic]]
+            for k in range(len(values)):
+                if _are_disjoint(values[k], counterpart[k]):
                     figures[k] = f"* {figures[k]}"
         change = ""
         if statistic in CHANGE_OF_STATISTIC:
-            ratio = measure["change"].sel(change_of=CHANGE_OF_STATISTIC[statistic]).values
+            ratio = changes[CHANGE_OF_STATISTIC[statistic]]
             change = number(ratio, sign=True) if statistic == "mean" else percent(ratio - 1, sign=True)
-        rows.append([label, *figures, change])
+        rows.append([str(label), *figures, change])
     return rows
 
 
