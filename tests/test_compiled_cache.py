@@ -1,45 +1,41 @@
 """Compiled functions are kept on disk where that is possible, and work where it is not."""
 
+import hashlib
 import os
 import shutil
 import sys
-from pathlib import Path
 
 import pytest
 
-import tolcontact
 from tests.helpers import finish, nightly, run, script, start
+from tolcontact.compiled import compiled
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
 def warm(tmp_path_factory):
-    """A copy of the package of its own, whose compiled functions are in its cache."""
-    copy = tmp_path_factory.mktemp("warm") / "site"
-    shutil.copytree(Path(tolcontact.__file__).parent, copy / "tolcontact", ignore=shutil.ignore_patterns("__pycache__"))
-    assert count(copy) == (0, 1)
-    return copy
+    """A cache that holds the compiled function."""
+    home = tmp_path_factory.mktemp("warm")
+    assert count(home) == (0, 1)
+    return home
 
 
 @pytest.fixture
-def installed(warm, tmp_path):
-    return shutil.copytree(warm, tmp_path / "site")
+def home(warm, tmp_path):
+    return shutil.copytree(warm, tmp_path / "home")
 
 
-def count(site, *options, **environment):
-    """Hits and misses of the cache in a process of its own that imports the package from `site`."""
-    return counted(started(site, *options, **environment))
+def count(home, *options, **environment):
+    """Hits and misses of the cache in a process of its own whose caches lie in `home`."""
+    return counted(started(home, *options, **environment))
 
 
-def started(site, *options, **environment):
+def started(home, *options, **environment):
     python, *named = script("count_compiled")
-    return begin([python, *options, *named], site, {**os.environ, "NUMBA_CACHE_DIR": "", **environment})
-
-
-def begin(command, site, environment):
-    known = {**environment, "PYTHONPATH": str(site)}
-    return start(command, env=known, cwd=site)
+    known = {**os.environ, "HOME": str(home), **environment}
+    known.pop("XDG_CACHE_HOME", None)
+    return start([python, *options, *named], env=known, cwd=home)
 
 
 def counted(begun):
@@ -49,55 +45,66 @@ def counted(begun):
     return int(hits), int(misses)
 
 
-def cached(site, kind):
-    (file,) = (site / "tolcontact/statistics/__pycache__").glob(f"kernel.add_magnitudes-*.{kind}")
+def folder_of(home):
+    return home / ".cache/tolcontact/code"
+
+
+def cached(home):
+    (file,) = folder_of(home).iterdir()
     return file
 
 
-def test_a_second_process_finds_it_compiled(installed):
-    assert count(installed) == (1, 0)
-    assert count(installed, "-O") == (1, 0)
+def test_a_second_process_finds_it_compiled(home):
+    assert count(home) == (1, 0)
+    assert count(home, "-O") == (1, 0)
 
 
-@pytest.mark.parametrize(
-    ("kind", "left"),
-    [
-        ("nbc", "half"),
-        *nightly(("nbi", "garbage"), ("nbi", "nothing"), ("nbc", "nothing"), ("nbc", "another pickle")),
-    ],
-)  # fmt: skip
-def test_a_damaged_file_is_replaced(kind, left, installed):
-    file = cached(installed, kind)
+@pytest.mark.parametrize("left", ["half", *nightly("nothing", "garbage", "another pickle")])
+def test_a_damaged_file_is_replaced(left, home):
+    file = cached(home)
     whole = file.read_bytes()
+    pickled = b"\x80\x04K\x05."
     file.write_bytes({
-        "nothing": b"", "half": whole[: len(whole) // 2],
-        "garbage": b"\x80\x05garbage" * 50, "another pickle": b"\x80\x04K\x05.",
+        "nothing": b"", "half": whole[: len(whole) // 2], "garbage": b"\x80\x05garbage" * 50,
+        "another pickle": hashlib.blake2b(pickled, digest_size=32).digest() + pickled,
     }[left])  # fmt: skip
-    assert count(installed) == (0, 1)
-    assert count(installed) == (1, 0)
+    assert count(home) == (0, 1)
+    assert count(home) == (1, 0)
 
 
-def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(installed, tmp_path):
-    """A folder where files should be stands for what even root cannot write to."""
-    for kind in ("nbi", "nbc"):
-        file = cached(installed, kind)
-        file.unlink()
-        file.mkdir()
-        assert count(installed) == (0, 1)
-        file.rmdir()
+def test_a_damaged_file_that_cannot_be_replaced_is_passed_over(home):
+    """A folder where a file should be stands for what even root cannot write to."""
+    file = cached(home)
+    file.unlink()
+    file.mkdir()
+    assert count(home) == (0, 1)
 
 
-def test_without_a_place_to_write_it_compiles_anew(installed):
-    shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
-    (installed / "tolcontact/statistics/__pycache__").write_text("in the way")
-    assert count(installed, HOME="/dev/null", XDG_CACHE_HOME="/dev/null") == (0, 1)
+def test_without_a_place_to_write_it_compiles_anew(home):
+    assert count(home, HOME="/dev/null") == (0, 1)
 
 
-def test_several_processes_may_begin_at_once(installed):
-    shutil.rmtree(installed / "tolcontact/statistics/__pycache__")
-    begun = [started(installed) for _ in range(3)]
+def test_several_processes_may_begin_at_once(tmp_path):
+    begun = [started(tmp_path) for _ in range(3)]
     assert all(sum(counted(one)) == 1 for one in begun)
-    assert count(installed) == (1, 0)
+    assert count(tmp_path) == (1, 0)
+
+
+def caller(added):
+    """A compiled function, always the same, that calls another one."""
+    names = {"compiled": compiled}
+    exec(f"@compiled\ndef called(x): return x + {added}\n@compiled\ndef calling(x): return called(x)\n", names)
+    return names["calling"]
+
+
+def test_a_change_in_a_function_that_it_calls_is_noticed(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    found = []
+    for added in (1, 2, 1):
+        calling = caller(added)
+        assert calling(1.0) == 1 + added
+        found.append(sum(calling.stats.cache_hits.values()))
+    assert found == [0, 0, 1]
 
 
 READ = "-all,+dac_read_search"  # everything may be read
@@ -114,15 +121,16 @@ def nobody():
     return AS_NOBODY
 
 
-@pytest.mark.parametrize("home", ["not writable", *nightly("writable", "missing")])
-def test_another_user_may_use_it(home, installed, nobody, tmp_path):
+@pytest.mark.parametrize("home", ["own", *nightly("not writable", "writable", "missing")])
+def test_another_user_may_use_it(home, nobody, tmp_path):
     """Who can read the package, but not write to it."""
     folder = tmp_path / "home"
     if home != "missing":
         folder.mkdir()
         folder.chmod(0o777 if home == "writable" else 0o755)
+    if home == "own":
+        os.chown(folder, 65534, 65534)
     known = {**os.environ, "HOME": str(folder)}
-    for name in ("XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
-        known.pop(name, None)
-    found = [counted(begin([*nobody, *script("count_compiled")], installed, known)) for _ in range(2)]
-    assert found == [(0, 1), (1, 0) if home == "writable" else (0, 1)]
+    known.pop("XDG_CACHE_HOME", None)
+    found = [counted(start([*nobody, *script("count_compiled")], env=known)) for _ in range(2)]
+    assert found == [(0, 1), (1, 0) if home == "own" else (0, 1)]

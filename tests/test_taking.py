@@ -66,7 +66,7 @@ def test_the_target_of_a_link_is_overwritten_and_the_link_stays(tmp_path):
 
 def test_what_a_killed_run_left_is_taken_over(tmp_path):
     out = tmp_path / "out.nc"
-    for name in (".out.nc.lock", ".out.nc.part"):
+    for name in (".out.nc.lock", ".out.nc.0123abcd.part"):
         (tmp_path / name).write_bytes(b"left")
     tc.run(cases.stack(), samples=10, solver="daqp", out=out).close()
     assert list(tmp_path.iterdir()) == [out]

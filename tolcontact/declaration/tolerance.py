@@ -73,8 +73,8 @@ class Tolerance(Readable):
             yield f"the median of scipy.stats.{frozen.dist.name} is {median}; expected finite parameters [mm]"
         elif (seconds := _seconds_per_draw(frozen)) > MAX_DRAW_SECONDS:
             yield (
-                f"a draw of scipy.stats.{frozen.dist.name} takes {1000 * seconds:.0f} ms of processor time, too long for a run; "
-                f"expected at most {1000 * MAX_DRAW_SECONDS:g} ms; choose a distribution with a quicker ppf"
+                f"a draw of scipy.stats.{frozen.dist.name} takes {1000 * seconds:.0f} ms of processor time, too long for a "
+                f"run; expected at most {1000 * MAX_DRAW_SECONDS:g} ms; choose a distribution with a quicker ppf"
             )
 
     @property

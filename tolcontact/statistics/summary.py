@@ -63,8 +63,7 @@ def summarize(results: xr.DataTree) -> Summary:
     if count < MIN_REALIZATIONS:
         raise ArchiveError(f"{count} realizations are finished, too few for statistics; continue with --resume")
     rows = results.to_dataset().isel({terms.REALIZATION: slice(count)})
-    combinations, smallest = contact.combinations(rows), _smallest_range(results, rows)
-    of_measures = measure_estimates(rows)
+    combinations, smallest, of_measures = contact.combinations(rows), _smallest_range(results, rows), measure_estimates(rows)
     values = {
         terms.STATISTIC_VALUE: of_measures.statistics,
         terms.CHANGE: of_measures.changes,
