@@ -12,7 +12,8 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.archive import check_room_for, keep
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.simulation.cluster import mapping
+from tolcontact.simulation.cluster import mapping, threads_of
+from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 
 SPREAD_SAMPLES = 1 << 14  # realizations that the spreads of contributors are estimated from
@@ -31,7 +32,7 @@ class Analysis:
         check_counts(samples=samples, seed=seed)
         self.record, self.samples, self.seed, self.progress = record, samples, seed, progress
         self.program = program_of(model, solver, method)
-        self.blocks = mapping(client)
+        self.blocks, self._client = mapping(client), client
         self._into = into
         if into is not None:
             check_room_for(into, record, self.program)
@@ -42,8 +43,16 @@ class Analysis:
         return self.program.nominal.assembly.name
 
     def engine(self, total: int | None = None) -> Engine:
-        """Return an engine that reports its progress if there is a `total` of realizations."""
+        """Return an engine that reports its progress if there is a `total` of realizations.
+
+        Raises OptionError if so many realizations cannot end.
+        """
+        self.check_affordable(self.samples if total is None else total)
         return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
+
+    def check_affordable(self, realizations: int) -> None:
+        """Raise OptionError if so many realizations cannot end."""
+        check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
 
     def sampled_deviations(self) -> np.ndarray:
         """Return deviations (n, contributor) of enough realizations to estimate spreads."""

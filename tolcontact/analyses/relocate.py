@@ -58,6 +58,7 @@ def relocate(
         terms.RELOCATION, assembly, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
+    analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
     trials = RelocatedTrials(assembly, analysis, locator, goal.measure)
     places = Places(trials, goal, *_corners(between))

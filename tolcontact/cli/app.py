@@ -105,6 +105,9 @@ def command_line(arguments: list[str] | None = None) -> None:
     except TolcontactError as error:
         typer.echo(f"error: {error}", err=True)
         sys.exit(2)
+    except MemoryError as error:
+        typer.echo(f"error: there is not enough memory ({shown(str(error)) or 'no details'}); ask for fewer samples", err=True)
+        sys.exit(2)
     except OSError as error:
         typer.echo(f"error: the operating system reports: {shown(str(error))}", err=True)
         sys.exit(2)

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
 from tolcontact.errors import shown
 from tolcontact.report import grouped
-from tolcontact.workflow.until import duration
+from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s
 

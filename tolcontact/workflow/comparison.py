@@ -18,9 +18,10 @@ from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import USUAL_SEARCH, Method
 from tolcontact.simulation import Block
-from tolcontact.simulation.cluster import MapBlocks, Workers, mapping
+from tolcontact.simulation.cluster import MapBlocks, Workers, mapping, threads_of
 from tolcontact.statistics import compare_runs as compare_results
 from tolcontact.vocabulary import CORRECTED
+from tolcontact.workflow.forecast import check_affordable
 from tolcontact.workflow.models import Choice, Model, assembly_of, check_counts, method_of, program_of
 from tolcontact.workflow.simulate import simulate
 
@@ -65,6 +66,9 @@ def compare(
     nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, solver, method) for solver, method in contestants]
+    kept = 2 + 12 * len(nominal.parts) + len(nominal.measures) + len(nominal.pairs)
+    for program in programs:
+        check_affordable(program, samples=samples, seed=seed, threads=threads_of(client), kept=kept)
     rows = _rows(programs, blocks, samples, seed)
     labels = {
         terms.SOLVER: [" ".join([solver, *distinctions(method, resolved_by)]) for solver, method in contestants],

@@ -19,8 +19,10 @@ from tolcontact.method import Method
 from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
 from tolcontact.variation.measured_population import measured_population
+from tolcontact.workflow.forecast import check_memory
 
 DEFAULT_SOLVER = "qpoases"
+COUNTS = {"samples": (2, 10**12), "seed": (0, 2**63 - 1), "surfaces": (0, 10**6)}  # smallest and largest
 Model = Assembly | Callable[[], Assembly] | str | Path
 Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the model's own method has the others
 
@@ -98,11 +100,11 @@ def method_of(assembly: Assembly, method: Choice | None) -> Method:
 
 
 def check_counts(**counts: int) -> None:
-    """Raise OptionError for a count that is no whole number, or too small (samples 2, seed and surfaces 0)."""
+    """Raise OptionError for a count that is no whole number, or outside of `COUNTS`."""
     for option, value in counts.items():
-        minimum = {"samples": 2, "seed": 0, "surfaces": 0}[option]
-        if isinstance(value, bool) or not isinstance(value, int) or not minimum <= value < 2**63:
-            raise OptionError(f"{option} is {value!r}; expected a whole number, at least {minimum} and below 2^63")
+        least, most = COUNTS[option]
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
+            raise OptionError(f"{option} is {value!r}; expected a whole number from {least} to {most}")
 
 
 def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> xr.Dataset:
@@ -118,6 +120,7 @@ def check_population(model: Model, *, samples: int = 10_000, seed: int = 1) -> x
     """
     check_counts(samples=samples, seed=seed)
     nominal = discretize(assembly_of(model))
+    check_memory(samples, len(nominal.contributors))
     zones = list(measured_population(nominal, Draws(nominal), seed=seed, count=samples))
     values = {
         terms.ZONE_FEATURE: [zone.feature for zone in zones],

@@ -16,9 +16,10 @@ from tolcontact.simulation.cluster import MapBlocks, mapping, threads_of
 from tolcontact.simulation.surfaces import check_surfaces, simulated_poses, warn_of
 from tolcontact.statistics import Summary, summarize as summary_of
 from tolcontact.vocabulary import FIELD_CHOICES, KEPT, MONTE_CARLO, PLANS
+from tolcontact.workflow.forecast import announce
 from tolcontact.workflow.models import Choice, Model, check_counts, check_program, program_of
 from tolcontact.workflow.run_sums import RunSums
-from tolcontact.workflow.until import Target, announce
+from tolcontact.workflow.until import Target
 
 SURFACES = 64
 Progress = Callable[[int], None]
