@@ -9,13 +9,28 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
+from tolcontact import interrupts
 from tolcontact.declaration import Assembly
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.version import __version__
 
+
+class Commands(TyperGroup):
+    """The commands. One that is stopped ends with a message."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            with interrupts.stoppable():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            interrupts.end("stopped; nothing is kept")
+
+
 app = typer.Typer(
+    cls=Commands,
     help="Tolerance analysis of rigid assemblies with contact resolved in every realization.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,

@@ -2,9 +2,6 @@
 
 import contextlib
 import logging
-import os
-import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
 
+from tolcontact import interrupts
 from tolcontact.errors import shown
 from tolcontact.report import grouped
 from tolcontact.workflow.forecast import duration
@@ -92,21 +90,9 @@ def _log_shown(console: Console, show: Callable[[str], None], *, quiet: bool) ->
 
 @contextlib.contextmanager
 def stopped(out: Path | None, done: list[int]) -> Iterator[None]:
-    """Report the progress of a run that is stopped; `done` is the finished and the total number of realizations."""
-    stopped_by = [signal.SIGINT]
-
-    def terminate(number: int, _: object) -> None:
-        stopped_by[0] = signal.Signals(number)
-        raise KeyboardInterrupt
-
-    handler = signal.signal(signal.SIGTERM, terminate)
+    """End a run that is stopped with how far it is; `done` is the finished and the total number of realizations."""
     try:
         yield
     except KeyboardInterrupt:
         advice = "continue with --resume" if out is not None and out.exists() else "nothing is kept"
-        typer.echo(f"stopped: {grouped(done[0])} of {grouped(done[1])} done; {advice}", err=True)
-        sys.stderr.flush()
-        # Threads may compute for minutes; their results are not in the archive.
-        os._exit(128 + stopped_by[0])
-    finally:
-        signal.signal(signal.SIGTERM, handler)
+        interrupts.end(f"stopped: {grouped(done[0])} of {grouped(done[1])} done; {advice}")

@@ -10,7 +10,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.metadata import version
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
@@ -40,6 +40,7 @@ SHARDS_AHEAD = 4  # under way for each thread of a worker
 SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
 WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
 LOOPBACK = "127.0.0.1:0"  # any port; by default, pages of a cluster are served on all interfaces
+LOOP_TIMEOUT = 1.0  # s: for the end of an event loop
 SCHEDULER_TIMEOUT = 5.0  # s: for an answer of the scheduler
 
 T = TypeVar("T")
@@ -105,7 +106,8 @@ def _event_loop() -> Iterator[Any]:
     try:
         yield runner.loop
     finally:
-        runner.stop()
+        with suppress(TimeoutError):  # of a cluster that was stopped while it began; its processes end with this one
+            runner.stop(timeout=LOOP_TIMEOUT)
 
 
 def _say_where(client: Any) -> None:

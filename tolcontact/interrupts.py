@@ -1,0 +1,99 @@
+"""Ctrl-C and SIGTERM, which end a command wherever it is.
+
+Python raises KeyboardInterrupt at whatever the main thread does. In a callback from a library's code, or in the clean-up of an
+object, that is ignored; some libraries turn it into an error of their own. So it is raised again and again until it is being
+handled, and whatever ends a command afterwards is a stop.
+"""
+
+import _thread
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from types import FrameType
+from typing import Any, NoReturn
+
+INTERVAL = 0.3  # s, after which an interrupt that is not being handled is raised again
+MAX_CLEANING = 60.0  # s, after which a process that is still handling it is ended
+STOPPED = (signal.SIGINT, signal.SIGTERM)
+
+
+class _Stop:
+    """The first signal of this process, and when it came; 0 before."""
+
+    number = 0
+    began = 0.0
+
+
+@contextlib.contextmanager
+def stoppable() -> Iterator[None]:
+    """Let SIGINT and SIGTERM end the block with KeyboardInterrupt, after which the process has to end (see `end`).
+
+    In other threads than the main one nothing changes.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handlers = {number: signal.signal(number, _interrupt) for number in STOPPED}
+    hook, sys.unraisablehook = sys.unraisablehook, _report_unless_stopped
+    try:
+        yield
+    except BaseException as error:
+        if _Stop.number and not isinstance(error, KeyboardInterrupt):
+            raise KeyboardInterrupt from None  # what it became in a library
+        raise
+    finally:
+        if not _Stop.number:  # else the process is about to end
+            sys.unraisablehook = hook
+            for number, handler in handlers.items():
+                signal.signal(number, handler)
+
+
+def end(message: str) -> NoReturn:
+    """End the process that was stopped: with a message, and the exit code of its signal.
+
+    Threads may compute for minutes, and what is done at exit may wait for them; nothing of it is needed.
+    """
+    number = _Stop.number or signal.SIGINT
+    with contextlib.suppress(OSError, ValueError):  # of a terminal that is gone
+        sys.stdout.flush()
+    with contextlib.suppress(OSError, ValueError):
+        sys.stderr.write(f"{message}\n")
+        sys.stderr.flush()
+    os._exit(128 + number)
+
+
+def _interrupt(number: int, _: FrameType | None) -> None:
+    if _Stop.number and _is_handled():
+        return
+    if not _Stop.number:
+        _Stop.number, _Stop.began = number, time.monotonic()
+        _thread.start_new_thread(_insist, (number,))  # a Thread might wait for locks that the main thread holds
+    raise KeyboardInterrupt
+
+
+def _is_handled() -> bool:
+    """Return whether the main thread is handling KeyboardInterrupt: unwinding its blocks, or in an `except` of it."""
+    error: BaseException | None = sys.exc_info()[1]
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt):
+            return True
+        error = error.__context__
+    return False
+
+
+def _insist(number: int) -> None:
+    while True:
+        time.sleep(INTERVAL)
+        if time.monotonic() > _Stop.began + MAX_CLEANING:
+            os._exit(128 + number)
+        signal.pthread_kill(threading.main_thread().ident or 0, number)
+
+
+def _report_unless_stopped(unraisable: Any) -> None:
+    """Report an exception that cannot be raised, as usual, but not an interrupt: it will be raised again."""
+    if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
