@@ -6,11 +6,8 @@ from tolcontact import interrupts
 
 def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
-    try:
-        with interrupts.stoppable():
-            tolcontact.command_line()  # imported here, on first use
-    except KeyboardInterrupt:
-        interrupts.end("stopped before anything was done")
+    with interrupts.stoppable(at_once="stopped before anything was done"):
+        tolcontact.command_line()  # imported here, on first use
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 """Ctrl-C and SIGTERM, which end a command wherever it is.
 
-Python raises KeyboardInterrupt at whatever the main thread does. In a callback from a library's code, or in the clean-up of an
-object, that is ignored; some libraries turn it into an error of their own. So it is raised again and again until it is being
-handled, and whatever ends a command afterwards is a stop.
+Python raises KeyboardInterrupt at whatever the main thread does. Some libraries catch it (trimesh takes any exception for a
+package that is not installed), in callbacks and in the clean-up of objects it is ignored, and in the initialization of some
+native modules it ends the process with a memory fault. So it is not raised in these; it is raised again and again until it is
+being handled; and whatever ends a command afterwards is a stop.
 """
 
 import _thread
@@ -29,15 +30,18 @@ class _Stop:
 
 
 @contextlib.contextmanager
-def stoppable() -> Iterator[None]:
+def stoppable(at_once: str = "") -> Iterator[None]:
     """Let SIGINT and SIGTERM end the block with KeyboardInterrupt, after which the process has to end (see `end`).
 
     In other threads than the main one nothing changes.
+
+    at_once   message with which the process ends at once instead, where there is nothing to clean up
     """
+    handler = (lambda number, _: end(at_once, number)) if at_once else _interrupt
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    handlers = {number: signal.signal(number, _interrupt) for number in STOPPED}
+    handlers = {number: signal.signal(number, handler) for number in STOPPED}
     hook, sys.unraisablehook = sys.unraisablehook, _report_unless_stopped
     try:
         yield
@@ -48,16 +52,16 @@ def stoppable() -> Iterator[None]:
     finally:
         if not _Stop.number:  # else the process is about to end
             sys.unraisablehook = hook
-            for number, handler in handlers.items():
-                signal.signal(number, handler)
+            for number, former in handlers.items():
+                signal.signal(number, former)
 
 
-def end(message: str) -> NoReturn:
+def end(message: str, number: int = 0) -> NoReturn:
     """End the process that was stopped: with a message, and the exit code of its signal.
 
     Threads may compute for minutes, and what is done at exit may wait for them; nothing of it is needed.
     """
-    number = _Stop.number or signal.SIGINT
+    number = number or _Stop.number or signal.SIGINT
     with contextlib.suppress(OSError, ValueError):  # of a terminal that is gone
         sys.stdout.flush()
     with contextlib.suppress(OSError, ValueError):
@@ -66,13 +70,23 @@ def end(message: str) -> NoReturn:
     os._exit(128 + number)
 
 
-def _interrupt(number: int, _: FrameType | None) -> None:
+def _interrupt(number: int, frame: FrameType | None) -> None:
     if _Stop.number and _is_handled():
         return
     if not _Stop.number:
         _Stop.number, _Stop.began = number, time.monotonic()
         _thread.start_new_thread(_insist, (number,))  # a Thread might wait for locks that the main thread holds
-    raise KeyboardInterrupt
+    if not _is_loading(frame):
+        raise KeyboardInterrupt
+
+
+def _is_loading(frame: FrameType | None) -> bool:
+    """Return whether a native module is being initialized."""
+    while frame is not None:
+        if frame.f_code.co_qualname.startswith("ExtensionFileLoader."):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _is_handled() -> bool:
