@@ -56,7 +56,7 @@ def once(reader, monkeypatch):
     answers = {}
 
     def answer(command, **_):
-        question = (*command, Path(command[-1]).read_bytes())
+        question = (*command, Path(command[-2]).read_bytes())
         if question not in answers:
             print(json.dumps(list(map(str, command[2:]))), file=reader.stdin, flush=True)
             code, out, err = json.loads(reader.stdout.readline())

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,9 @@ except ImportError:  # not on Windows, where nothing is limited
     resource = None  # type: ignore[assignment]
 
 
+STALL_FACTOR = 10  # times the processor time that a child may take: longer it does not wait for a processor, but for ever
+
+
 class ChildDiedError(Exception):
     """The process did not finish; the message states why."""
 
@@ -19,7 +23,8 @@ class ChildDiedError(Exception):
 def run_child(script: Path, *arguments: str, seconds: float) -> str:
     """Run a Python file, which should begin with `limit_resources`, and return its standard output.
 
-    Raises ChildDiedError if it takes longer than `seconds`, or ends by a signal or an error.
+    Raises ChildDiedError if it takes STALL_FACTOR times as long as `seconds` (a busy machine does not make a file a damaged
+    one: the limit of its processor time is the file's own), or ends by a signal or an error.
     """
     try:
         completed = subprocess.run(
@@ -27,11 +32,11 @@ def run_child(script: Path, *arguments: str, seconds: float) -> str:
             env=environment(),
             stdin=subprocess.DEVNULL,
             capture_output=True,
-            timeout=seconds,
+            timeout=STALL_FACTOR * seconds,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
-        raise ChildDiedError(f"reading it took longer than {seconds:.0f} s") from error
+        raise ChildDiedError(f"reading it took longer than {STALL_FACTOR * seconds:.0f} s") from error
     if completed.returncode:
         raise ChildDiedError(_reason(completed))
     return completed.stdout.decode("utf-8", "surrogateescape")
@@ -65,12 +70,23 @@ def limit_resources(memory: int, *, file_size: int | None = None, seconds: int |
                 resource.setrlimit(name, (allowed, allowed))
 
 
+def processor_time(pid: int) -> float:
+    """Return the processor time [s] that a running child has taken so far; 0 where the system does not tell."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # in user and in system mode
+
+
 def peak_memory() -> int | None:
     """Return the largest memory [byte] that this process has used so far; None where the system does not tell."""
     return None if resource is None else resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def _reason(completed: subprocess.CompletedProcess) -> str:
+    if completed.returncode == -signal.SIGXCPU:
+        return "reading it took too long"
     if completed.returncode < 0:
         return f"the library that reads it crashed (signal {-completed.returncode})"
     message = (completed.stderr.decode("utf-8", "replace").strip().splitlines() or ["no message"])[-1]

@@ -22,7 +22,7 @@ from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
 from tolcontact.vocabulary import ArchiveVariable, archive, variation
 
-MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0
+MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # beside four times the file's own size
 MAX_DEFLATION = 1032  # zlib compresses data no further
 MAX_DECLARATION = 1 << 26  # bytes of a declared model
@@ -63,9 +63,9 @@ class DamagedError(Exception):
 def inspect(path: Path) -> None:
     """Raise ArchiveError if a file is not an archive, is damaged, or claims what it cannot hold."""
     check_name(path)
-    gigabytes = path.stat().st_size / 1e9
+    seconds = math.ceil(MAX_SECONDS + SECONDS_PER_GB * path.stat().st_size / 1e9)
     try:
-        fault = run_child(Path(__file__), os.fspath(path), seconds=MAX_SECONDS + SECONDS_PER_GB * gigabytes)
+        fault = run_child(Path(__file__), os.fspath(path), str(seconds), seconds=seconds)
     except ChildDiedError as error:
         raise ArchiveError(f'"{path}" is damaged, or not an archive of tolcontact: {error}') from error
     if fault:
@@ -297,5 +297,5 @@ def _check_declaration(file: netCDF4.Dataset) -> None:
 
 if __name__ == "__main__":
     _file = Path(sys.argv[1])
-    limit_resources(MEMORY + 4 * _file.stat().st_size)
+    limit_resources(MEMORY + 4 * _file.stat().st_size, seconds=int(sys.argv[2]))
     sys.stdout.write(_fault(_file))

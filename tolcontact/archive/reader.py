@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import netCDF4
 import numpy as np
 import pandas as pd
 import xarray as xr
@@ -14,6 +15,8 @@ from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
+
+CACHE_BYTES = 1 << 22  # a chunk; the library's own size would add up to as much memory as all else takes together
 
 
 def open_archive(path: str | Path) -> xr.DataTree:
@@ -31,11 +34,15 @@ def open_archive(path: str | Path) -> xr.DataTree:
 
 def opened(path: Path) -> xr.DataTree:
     """Open an archive that is known to be undamaged."""
+    usual = netCDF4.get_chunk_cache()
     try:
+        netCDF4.set_chunk_cache(CACHE_BYTES)  # of each variable
         # Numbers of realizations are not read, which takes as much memory as all else together: they are 0, 1, 2, ...
         tree = xr.open_datatree(path, engine="netcdf4", drop_variables=terms.REALIZATION)
     except Exception as error:  # whatever a library finds that the inspection did not
         raise ArchiveError(f'"{path}" cannot be read: {type(error).__name__}: {error}') from error
+    finally:
+        netCDF4.set_chunk_cache(*usual)
     numbers = pd.RangeIndex(tree.sizes[terms.REALIZATION])
     tree.coords[terms.REALIZATION] = (terms.REALIZATION, numbers, terms.NUMBERS.all_attributes)
     return tree

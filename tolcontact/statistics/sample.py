@@ -10,9 +10,11 @@ from scipy import special
 from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
 
-MAX_SORTED_VALUES = 1 << 18  # larger samples are not sorted in memory
+MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
 MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
 DIGIT = 16  # bits
+COUNTED_DIGITS = 2
+MAX_PREFIXES = 64  # that are counted in one pass
 MIN_REPLICATES = 16
 
 
@@ -98,23 +100,31 @@ class Sample:
     def ordered(self, ranks: Sequence[int]) -> np.ndarray:
         """Return the order statistics of some ranks, from 0 (least) to count - 1; NaN if a value is not finite.
 
-        A sample that does not fit into memory is not sorted. Its values are counted by their leading digits instead, one digit
-        more in each pass.
+        A sample that does not fit into memory is not sorted. Its values are counted by their leading digits instead, and only
+        those with the leading digits of the wanted ones are sorted.
         """
         if not np.isfinite(self.mean):
             return np.full(len(ranks), np.nan)
         if self.count <= self.max_sorted:
             return self._sorted[list(ranks)]
         # The leading digits of the wanted keys, and the rank of each key among the values with these leading digits.
-        prefixes, inner_ranks = np.zeros(len(ranks), dtype=np.uint64), np.array(ranks, dtype=np.int64)
-        for shift in range(64 - DIGIT, -1, -DIGIT):
+        prefixes, inner_ranks, bits = np.zeros(len(ranks), dtype=np.uint64), np.array(ranks, dtype=np.int64), 64
+        for _ in range(COUNTED_DIGITS):
+            bits -= DIGIT
             unique_prefixes, prefix_numbers = np.unique(prefixes, return_inverse=True)
-            cumulative = self._digit_counts(unique_prefixes, shift).cumsum(axis=1)
-            for k, prefix_number in enumerate(prefix_numbers):
-                digit = np.searchsorted(cumulative[prefix_number], inner_ranks[k], side="right")
-                inner_ranks[k] -= cumulative[prefix_number, digit - 1] if digit else 0
-                prefixes[k] = (prefixes[k] << np.uint64(DIGIT)) | np.uint64(digit)
-        return _values(prefixes)
+            for start in range(0, len(unique_prefixes), MAX_PREFIXES):
+                counted = unique_prefixes[start : start + MAX_PREFIXES]
+                cumulative = self._digit_counts(counted, bits).cumsum(axis=1)
+                for k in np.flatnonzero((prefix_numbers >= start) & (prefix_numbers < start + len(counted))):
+                    of_prefix = cumulative[prefix_numbers[k] - start]
+                    digit = np.searchsorted(of_prefix, inner_ranks[k], side="right")
+                    inner_ranks[k] -= of_prefix[digit - 1] if digit else 0
+                    prefixes[k] = (prefixes[k] << np.uint64(DIGIT)) | np.uint64(digit)
+        keys, counts = self._counted_keys(np.unique(prefixes), bits)
+        before = np.searchsorted(keys, prefixes << np.uint64(bits))
+        cumulative = counts.cumsum()
+        places = np.concatenate([[0], cumulative])[before] + inner_ranks
+        return _values(keys[np.searchsorted(cumulative, places, side="right")])
 
     @cached_property
     def _sorted(self) -> np.ndarray:
@@ -130,6 +140,19 @@ class Sample:
             digits = (keys[matches] & np.uint64((1 << DIGIT) - 1)).astype(np.int64)
             counts += np.bincount((numbers[matches] << DIGIT) + digits, minlength=len(counts))
         return counts.reshape(len(prefixes), -1)
+
+    def _counted_keys(self, prefixes: np.ndarray, shift: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the different keys, in order, that have one of the prefixes when shifted by `shift` bits; and their numbers."""
+        found, times = [np.zeros(0, np.uint64)], [np.zeros(0, np.int64)]
+        for piece in self.pieces():
+            keys = _keys(piece)
+            leading = keys >> np.uint64(shift)
+            numbers = np.searchsorted(prefixes, leading).clip(max=len(prefixes) - 1)
+            different, counts = np.unique(keys[prefixes[numbers] == leading], return_counts=True)
+            found.append(different)
+            times.append(counts)
+        different, numbers = np.unique(np.concatenate(found), return_inverse=True)
+        return different, np.bincount(numbers, np.concatenate(times), minlength=len(different)).astype(np.int64)
 
 
 def measured_sample(rows: xr.Dataset, measure: int, state: str) -> Sample:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tolcontact.child import environment
+from tolcontact.child import STALL_FACTOR, environment, processor_time
 from tolcontact.errors import GeometryFault, clipped
 
 MAX_START_SECONDS = 30.0  # until the worker has loaded its libraries
@@ -31,7 +31,7 @@ class ReadTimeout(GeometryFault):
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits for reading a file: time, memory [byte] and number of triangles.
+    """The limits for reading a file: processor time, memory [byte] and number of triangles.
 
     On an idle core a STEP file of 1 MB takes some 2 s, one of 20 MB 41 s. A million triangles take some 0.5 GiB to read, and
     some 3 GiB on the way through a simulation with contact on all of them.
@@ -106,13 +106,16 @@ def _by_one_process(jobs: Sequence[Job], limits: Limits) -> Iterator[dict[str, n
 
 
 def _wait_for(process: subprocess.Popen, seconds: float, *paths: Path) -> bool:
-    """Return whether the process writes a file at one of the paths within some `seconds`."""
-    end = time.monotonic() + seconds
+    """Return whether the process writes a file at one of the paths within some `seconds` of processor time.
+
+    On a busy machine it may take STALL_FACTOR times as long; it is not waited for any longer.
+    """
+    end, last = time.monotonic() + STALL_FACTOR * seconds, processor_time(process.pid) + seconds
     while True:
         ended = process.poll() is not None  # before the look for files: one that was written just before the end counts
         if any(path.exists() for path in paths):
             return True
-        if ended or time.monotonic() > end:
+        if ended or time.monotonic() > end or processor_time(process.pid) > last:
             return False
         time.sleep(POLL_SECONDS)
 
@@ -130,8 +133,8 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
     code = process.poll()
     if code is None:
         return (
-            f"was not read within {seconds:.0f} s: it is damaged (look for coordinates that are far off), or far too fine; "
-            "export it again"
+            f"took too long: it was not read within {seconds:.0f} s of processor time; it is far too fine, or damaged (look "
+            "for coordinates that are far off); export it again"
         )
     if code < 0:
         name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
