@@ -4,6 +4,7 @@ python -m studies.robustness.files --archives 500 --shapes 200 --models 100 --se
 """
 
 import argparse
+import contextlib
 import copy
 import json
 import random
@@ -140,7 +141,8 @@ def stand() -> dict[str, Any]:
 STRANGE: tuple[Any, ...] = (
     None, True, -1, 0, 1e308, 10**400, 1e-300, 1e-9, 10**9, 1e5, "", "x", "a" * 10**6, [], {}, [0, 0, 0], [1e300] * 3, "block",
     {"scipy": "studentized_range", "args": [3, 10]}, {"scipy": "levy_stable", "args": [1.8, 0.5]},
-    {"scipy": "ksone", "args": [22]}, {"scipy": "kappa4", "args": [1, 0]}, {"box": [1e-9, 1, 1]}, {"box": [1e9, 1e9, 1e9]}, "vertices", [[1, 2], [3, 4]],
+    {"scipy": "ksone", "args": [22]}, {"scipy": "kappa4", "args": [1, 0]}, {"box": [1e-9, 1, 1]},
+    {"box": [1e9, 1e9, 1e9]}, "vertices", [[1, 2], [3, 4]],
 )  # fmt: skip
 
 
@@ -157,7 +159,14 @@ def many(document: dict[str, Any], rng: random.Random) -> None:
 def strange_model(rng: random.Random) -> str:
     """Return a model as JSON in which some entries are strange, or very many."""
     document = stand()
-    for _ in range(rng.choice((1, 1, 2))):
+    with contextlib.suppress(TypeError, KeyError, IndexError, AttributeError):  # the first change may forbid a second one
+        _make_strange(document, rng, changes=rng.choice((1, 1, 2)))
+    text = json.dumps(document)
+    return text if rng.random() < 0.9 else changed(text.encode(), rng).decode(errors="replace")
+
+
+def _make_strange(document: dict[str, Any], rng: random.Random, changes: int) -> None:
+    for _ in range(changes):
         kind = rng.random()
         if kind < 0.2:
             many(document, rng)
@@ -176,8 +185,6 @@ def strange_model(rng: random.Random) -> str:
                     continue
                 at[key] = rng.choice(STRANGE)
                 break
-    text = json.dumps(document)
-    return text if rng.random() < 0.9 else changed(text.encode(), rng).decode(errors="replace")
 
 
 def models(count: int, rng: random.Random, folder: Path, table: Table) -> None:

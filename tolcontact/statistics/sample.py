@@ -142,7 +142,7 @@ class Sample:
         return counts.reshape(len(prefixes), -1)
 
     def _counted_keys(self, prefixes: np.ndarray, shift: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the different keys, in order, that begin with one of the prefixes (without `shift` bits); and their numbers."""
+        """Return the different keys, in order, that begin with a prefix (all but `shift` bits), and their numbers."""
         found, times = [np.zeros(0, np.uint64)], [np.zeros(0, np.int64)]
         for piece in self.pieces():
             keys = _keys(piece)
