@@ -50,7 +50,7 @@ def stoppable(at_once: str = "") -> Iterator[None]:
             raise KeyboardInterrupt from None  # what it became in a library
         raise
     finally:
-        if not _Stop.number:  # else the process is about to end
+        if not (_Stop.number or at_once):  # else the process is about to end
             sys.unraisablehook = hook
             for number, former in handlers.items():
                 signal.signal(number, former)

@@ -124,8 +124,8 @@ def writers(count: int, rng: random.Random, folder: Path, expected: Path, table:
         codes = {process.returncode for process in (first, second)}
         fault = "" if codes == {0, 2} else f"codes {codes}"
         fault = fault or is_whole(folder / "run.nc", expected)
-        left = {path.name for path in folder.iterdir()} - {"run.nc", "whole.nc"}
-        fault = fault or (f"left {', '.join(sorted(left))}" if left else "")
+        remains = sorted({path.name for path in folder.iterdir()} - {"run.nc", "whole.nc"})
+        fault = fault or (f"left {', '.join(remains)}" if remains else "")
         table.add("two writers", fault or "one wrote, one was refused", f"{number}: {words}", is_fault=bool(fault))
 
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact import vocabulary as terms
 from tolcontact.declaration import Point
 from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.errors import ArchiveError
 
 Mark = dict[str, Any]
 
@@ -37,10 +38,14 @@ class Marks:
 def marks_of(results: xr.DataTree) -> Marks:
     """Return the annotations that an archive has."""
     document = json.loads(str(results["model"][terms.DECLARATION.name].values))
-    forces = [
-        {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]
-    ]
-    return Marks(_locators(results), list(_contacts(results)), list(_measures(document)), _features(results), forces)
+    try:
+        forces = [
+            {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]
+        ]
+        measures = list(_measures(document))
+    except (LookupError, TypeError, ValueError, RuntimeError) as error:  # no run wrote it: its checksum was forged
+        raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
+    return Marks(_locators(results), list(_contacts(results)), measures, _features(results), forces)
 
 
 def marks_of_nominal(nominal: Nominal) -> Marks:

@@ -80,11 +80,14 @@ def local_cluster(workers: int) -> Iterator[Any]:
         "distributed.worker.profile.enabled": False,  # which takes a twentieth of their time
     }
     with dask.config.set(settings), _event_loop() as loop:
-        cluster = started(
-            n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, silence_logs=logging.CRITICAL, loop=loop,
-            # Any user of this machine can reach the scheduler, which runs the code of whoever has the credentials.
-            security=security, dashboard_address=LOOPBACK, worker_dashboard_address=LOOPBACK,
-        )  # fmt: skip
+        try:
+            cluster = started(
+                n_workers=workers, threads_per_worker=1, processes=True, memory_limit=0, silence_logs=logging.CRITICAL,
+                # Any user of this machine can reach the scheduler, which runs the code of whoever has the credentials.
+                security=security, dashboard_address=LOOPBACK, worker_dashboard_address=LOOPBACK, loop=loop,
+            )  # fmt: skip
+        except (OSError, RuntimeError) as error:
+            raise ClusterError(f"worker processes cannot be started: {error.__cause__ or error}") from error
         with cluster, distributed.Client(cluster) as client:
             _say_where(client)
             yield client
