@@ -1,5 +1,6 @@
 """Fixtures of several test modules; and the shapes of arrays, which are checked in all tests but the slow ones."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -62,3 +63,17 @@ def drawing():
     script = "import pyvista as pv; p = pv.Plotter(off_screen=True); p.add_mesh(pv.Sphere()); p.screenshot(return_img=True)"
     if subprocess.run([sys.executable, "-c", script], capture_output=True, timeout=120, check=False).returncode:
         pytest.skip("there is no OpenGL")
+
+
+READ = "-all,+dac_read_search"  # everything may be read
+AS_NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
+AS_NOBODY += [f"--bounding-set={READ}", f"--inh-caps={READ}", f"--ambient-caps={READ}"]
+
+
+@pytest.fixture
+def nobody():
+    """The command that makes one run as a user who can write nowhere."""
+    done = shutil.which("setpriv") and subprocess.run([*AS_NOBODY, sys.executable, "-c", ""], check=False)
+    if not done or done.returncode:
+        pytest.skip("only root may become another user")
+    return AS_NOBODY

@@ -21,7 +21,7 @@ import xarray as xr
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import COMMAND, call, nightly, start
+from tests.helpers import COMMAND, call, nightly, run, start
 from tolcontact.errors import ClusterError
 from tolcontact.simulation import cluster
 from tolcontact.simulation.cluster import local_cluster, running_cluster
@@ -359,3 +359,46 @@ def test_a_shard_may_end_when_one_has_just_stopped_waiting():
     assert cluster.shard_result(client, LastMoment(7)) == 7
     with pytest.raises(TimeoutError, match="of its own"):
         cluster.shard_result(client, LastMoment(TimeoutError("of its own")))
+
+
+def test_another_user_cannot_use_the_workers(client, nobody):
+    """They would run its code as their owner."""
+    code = (
+        "import os, sys; assert os.getuid() == 65534\n"
+        "from distributed import Client, Security\n"
+        "for address, security in [(sys.argv[1], None), (sys.argv[1].replace('tls', 'tcp'), None), "
+        "(sys.argv[1], Security.temporary())]:\n"
+        "    try:\n"
+        "        print('ran as', Client(address, timeout=3, security=security).submit(os.getuid).result(timeout=5))\n"
+        "    except Exception as error:\n"
+        "        print('refused')\n"
+        "sys.stdout.flush(); os._exit(0)"
+    )
+    assert client.scheduler.address.startswith("tls://127.0.0.1:")
+    done = run([*nobody, sys.executable, "-c", code, client.scheduler.address])
+    assert done.stdout.split() == ["refused"] * 3, (done.stdout, done.stderr)
+
+
+def test_nothing_of_a_cluster_is_served_to_other_machines(client):
+    pids = [os.getpid(), *(child.pid for child in psutil.Process().children(recursive=True))]
+    addresses = {
+        connection.laddr.ip
+        for pid in pids
+        for connection in psutil.Process(pid).net_connections("inet")
+        if connection.status == psutil.CONN_LISTEN
+    }
+    assert addresses <= {"127.0.0.1", "::1"} and addresses
+
+
+def test_ctrl_c_in_a_terminal_is_for_the_command_and_not_for_its_workers(client):
+    """The terminal sends it to all of them."""
+    workers = [child for child in psutil.Process().children() if "spawn_main" in " ".join(child.cmdline())]
+    assert len(workers) >= 2
+    for worker in workers:
+        worker.send_signal(signal.SIGINT)
+    assert client.submit(sum, [1, 2], pure=False).result(timeout=60) == 3 and all(worker.is_running() for worker in workers)
+
+
+def test_a_scheduler_with_certificates_needs_them_here():
+    with pytest.raises(ClusterError, match="asks for certificates, and dask has none"), running_cluster("tls://127.0.0.1:1"):
+        pass

@@ -3,11 +3,10 @@
 import hashlib
 import os
 import shutil
-import sys
 
 import pytest
 
-from tests.helpers import finish, nightly, run, script, start
+from tests.helpers import finish, nightly, script, start
 from tolcontact.compiled import compiled
 
 pytestmark = pytest.mark.slow
@@ -105,20 +104,6 @@ def test_a_change_in_a_function_that_it_calls_is_noticed(monkeypatch, tmp_path):
         assert calling(1.0) == 1 + added
         found.append(sum(calling.stats.cache_hits.values()))
     assert found == [0, 0, 1]
-
-
-READ = "-all,+dac_read_search"  # everything may be read
-AS_NOBODY = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups"]
-AS_NOBODY += [f"--bounding-set={READ}", f"--inh-caps={READ}", f"--ambient-caps={READ}"]
-
-
-@pytest.fixture
-def nobody():
-    """The command that makes one run as a user who can write nowhere."""
-    done = shutil.which("setpriv") and run([*AS_NOBODY, sys.executable, "-c", ""])
-    if not done or done.returncode:
-        pytest.skip("only root may become another user")
-    return AS_NOBODY
 
 
 @pytest.mark.parametrize("home", ["own", *nightly("not writable", "writable", "missing")])

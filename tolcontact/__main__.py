@@ -1,20 +1,45 @@
 """`python -m tolcontact`, and the console script: the command line, which may be stopped while it is being imported."""
 
+import resource
 import sys
+from collections.abc import Callable
+from typing import NoReturn
 
 import tolcontact
 from tolcontact import interrupts
 
+STOPPED = "stopped"
+MIN_ADDRESS_SPACE = 1_500_000_000  # bytes
+
 
 def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
-    with interrupts.stoppable(at_once="stopped"):
-        try:
-            run = tolcontact.command_line  # imported here, on first use
-        except (ImportError, MemoryError) as error:
-            sys.stderr.write(f"error: libraries cannot be loaded ({error}); is there enough memory, are all installed?\n")
-            sys.exit(2)
-        run()
+    try:
+        with interrupts.stoppable(at_once=STOPPED):
+            check_address_space()
+            _imported()()
+    except KeyboardInterrupt:  # between the end of a command and that of the process
+        interrupts.end(STOPPED)
+
+
+def _imported() -> Callable[[], None]:
+    try:
+        return tolcontact.command_line  # imported here, on first use
+    except (ImportError, MemoryError) as error:
+        _refuse(f"libraries cannot be loaded ({error}); is there enough memory, and are all of them installed?")
+
+
+def check_address_space() -> None:
+    """Exit with code 2 unless libraries can be loaded: with less address space some of them hang instead of failing."""
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit != resource.RLIM_INFINITY and limit < MIN_ADDRESS_SPACE:
+        needed = f"{MIN_ADDRESS_SPACE / 1e9:g} GB"
+        _refuse(f"this process may use {limit / 1e9:g} GB of address space, and its libraries need {needed}; raise ulimit -v")
+
+
+def _refuse(message: str) -> NoReturn:
+    sys.stderr.write(f"error: {message}\n")
+    sys.exit(2)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | `--samples`, `--seed` | number of realizations, 1000 by default; the same seed gives the same realizations |
 | `--solver` | QP solver, see `tolcontact.compilation` |
 | `--resolution`, `--objective` | replace the model's own choice, see `tolcontact.contact` and `tolcontact.mechanics` |
-| `--out FILE.nc`, `--overwrite`, `--resume` | write, replace, or continue an archive |
+| `--out FILE.nc`, `--overwrite`, `--resume` | write, replace (any file), or continue an archive |
 | `--plan` | the plan of the draws: `monte-carlo`, `latin hypercube` or `sobol`, see `tolcontact.variation` |
 | `--until "gap: 6 sigma +-1 %"` | sample until this confidence interval is narrow enough; also `mean +-0.01`, `ppm +-20 %` |
 | `--keep measures`, `poses` or `all` | variables of each realization in the archive |
@@ -49,7 +49,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 | 0 | done |
 | 1 | done, but more than 0.1 % of the realizations are not resolved, or what `--until` or `--require` states is not met |
 | 2 | invalid input: one message, nothing written |
-| 130, 143 | stopped by Ctrl-C or SIGTERM; finished realizations are in the archive |
+| 130, 143 | stopped by Ctrl-C or SIGTERM, one of which is enough; finished realizations are in the archive |
 
 >>> from typer.testing import CliRunner
 >>> from tolcontact.cli.app import app

@@ -36,8 +36,10 @@ therefore depend on which realizations share a block, and so on the number of re
 
 ## Many processes, many machines
 
-`tolcontact run MODEL --workers 8` simulates in eight processes of this machine, `--scheduler tcp://HOST:8786` on the workers
-of a running dask scheduler, `tc.run(..., client=client)` on those of any client of `dask.distributed` (the extra `dask`).
+`tolcontact run MODEL --workers 8` simulates in eight processes of this machine. Only this command can reach them: they ask for
+credentials that are made for it, and serve the pages of their dashboard to this machine alone. `--scheduler tcp://HOST:8786`
+simulates on the workers of a running dask scheduler, `tc.run(..., client=client)` on those of any client of
+`dask.distributed` (the extra `dask`).
 Start the scheduler and each worker in a shell of its own:
 
     dask scheduler
@@ -51,7 +53,15 @@ simulate its shards; if the scheduler restarts within a minute, its shards are s
 `--resume` continues the run with any number of workers. For workers that you start yourself, set
 `DASK_DISTRIBUTED__NANNY__PRE_SPAWN_ENVIRON__MALLOC_TRIM_THRESHOLD_=100000000`: with dask's default they take half as long
 again (`--workers` sets it for you). The study in `studies/scale` measures the overhead and the limits of a cluster. Workers
-run Python code that clients send, so run a scheduler only in a network that you trust.
+run the Python code that clients send: whoever reaches a scheduler runs code as its owner, on a shared machine any of its
+users. So give it certificates, and its workers and clients the same ones:
+
+    dask scheduler --protocol tls --tls-ca-file ca.pem --tls-cert own.pem --tls-key own.key
+    dask worker tls://HOST:8786 --nthreads 1 --tls-ca-file ca.pem --tls-cert own.pem --tls-key own.key
+
+    export DASK_DISTRIBUTED__COMM__TLS__CA_FILE=ca.pem
+    export DASK_DISTRIBUTED__COMM__TLS__CLIENT__CERT=own.pem DASK_DISTRIBUTED__COMM__TLS__CLIENT__KEY=own.key
+    tolcontact run MODEL --scheduler tls://HOST:8786
 
 `tc.simulate` and `tc.study` (see `tolcontact.workflow`) return lazy datasets of realizations, which dask computes. Workers can
 then write their own results (`to_zarr`), so no single writer limits them.
@@ -63,9 +73,10 @@ All analyses also accept a `client`, and `--workers` or `--scheduler` on the com
 
 From draws to measures, on one thread, RA1 takes 11 to 13 us per realization with `daqp` and 25 to 30 us with `qpoases`; RA2,
 with 3000 contact points, 21 to 26 us and 56 us. That is 17 and 21 times (with `qpoases` 7 and 10 times) as fast as NumPy with
-a loop over a QP solver (see `studies/speed`). A million realizations of RA1 take 10 to 15 s on two processors and 500 MB.
-Memory does not grow with the number of realizations: at most two blocks for each thread are kept. A run of a million
-realizations or more, or one that will take more than a minute, announces its time, memory and disk space before it starts.
+a loop over a QP solver (see `studies/speed`). A million realizations of RA1 take 10 to 15 s on two processors and 550 MB,
+their summary or report 450 MB. Memory does not grow with the number of realizations: at most two blocks for each thread are
+kept, and statistics read pieces. A run of a million realizations or more, or one that will take more than a minute, announces
+its time, memory and disk space before it starts; what would take more than 30 days, or more memory than there is, is refused.
 """
 
 from tolcontact.simulation.block import Block, outcomes, simulate_block

@@ -122,10 +122,15 @@ def _say_where(client: Any) -> None:
 def running_cluster(address: str) -> Iterator[Any]:
     """Open the client of the scheduler at an address, for example tcp://10.0.0.1:8786."""
     with needs_dask():
+        if address.startswith("tls:") and not distributed.Security().get_connection_args("client").get("ssl_context"):
+            raise ClusterError(
+                f'the scheduler at "{address}" asks for certificates, and dask has none; set '
+                "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..._TLS__CLIENT__CERT and ..._TLS__CLIENT__KEY"
+            )
         try:
             client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
-        except (OSError, ValueError, TypeError) as error:  # TypeError: dask has no certificates
-            advice = "start one with: dask scheduler; one that asks for certificates needs tls:// and those in dask's settings"
+        except (OSError, ValueError) as error:
+            advice = "start one with: dask scheduler; if it asks for certificates, its address begins with tls://"
             raise ClusterError(f'no dask scheduler answers at "{address}": {error}; {advice}') from error
     with client:
         _say_where(client)

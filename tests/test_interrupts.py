@@ -1,0 +1,63 @@
+"""One signal ends a command, also where a library swallows the exception, or makes another one of it."""
+
+import signal
+import sys
+
+import pytest
+
+from tests.helpers import run
+
+BEGIN = """
+import os, signal, sys, time
+from tolcontact import interrupts
+def stop(number=signal.SIGINT):
+    os.kill(os.getpid(), number)
+    time.sleep(0)
+class Cleaned:
+    def __del__(self):
+        stop()
+try:
+    with interrupts.stoppable():
+"""
+END = """
+        print("went on")
+except KeyboardInterrupt:
+    interrupts.end("stopped")
+"""
+PLACES = {
+    "anywhere": ("stop()", signal.SIGINT),
+    "SIGTERM": ("stop(signal.SIGTERM)", signal.SIGTERM),
+    "ignored in a clean-up": ("Cleaned(); time.sleep(60)", signal.SIGINT),
+    "caught by a library": ("try: stop()\n        except BaseException: pass\n        time.sleep(60)", signal.SIGINT),
+    "made another error": (
+        "try: stop()\n        except BaseException as error: raise ImportError('x') from error", signal.SIGINT,
+    ),
+    "made an exit": ("try: stop()\n        except BaseException: sys.exit(0)", signal.SIGINT),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_one_signal_is_enough(place):
+    code, number = PLACES[place]
+    done = run([sys.executable, "-c", f"{BEGIN}        {code}{END}"])
+    assert (done.returncode, done.stdout, done.stderr) == (128 + number, "", "stopped\n")
+
+
+def test_a_second_one_does_not_disturb_the_cleaning_up():
+    code = "try: stop()\n        finally: stop(); time.sleep(1); stop(signal.SIGTERM); sys.stdout.write('cleaned')"
+    done = run([sys.executable, "-c", f"{BEGIN}        {code}{END}"])
+    assert (done.returncode, done.stdout, done.stderr) == (130, "cleaned", "stopped\n")
+
+
+def test_without_a_signal_everything_is_as_before():
+    code = "before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]\n"
+    code += "from tolcontact import interrupts\nwith interrupts.stoppable(): pass\n"
+    code += "assert before == [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]"
+    assert run([sys.executable, "-c", f"import signal\n{code}"]).returncode == 0
+
+
+def test_too_little_address_space_is_said_where_libraries_would_hang():
+    code = "import resource, os, sys; resource.setrlimit(resource.RLIMIT_AS, (10**9,) * 2); "
+    code += "os.execv(sys.executable, [sys.executable, '-m', 'tolcontact', '--version'])"
+    done = run([sys.executable, "-c", code])
+    assert done.returncode == 2 and "address space" in done.stderr and "Traceback" not in done.stderr
