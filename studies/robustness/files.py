@@ -29,7 +29,7 @@ READERS = {
     "summary --limits": ["summary", "a.nc", "--limits"],
     "report": ["report", "a.nc", "--overwrite"],
     "compare": ["compare", "good.nc", "a.nc"],
-    "run --resume": ["run", "MODEL", "--samples", "40", "--out", "a.nc", "--resume", "--quiet"],
+    "run --resume": ["run", "MODEL", "--samples", "40", "--solver", "daqp", "--out", "a.nc", "--resume", "--quiet"],
 }
 MAX_SECONDS, MAX_MEGABYTES = 20.0, 2048.0  # for the model of a stranger
 
@@ -98,8 +98,9 @@ def words(reader: str, model: Path) -> list[str]:
 
 def shapes(count: int, rng: random.Random, folder: Path, table: Table) -> None:
     """Let commands read shape files with changed bytes."""
-    ball = trimesh.creation.icosphere(2)
-    good = {f"ball.{kind}": ball.export(file_type=kind) for kind in ("stl", "obj", "ply", "glb")}
+    box = trimesh.creation.box((50, 25, 10)).subdivide().subdivide()
+    box.apply_translation((25, 12.5, 5))
+    good = {f"box.{kind}": box.export(file_type=kind) for kind in ("stl", "obj", "ply", "glb")}
     good = {name: data.encode() if isinstance(data, str) else data for name, data in good.items()}
     good["as1.stp"] = (ROOT / "studies/cad/as1-oc-214.stp").read_bytes()
     for number in range(count):
