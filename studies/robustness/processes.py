@@ -42,7 +42,7 @@ def is_whole(path: Path, expected: Path) -> str:
             if group not in one.groups:
                 return f"has no group {group}"
             for name in other[group].data_vars:
-                found, wanted = one[f"{group}/{name}"], other[f"{group}/{name}"]
+                found, wanted = one[group][str(name)], other[group][str(name)]
                 if name not in VARYING and not xr.DataArray(found.values).identical(xr.DataArray(wanted.values)):
                     return f"{group} {name} differs"
     return ""
