@@ -56,9 +56,10 @@ class _Cache(NullCache):  # type: ignore[misc]
         except Exception:  # another build of the same version may lack anything
             return None
 
-    def save_overload(self, sig: Any, data: Any) -> None:
-        if not (data.library.has_dynamic_globals or any(not part.can_cache for part in data.lifted)):  # addresses of a process
-            code_cache.store(self._key(sig, data.codegen), dumps(data._reduce()))
+    def save_overload(self, sig: Any, result: Any) -> None:
+        # Another process could not use code that holds addresses of this one.
+        if not result.library.has_dynamic_globals and all(part.can_cache for part in result.lifted):
+            code_cache.store(self._key(sig, result.codegen), dumps(result._reduce()))
 
     def _key(self, sig: Any, codegen: Any) -> str:
         parts = [numba.__version__, sys.version, repr(sig), repr(codegen.magic_tuple()), *_description(self._dispatcher, set())]

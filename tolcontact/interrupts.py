@@ -62,9 +62,9 @@ def end(message: str, number: int = 0) -> NoReturn:
     Threads may compute for minutes, and what is done at exit may wait for them; nothing of it is needed.
     """
     number = number or _Stop.number or signal.SIGINT
-    with contextlib.suppress(OSError, ValueError):  # of a terminal that is gone
+    with contextlib.suppress(Exception):  # the terminal is gone, or the signal came while a stream was being written to
         sys.stdout.flush()
-    with contextlib.suppress(OSError, ValueError):
+    with contextlib.suppress(Exception):
         sys.stderr.write(f"{message}\n")
         sys.stderr.flush()
     os._exit(128 + number)

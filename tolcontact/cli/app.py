@@ -26,7 +26,7 @@ class Commands(TyperGroup):
             with interrupts.stoppable():
                 return super().invoke(ctx)
         except KeyboardInterrupt:
-            interrupts.end("stopped; nothing is kept")
+            interrupts.end("stopped")
 
 
 app = typer.Typer(
