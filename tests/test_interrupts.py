@@ -61,3 +61,11 @@ def test_too_little_address_space_is_said_where_libraries_would_hang():
     code += "os.execv(sys.executable, [sys.executable, '-m', 'tolcontact', '--version'])"
     done = run([sys.executable, "-c", code])
     assert done.returncode == 2 and "address space" in done.stderr and "Traceback" not in done.stderr
+
+
+def test_closed_streams_do_no_harm_to_the_next_files(tmp_path):
+    archive = tmp_path / "run.nc"
+    command = f"{sys.executable} -m tolcontact run models/ra1.py --samples 20 --out {archive} 0<&- 1>&- 2>&-"
+    assert run(["sh", "-c", command]).returncode == 0
+    assert archive.read_bytes()[1:4] == b"HDF"
+    assert run([sys.executable, "-m", "tolcontact", "summary", str(archive)]).returncode == 0

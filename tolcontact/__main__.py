@@ -1,5 +1,6 @@
 """`python -m tolcontact`, and the console script: the command line, which may be stopped while it is being imported."""
 
+import os
 import resource
 import sys
 from collections.abc import Callable
@@ -16,6 +17,7 @@ def command_line() -> None:
     """Run the command line (see tolcontact.cli)."""
     try:
         with interrupts.stoppable(at_once=STOPPED):
+            open_streams()
             check_address_space()
             _imported()()
     except KeyboardInterrupt:  # between the end of a command and that of the process
@@ -27,6 +29,16 @@ def _imported() -> Callable[[], None]:
         return tolcontact.command_line  # imported here, on first use
     except (ImportError, MemoryError) as error:
         _refuse(f"libraries cannot be loaded ({error}); is there enough memory, and are all of them installed?")
+
+
+def open_streams() -> None:
+    """Open a closed standard input, output or error as the null device: else the next file takes its number, and its output."""
+    while (number := os.open(os.devnull, os.O_RDWR)) <= 2:
+        os.set_inheritable(number, True)
+    os.close(number)
+    sys.stdin = sys.stdin or os.fdopen(0)
+    sys.stdout = sys.stdout or os.fdopen(1, "w")
+    sys.stderr = sys.stderr or os.fdopen(2, "w")
 
 
 def check_address_space() -> None:

@@ -22,6 +22,8 @@ from tolcontact.geometry.shapes import field_surface, shape
 
 log = logging.getLogger(__name__)
 
+MANY_PAIRS = 100
+
 
 class _Faults(list[str]):
     """The faults of an assembly."""
@@ -51,6 +53,8 @@ def discretize(assembly: Assembly) -> Nominal:
         parts = [_on_features(part, features, meshes, faults) for part in parts if part is not None]
     nominal_parts = tuple(part for part in parts if part is not None)
     placed = {nominal.part: nominal for nominal in nominal_parts}
+    if len(assembly.pairs) > MANY_PAIRS:
+        log.warning("%d contact pairs: to prepare them takes about a tenth of a second each", len(assembly.pairs))
     pairs = [
         faults.attempt(designation("contact pair", pair), contact_points, assembly, pair, placed, meshes, features)
         for pair in assembly.pairs

@@ -36,15 +36,11 @@ class BodyFace:
     def depth(self, points: np.ndarray) -> np.ndarray:
         """Return the depth (point,) [mm] of `points` (point, 3) [mm] behind the face, in the body; 0 elsewhere.
 
-        It is the distance to the face, and 0 where a flat face is less than ROUNDED away, as it is from most points of faces
-        that touch. Everything behind a face is inside a body that is not closed.
+        It is the distance to the face. Everything behind a face is inside a body that is not closed.
         """
         depth = np.zeros(len(points))
         lower, upper = self.body.bounds
         inside = np.flatnonzero(((points >= lower) & (points <= upper)).all(axis=1))
-        if self._plane is not None:
-            n, height = self._plane
-            inside = inside[points[inside] @ n < height - ROUNDED]
         if inside.size:
             depth[inside] = self.face.depth(points[inside])
             inside = inside[depth[inside] > 0]
@@ -55,18 +51,34 @@ class BodyFace:
             depth[inside[turns <= 0.5]] = 0
         return depth
 
+    def behind(self, motion: np.ndarray, other: "BodyFace", outward: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows and numbers of points of another face that may lie behind this one when it is moved.
+
+        Of a flat face these are points more than ROUNDED behind its plane, which few are where faces touch; else all points.
+
+        motion    (row, 12)
+        outward   (row,) [mm]: how far the points lie out of their face
+        """
+        if self.plane is None:
+            row, point = np.indices((len(motion), len(other.points)))
+            return row.ravel(), point.ravel()
+        n, height = self.plane
+        turned = n @ pose.rotation(motion)
+        level = turned @ other.points.T + (pose.translation(motion) @ n - height)[:, None]
+        if outward.any():
+            level += outward[:, None] * (turned @ other.normals.T)
+        row, point = np.nonzero(level < -ROUNDED)
+        return row, point
+
     @cached_property
     def _bulge(self) -> float:
         """The largest distance [mm] of analytic surfaces from the body's flat triangles."""
         return max((chord_height(piece.face) for piece in self.face.pieces), default=0.0)
 
     @cached_property
-    def _plane(self) -> tuple[np.ndarray, float] | None:
+    def plane(self) -> tuple[np.ndarray, float] | None:
         """Normal and height of the plane behind which a flat face lies; None if the face is not flat."""
-        normals = self.face.corner_normals.reshape(-1, 3)
-        n = normals.mean(axis=0)
-        n /= np.linalg.norm(n)
-        return (n, float((self.face.mesh.vertices @ n).max())) if (normals @ n).min() > 1 - 1e-12 else None
+        return _plane_of(self.face)
 
     @cached_property
     def _is_closed(self) -> bool:
@@ -98,11 +110,13 @@ class FacePair:
             rows = slice(start, start + POSES_PER_BLOCK)
             X, outward = X_RM[rows], heights[rows]
             for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
-                places = pose.apply(motion, side.points)
-                if outward.any():
-                    places += outward[:, None, None] * (side.normals @ pose.rotation(motion).swapaxes(1, 2))
-                depth = body.depth(places.reshape(-1, 3)).reshape(len(X), -1)
-                largest[rows] = np.maximum(largest[rows], depth.max(axis=1, initial=0))
+                row, point = body.behind(motion, side, outward)
+                if row.size:
+                    places = side.points[point] + outward[row, None] * side.normals[point]
+                    depth = body.depth(
+                        np.einsum("kij,kj->ki", pose.rotation(motion)[row], places) + pose.translation(motion)[row]
+                    )
+                    np.maximum.at(largest, start + row, depth)
         return largest
 
 
@@ -113,8 +127,18 @@ def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:
     points = np.unique(_spread(face.mesh, step, count), axis=0)
     if len(points) > MAX_POINTS:
         points = points[np.random.default_rng(0).choice(len(points), MAX_POINTS, replace=False)]
+    flat = _plane_of(face)
+    if flat is not None:
+        return BodyFace(face, body, points, np.broadcast_to(flat[0], points.shape))
     triangle, nearest = face.nearest(points)
     return BodyFace(face, body, face.project(points)[0] if face.surfaces else points, face.normals(triangle, nearest))
+
+
+def _plane_of(face: Surface) -> tuple[np.ndarray, float] | None:
+    normals = face.corner_normals.reshape(-1, 3)
+    n = normals.mean(axis=0)
+    n /= np.linalg.norm(n)
+    return (n, float((face.mesh.vertices @ n).max())) if (normals @ n).min() > 1 - 1e-12 else None
 
 
 def _spread(mesh: trimesh.Trimesh, step: float, count: int) -> np.ndarray:

@@ -128,13 +128,25 @@ def running_cluster(address: str) -> Iterator[Any]:
                 "DASK_DISTRIBUTED__COMM__TLS__CA_FILE, ..._TLS__CLIENT__CERT and ..._TLS__CLIENT__KEY"
             )
         try:
-            client = distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
+            distributed.Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False).close()
+            client = distributed.Client(address, timeout=WORKER_TIMEOUT, set_as_default=False)  # waits as long for a lost one
         except (OSError, ValueError) as error:
             advice = "start one with: dask scheduler; if it asks for certificates, its address begins with tls://"
             raise ClusterError(f'no dask scheduler answers at "{address}": {error}; {advice}') from error
-    with client:
+    with _silent("distributed.client"), client:  # a lost scheduler is told here
         _say_where(client)
         yield client
+
+
+@contextmanager
+def _silent(name: str) -> Iterator[None]:
+    logger = logging.getLogger(name)
+    level = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
 
 
 @contextmanager
@@ -224,6 +236,8 @@ def check_workers(client: Any, timeout: float = WORKER_TIMEOUT) -> None:
         raise ClusterError(
             f"no worker came within {timeout:.0f} s; start some with: dask worker {client.scheduler.address} --nthreads 1"
         ) from error
+    except OSError as error:
+        raise ClusterError(f"the scheduler was lost before it had work: {error}; resume the run later") from error
     for library, expected in versions().items():
         for worker, actual in client.run(version, library, on_error="return").items():
             check_version(worker, library, actual if isinstance(actual, str) else MISSING_VERSION, expected)
@@ -261,8 +275,11 @@ class _Shards:
 
     @property
     def threads(self) -> int:
-        """The number of shards that can be simulated together."""
-        return threads_of(self._client)
+        """The number of shards that can be simulated together; 1 if the scheduler is lost, which the next shard tells."""
+        try:
+            return threads_of(self._client)
+        except OSError:
+            return 1
 
     def begin(self, start: int) -> int:
         """Submit the shard from the realization `start` on; return where the next one begins."""
@@ -280,7 +297,9 @@ class _Shards:
                 raise ClusterError(
                     f"realizations {start} to {stop - 1} ended the workers that simulated them: {error}"
                 ) from error
-            except (distributed.client.FutureCancelledError, distributed.comm.CommClosedError):
+            except (distributed.client.FutureCancelledError, OSError):  # a lost connection is an OSError, whatever its cause
+                if future.status == "error":  # of the shard itself
+                    raise
                 self._begin_again()
             else:
                 self._begun.popleft()
@@ -314,12 +333,19 @@ class _Shards:
         """Wait for a scheduler that has forgotten the shards under way, and send them again."""
         log.warning("the scheduler was lost; waiting for it")
         until = time.monotonic() + self._timeout
-        while self._client.status != "running" or not self._client.nthreads():
+        while not self._has_workers():
             if time.monotonic() > until:
                 raise ClusterError(
-                    f"the scheduler was lost, and did not come back within {self._timeout:.0f} s; resume the run later"
+                    "the scheduler was lost, and did not come back with its workers "
+                    f"within {self._timeout:.0f} s; resume the run later"
                 )
             time.sleep(0.2)
         self._model.send()
         self._send_job()
         self._begun = deque((start, stop, self._submitted(start, stop)) for start, stop, _ in self._begun)
+
+    def _has_workers(self) -> bool:
+        """Whether the scheduler answers, and has workers."""
+        with suppress(OSError):  # it may be lost between a look at the client's status and the question
+            return self._client.status == "running" and bool(self._client.nthreads())
+        return False
