@@ -40,8 +40,7 @@ SHARDS_AHEAD = 4  # under way for each thread of a worker
 SHARD_SECONDS, MAX_SHARD_ROWS = 1.0, 1 << 15
 WORKER_TIMEOUT = 60.0  # s: for a lost connection, and for the first worker
 LOOPBACK = "127.0.0.1:0"  # any port; by default, pages of a cluster are served on all interfaces
-LOOP_TIMEOUT = 1.0  # s: for the end of an event loop
-SCHEDULER_TIMEOUT = 5.0  # s: for an answer of the scheduler
+LOOP_TIMEOUT, SCHEDULER_TIMEOUT = 1.0, 5.0  # s: for the end of an event loop, for an answer of the scheduler
 
 T = TypeVar("T")
 MapBlocks = Callable[..., Iterator[Any]]  # `map_blocks`, or the same on workers
