@@ -58,7 +58,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `UnitsWarning` |
+| warnings | `ContactWarning`, `FaceWarning`, `UnitsWarning` |
 
 `tolcontact.testing` has assertions for tests of your own models.
 """

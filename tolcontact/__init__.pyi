@@ -46,6 +46,7 @@ from .errors import (
     ArchiveError as ArchiveError,
     ClusterError as ClusterError,
     ContactWarning as ContactWarning,
+    FaceWarning as FaceWarning,
     ModelError as ModelError,
     OptionError as OptionError,
     ScriptError as ScriptError,

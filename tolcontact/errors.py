@@ -81,5 +81,9 @@ class ContactWarning(UserWarning):
     """The contact points or the triangles of a pair of curved faces are coarse compared with the tolerances."""
 
 
+class FaceWarning(UserWarning):
+    """A face is a part of a curved surface that a STEP file splits."""
+
+
 class UnitsWarning(UserWarning):
     """A part has an implausible size, and no units were given for its file."""

@@ -187,14 +187,23 @@ class Record(Named):
              left out if it has its default value
     kind     value of an entry under "kind"
     mark     key that distinguishes these entries from others
+    build    makes a thing of its fields, if the class itself does not
     codecs   codecs of fields whose type does not determine them
     """
 
     def __init__(
-        self, cls: Any, keys: str, *, kind: str = "", mark: str = "", name: str = "", **codecs: Codec | Inline
+        self,
+        cls: Any,
+        keys: str,
+        *,
+        kind: str = "",
+        mark: str = "",
+        name: str = "",
+        build: Callable[..., Any] | None = None,
+        **codecs: Codec | Inline,
     ) -> None:
         super().__init__(name or cls.__name__)
-        self.cls, self.kind, self.mark = cls, kind, mark
+        self.cls, self.kind, self.mark, self.build = cls, kind, mark, build or cls
         parameters, hints = inspect.signature(cls).parameters, get_type_hints(cls, include_extras=True)
         self.fields = []
         for token in keys.split():
@@ -242,7 +251,7 @@ class Record(Named):
             if member.key == "declared_at":
                 arguments.setdefault("declared_at", place.line)
         try:
-            thing = self.cls(**arguments)
+            thing = self.build(**arguments)
         except (TypeError, ValueError, TolcontactError) as error:
             raise self._fault(str(error), place) from error
         for fault in thing.faults() if hasattr(thing, "faults") else ():

@@ -88,9 +88,17 @@ def indices_of(value: Any, place: Place) -> Any:
     return value
 
 
-def _brep(value: Any, place: Place) -> Any:
-    """Return the number, the name or the point of a B-rep face."""
-    return value if isinstance(value, tuple) else indices_of(value, place)
+def _brep_faces(value: Any, place: Place) -> Any:
+    """Return the numbers, names or points of one B-rep face, or of several."""
+    if isinstance(value, dict):
+        if list(value) != ["any"]:
+            raise place.mismatch('faces under the key "any"', list(value))
+        return tuple(_brep_faces(face, place["any"][k])[0] for k, face in enumerate(value["any"]))
+    return (value if isinstance(value, tuple) else indices_of(value, place),)
+
+
+def _brep_entry(faces: tuple[Any, ...], writing: Writing) -> Any:
+    return faces[0] if len(faces) == 1 else {"any": faces}
 
 
 def _array(rows: list[list[float]], place: Place) -> np.ndarray:
@@ -195,7 +203,14 @@ CRITERION = Choice(
     Record(Facing, "facing=direction angle", mark="facing", facing=FREE_DIRECTION, angle=Plain(POSITIVE)),
     Record(Inside, "inside=lower+upper", mark="inside"),
     Record(Near, "near=part within", mark="near", near=CODECS[Part], within=Plain(POSITIVE)),
-    Record(Brep, "brep=which", mark="brep", brep=Plain(INDEX | str | Vector, read=_brep)),
+    Record(
+        Brep,
+        "brep=which whole?",
+        mark="brep",
+        build=lambda which, whole=False: Brep(*which, whole=whole),
+        brep=Plain(INDEX | str | Vector | dict[str, list[INDEX | str | Vector]], _brep_entry, _brep_faces),  # type: ignore[misc]
+        whole=Plain(bool),
+    ),
     Wrapped("cylinder", Record(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
     Record(
         Largest,

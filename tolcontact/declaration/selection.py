@@ -119,33 +119,52 @@ class Near(Readable):
 
 @dataclass(frozen=True, repr=False)
 class Brep(Readable):
-    """Faces of the B-rep of a STEP file: by number (`tolcontact faces` lists them), by name, or by a point [mm]."""
+    """Faces of the B-rep of a STEP file, each by number (`tolcontact faces` lists them), by name, or by a point [mm].
 
-    number: int | None
-    at: Vector | None
-    name: str | None
+    With `whole`, each one stands for all faces of the same surface that touch it, as the two halves of a hole do.
+    `Brep(3) | Brep("seat")` are the faces of both.
+    """
 
-    def __init__(self, which: Any) -> None:
-        number = int(which) if hasattr(which, "__index__") and not isinstance(which, bool) else None
-        object.__setattr__(self, "number", number)
-        object.__setattr__(self, "name", which if isinstance(which, str) else None)
-        object.__setattr__(self, "at", None if number is not None or self.name is not None else vector(which))
+    which: tuple[int | str | Vector, ...]
+    whole: bool
 
-    @property
-    def which(self) -> int | str | Vector | None:
-        """The number, the name, or the point."""
-        return next((value for value in (self.number, self.name, self.at) if value is not None), None)
+    def __init__(self, *which: Any, whole: bool = False) -> None:
+        object.__setattr__(self, "which", tuple(map(_brep_face, which)))
+        object.__setattr__(self, "whole", whole)
+
+    def __or__(self, other: "Brep") -> "Brep":
+        if not isinstance(other, Brep):
+            return NotImplemented
+        if self.whole != other.whole:
+            raise TypeError(
+                "a union of B-rep faces is of whole surfaces, or of single faces; state whole for both, or for none"
+            )
+        return Brep(*self.which, *other.which, whole=self.whole)
 
     def faults(self) -> Iterator[str]:
-        if self.at is not None and not is_finite(self.at):
+        if not self.which:
+            yield "B-rep faces need numbers, names, or points"
+        if any(isinstance(face, tuple) and not is_finite(face) for face in self.which):
             yield "a B-rep face needs its number, its name, or a point on it, three finite numbers"
-        if self.name == "":
+        if "" in self.which:
             yield "a B-rep face has an empty name; give its number, or a point on it"
+        if not isinstance(self.whole, bool):
+            yield f"whole is {self.whole!r}; expected True or False"
 
     def __str__(self) -> str:
-        if self.at is None:
-            return f"B-rep face {self.number if self.name is None else shown(repr(self.name))}"
-        return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in self.at))
+        return ("whole " if self.whole else "") + " and ".join(map(_brep_words, self.which))
+
+
+def _brep_face(which: Any) -> int | str | Vector:
+    if isinstance(which, str):
+        return which
+    return int(which) if hasattr(which, "__index__") and not isinstance(which, bool) else vector(which)
+
+
+def _brep_words(which: int | str | Vector) -> str:
+    if isinstance(which, tuple):
+        return "B-rep face at ({})".format(", ".join(f"{c:g}" for c in which))
+    return f"B-rep face {which if isinstance(which, int) else shown(repr(which))}"
 
 
 @dataclass(frozen=True, repr=False)

@@ -13,6 +13,7 @@ from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Toleran
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
+from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.features import Features, datum_order
@@ -71,6 +72,7 @@ def discretize(assembly: Assembly) -> Nominal:
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
+    warn_of_partial_surfaces(assembly, meshes)
     return Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
 
 

@@ -1,6 +1,7 @@
 """Descriptions of the faces of a part: B-rep faces of a STEP file, or smooth pieces of a mesh. Lengths in mm."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,7 +16,11 @@ from tolcontact.geometry.fitting import fit_surface
 from tolcontact.readable import Readable
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the surface on which it is
+RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
+POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 DESCRIPTIONS = "descriptions"
+
+FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
 
 @dataclass(frozen=True, repr=False)
@@ -31,6 +36,7 @@ class FaceInFile(Readable):
     area        [mm2] of its triangles
     residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
     name        its name in the file, which other faces may have too; empty if it has none
+    whole       numbers of the faces of its surface that touch it, and it; empty if it has the surface for itself
     """
 
     number: int
@@ -42,6 +48,7 @@ class FaceInFile(Readable):
     area: float
     residual: float = 0.0
     name: str = ""
+    whole: tuple[int, ...] = ()
 
     def __str__(self) -> str:
         name = f'"{shown(self.name)}", ' if self.name else ""
@@ -52,6 +59,9 @@ class FaceInFile(Readable):
             entries.append("along ({:g}, {:g}, {:g})".format(*(round(c, 6) + 0.0 for c in self.direction)))
         if self.residual:
             entries.append(f"fitted within {self.residual:.1g} mm")
+        if self.whole:
+            others = ", ".join(str(number) for number in self.whole if number != self.number)
+            entries.append(f"one surface with {others}")
         return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
@@ -72,17 +82,57 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
         number_of, stated = number_faces(mesh)
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
-        entries = enumerate(zip(groups, stated, strict=True), start=1)
-        faces = (_description(mesh, number, triangles, surface) for number, (triangles, surface) in entries)
-        names = mesh.metadata.get(FACE_NAMES) or [""] * len(stated)
-        mesh.metadata[DESCRIPTIONS] = tuple(replace(face, name=name) for face, name in zip(faces, names, strict=True))
+        corners = np.asarray(mesh.triangles)
+        surfaces = [surface or fit_surface(corners[own], FIT_TOLERANCE) for own, surface in zip(groups, stated, strict=True)]
+        faces = [_description(mesh, *entry) for entry in zip(itertools.count(1), groups, surfaces)]
+        if BREP in mesh.face_attributes:
+            names = mesh.metadata.get(FACE_NAMES) or [""] * len(stated)
+            faces = [replace(face, name=name) for face, name in zip(faces, names, strict=True)]
+            wholes = _wholes(mesh, number_of, list(zip(surfaces, groups, strict=True)))
+            faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
+        mesh.metadata[DESCRIPTIONS] = tuple(faces)
     return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
 
 
+def whole_surfaces(mesh: trimesh.Trimesh) -> np.ndarray:
+    """Return the number of the whole surface of each B-rep face (face,): faces of one surface that touch have the same one."""
+    return np.array([face.whole[0] if face.whole else face.number for face in describe_faces(mesh)], dtype=np.int64)
+
+
+def _wholes(mesh: trimesh.Trimesh, number_of: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
+    """Yield for each B-rep face the numbers of the faces that touch it and make up its surface with it; none if it is alone."""
+    neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
+    pairs = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
+    links = [pair for pair in pairs if are_one_surface(mesh, *(faces[number] for number in pair))]
+    label = trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=len(faces))
+    for number in label:
+        members = tuple(int(member) + 1 for member in np.flatnonzero(label == number))
+        yield members if len(members) > 1 else ()
+
+
+def are_one_surface(mesh: trimesh.Trimesh, one: FaceOnSurface, other: FaceOnSurface) -> bool:
+    """Return whether two faces are parts of one surface, with their outside on the same side of it."""
+    (surface, triangles), (other_surface, other_triangles) = one, other
+    if surface is None or other_surface is None or surface.kind != other_surface.kind:
+        return False
+    if surface.is_fitted != other_surface.is_fitted:
+        return False
+    if _is_outside(mesh, surface, triangles) != _is_outside(mesh, surface, other_triangles):
+        return False
+    vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[other_triangles])]
+    distance = float(np.abs(surface.distance(vertices)[0]).max())
+    return distance <= RESIDUAL_FACTOR * (surface.residual + other_surface.residual) + POSITION_TOLERANCE * float(mesh.scale)
+
+
+def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:
+    """Return whether the outside of some triangles (face,) is the outside of the surface."""
+    _, slope = surface.distance(np.asarray(mesh.triangles_center)[triangles])
+    return bool((slope * np.asarray(mesh.face_normals)[triangles]).sum() > 0)
+
+
 def _description(mesh: trimesh.Trimesh, number: int, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceInFile:
-    """Return the description of a face with some `triangles` (face,), and the `surface` if the file states one."""
+    """Return the description of a face with some `triangles` (face,) on a `surface`, None if none is known."""
     areas, normals = np.asarray(mesh.area_faces)[triangles], np.asarray(mesh.face_normals)[triangles]
-    surface = surface or fit_surface(np.asarray(mesh.triangles)[triangles], FIT_TOLERANCE)
     largest = int(areas.argmax())
     point, area = np.asarray(mesh.triangles_center)[triangles[largest]], float(areas.sum())
     if surface is None:

@@ -12,7 +12,7 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces
+from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces, whole_surfaces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
@@ -166,23 +166,32 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
     if BREP not in mesh.face_attributes:
         raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
     brep = np.asarray(mesh.face_attributes[BREP]).ravel()
-    if selection.name is not None:
-        return _by_name(face, brep, mesh.metadata[FACE_NAMES], selection.name)
-    if selection.at is not None:
-        return _by_point(face, mesh, brep, selection.at)
+    numbers = [number for which in selection.which for number in _brep_numbers(face, mesh, brep, which)]
+    if selection.whole:
+        group = whole_surfaces(mesh)
+        return np.isin(group[brep], group[numbers])
+    return np.isin(brep, numbers)
+
+
+def _brep_numbers(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, which: int | str | Vector) -> np.ndarray:
+    """Return the numbers of B-rep faces, from 0, that a number from 1, a name or a point chooses."""
+    if isinstance(which, str):
+        return _by_name(face, mesh.metadata[FACE_NAMES], which)
+    if isinstance(which, tuple):
+        return _by_point(face, mesh, brep, which)
     count = len(mesh.metadata[SURFACES])
-    if selection.number is None or not 1 <= selection.number <= count:
+    if not 1 <= which <= count:
         raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
-    return np.asarray(brep == selection.number - 1)
+    return np.array([which - 1])
 
 
-def _by_name(face: Face, brep: np.ndarray, names: Sequence[str], name: str) -> np.ndarray:
+def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     if name not in names:
         listed = ", ".join(f'"{shown(entry)}"' for entry in [entry for entry in dict.fromkeys(names) if entry][:MAX_LISTED])
         content = f"its faces are called {listed}" if listed else "its file gives no face of it a name"
         more = ", ...; tolcontact faces lists them" if len(set(names) - {""}) > MAX_LISTED else ""
         raise GeometryFault(f"face {face}: the part has no such face; {content}{more}")
-    return np.isin(brep, np.flatnonzero(np.array(names) == name))
+    return np.flatnonzero(np.array(names) == name)
 
 
 def _by_point(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, place: Vector) -> np.ndarray:
@@ -196,7 +205,7 @@ def _by_point(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, place: Vector
     hits = np.unique(brep[distance < distance.min() + CUT_MARGIN * mesh.scale])
     if len(hits) > 1:
         raise GeometryFault(f"face {face}: the point lies where {len(hits)} faces meet; give a point inside one of them")
-    return np.asarray(brep == hits[0])
+    return hits
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:

@@ -51,7 +51,7 @@ def preview(part: Part) -> PartPreview | None:
 
 def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:
     if BREP in mesh.face_attributes:
-        return f"face(tc.Brep({_vector(np.array(face.point))}))"
+        return f"face(tc.Brep({_vector(np.array(face.point))}{', whole=True' if face.whole else ''}))"
     if face.kind == "cylinder" and face.radius is not None:
         return f"face(tc.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
     mask = face_of == face.number - 1

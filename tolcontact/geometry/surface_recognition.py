@@ -6,13 +6,10 @@ import numpy as np
 import trimesh
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
-from tolcontact.geometry.brep_face import FIT_TOLERANCE
+from tolcontact.geometry.brep_face import FIT_TOLERANCE, are_one_surface
 from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.fitting import fit_surface
-
-RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
-POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 
 
 def analytic_surfaces(mesh: trimesh.Trimesh, triangles: np.ndarray) -> tuple[list[AnalyticSurface], np.ndarray]:
@@ -49,23 +46,9 @@ def _union(
     faces: np.ndarray,
 ) -> AnalyticSurface | None:
     """Return the common surface of two groups of triangles (face,), None if they are not parts of one surface."""
-    if (
-        earlier.kind != surface.kind
-        or earlier.is_fitted != surface.is_fitted
-        or _is_outside(mesh, earlier, earlier_faces) != _is_outside(mesh, earlier, faces)
-    ):
-        return None
-    vertices = np.asarray(mesh.vertices)[np.unique(mesh.faces[faces])]
-    distance = np.abs(earlier.distance(vertices)[0]).max()
-    if distance > RESIDUAL_FACTOR * (earlier.residual + surface.residual) + POSITION_TOLERANCE * mesh.scale:
+    if not are_one_surface(mesh, (earlier, earlier_faces), (surface, faces)):
         return None
     return _round_fit(mesh, np.concatenate([earlier_faces, faces])) if earlier.is_fitted else earlier
-
-
-def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, faces: np.ndarray) -> bool:
-    """Return whether the outside of some triangles (face,) is the outside of the surface."""
-    _, slope = surface.distance(np.asarray(mesh.triangles_center)[faces])
-    return bool((slope * np.asarray(mesh.face_normals)[faces]).sum() > 0)
 
 
 def _round_fit(mesh: trimesh.Trimesh, faces: np.ndarray) -> AnalyticSurface | None:
