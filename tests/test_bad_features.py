@@ -50,6 +50,16 @@ CASES = {
     "form wider than location": (
         lambda p: p.feature("f", p.face("+z"), tc.Profile(0.1, "A"), tc.Flatness(0.2)), "flatness 0.2 is wider than profile 0.1"
     ),
+    "straightness wider than location": (
+        lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B"), tc.Straightness(0.2)), "which contains it"
+    ),
+    "roundness wider than the zone of an axis": (
+        lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B"), tc.Roundness(0.2), tc.Cylindricity(0.3)), None
+    ),
+    "roundness wider than profile": (
+        lambda p: p.feature("f", p.face(BORE), tc.Profile(0.1, "A|B"), tc.Roundness(0.2)), "roundness 0.2 is wider than profile"
+    ),
+    "cylindricity of a plane": (lambda p: p.feature("f", p.face("+z"), tc.Cylindricity(0.1)), "cylindricity is for cylinders"),
     "limits the wrong way round": (
         lambda p: p.feature("f", p.face(BORE), tc.Size(10, -0.1, 0.1)), "the lower limit +0.1 is not below the upper one -0.1"
     ),

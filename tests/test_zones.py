@@ -20,6 +20,9 @@ FACTORS = {  # t / s for 99.73 % inside; the first ten from VARIATION's table, c
     "location of lines": (lambda: toleranced.block_with("top", tc.LineProfile(1, "A")), 11.77),
     "location, disk": (lambda: toleranced.ring_with("top", tc.Profile(1, "A")), 10.02),
     "axis, tilt": (lambda: toleranced.ring_with("bore", tc.Perpendicularity(1, "A")), 6.88),
+    "axis, tilt of a projected zone": (
+        lambda: toleranced.ring_with("bore", tc.Perpendicularity(1, "A", projected=45)), 6.88 * 45 / 30  # the bore is 30 long
+    ),
     "axis, shift": (lambda: toleranced.ring_with("bore", tc.Position(1, "A|B", rule="translation")), 6.88),
     "axis": (lambda: toleranced.ring_with("bore", tc.Position(1, "A|B")), 7.28 * np.sqrt(2)),  # ends, of shift and tilt
     "axis between planes": (

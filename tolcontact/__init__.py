@@ -47,7 +47,8 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 |---|---|
 | declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
-| | `Flatness`, `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`; `Feature`, `Variable` |
+| | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
+| | `Feature`, `Variable` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |

@@ -72,6 +72,7 @@ EVERY = {  # of the kinds that move features; all state 99.73 % inside
     "parallelism": lambda frame: block_with("top", tc.Parallelism(0.1, "A"), frame=frame),
     "perpendicularity to one": lambda frame: block_with("far", tc.Perpendicularity(0.1, "A"), frame=frame),
     "perpendicularity of an axis": lambda frame: ring_with("bore", tc.Perpendicularity(0.1, "A"), frame=frame),
+    "projected perpendicularity": lambda frame: ring_with("bore", tc.Perpendicularity(0.1, "A", projected=45), frame=frame),
     "angularity": lambda frame: block_with("far", tc.Angularity(0.1, "A|B"), frame=frame),
     "circular run-out": lambda frame: ring_with("bore", tc.CircularRunout(0.1, "B"), frame=frame),
     "total run-out": lambda frame: ring_with("bore", tc.TotalRunout(0.1, "B"), frame=frame),

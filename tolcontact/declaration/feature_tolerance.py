@@ -17,6 +17,7 @@ BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
 MOVES = ("both", "first", "second")
 ZONES = ("round", "flat")
+AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?")
 
 
@@ -88,13 +89,15 @@ class GeometricTolerance(Readable):
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
 
     A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
-    zone, along, material, projected and outside that it accepts. `is_form` is True for a kind that limits form alone.
+    zone, along, material, projected and outside that it accepts. `is_form` is True for a kind that limits form alone; the zones
+    of the kinds `around` it contain it, or those of all others if there are none.
     `features/tolerance_kinds.py` defines the zones.
     """
 
     kind: ClassVar[str] = ""
     needs_datums: ClassVar[bool] = True
     is_form: ClassVar[bool] = False
+    around: ClassVar[tuple[str, ...]] = ()
     options: ClassVar[tuple[str, ...]] = ()
 
     width: float
@@ -225,7 +228,7 @@ class Parallelism(GeometricTolerance):
 class Perpendicularity(GeometricTolerance):
     """Perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)."""
 
-    kind, options = "perpendicularity", ("zone", "along", "material")
+    kind, options = "perpendicularity", ("zone", "along", "material", "projected")
 
 
 class Angularity(GeometricTolerance):
@@ -249,10 +252,28 @@ class TotalRunout(GeometricTolerance):
     kind = "total run-out"
 
 
+class Straightness(GeometricTolerance):
+    """Straightness of an axis, or of any line of a plane (ISO 1101, 17.3). It limits form, and does not move the feature."""
+
+    kind, needs_datums, is_form = "straightness", False, True
+
+
 class Flatness(GeometricTolerance):
     """Flatness of a plane (ISO 1101, 17.4). It limits form, and does not move the plane as a whole."""
 
     kind, needs_datums, is_form = "flatness", False, True
+
+
+class Roundness(GeometricTolerance):
+    """Roundness of sections of a cylinder, cone or sphere (ISO 1101, 17.5). It limits form, and does not move the feature."""
+
+    kind, needs_datums, is_form, around = "roundness", False, True, AROUND_ROUND
+
+
+class Cylindricity(GeometricTolerance):
+    """Cylindricity (ISO 1101, 17.6). It limits form, and does not move the cylinder as a whole."""
+
+    kind, needs_datums, is_form, around = "cylindricity", False, True, AROUND_ROUND
 
 
 KINDS = {tolerance.kind: tolerance for tolerance in GeometricTolerance.__subclasses__()}

@@ -208,7 +208,8 @@ class Feature(Readable):
         tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
-                if not tolerance.is_form and tolerance.width < form.width:
+                contains = not tolerance.is_form and (not form.around or tolerance.kind in form.around)
+                if contains and tolerance.width < form.width:
                     yield (
                         f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "
                         "expected form within orientation within location"

@@ -31,7 +31,10 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 | `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
 | `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
 | `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
-| `tc.Flatness` | plane | form, which does not move a feature |
+| `tc.Straightness` | plane, axis | form, which does not move a feature |
+| `tc.Flatness` | plane | form |
+| `tc.Roundness` | cylinder, cone, sphere | form |
+| `tc.Cylindricity` | cylinder | form |
 
 `zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum.
 `material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the

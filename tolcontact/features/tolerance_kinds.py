@@ -165,7 +165,8 @@ class DirectionZone(AxisZone):
 
     @property
     def rows(self) -> np.ndarray:
-        rows = self.feature.axis_rows(np.array([1.0]), self._across)
+        length = (self._stations[1] - self._stations[0]) / 2  # of the zone, in lengths of the axis
+        rows = self.feature.axis_rows(np.array([abs(length)]), self._across)
         rows[..., :2] = 0
         return rows
 
@@ -203,7 +204,10 @@ ZONES: dict[type[GeometricTolerance], Zones] = {
     tolerances.Angularity: ORIENTATION,
     tolerances.CircularRunout: RUNOUT,
     tolerances.TotalRunout: RUNOUT,
+    tolerances.Straightness: dict.fromkeys((*FLAT, *ROUND), FormZone),
     tolerances.Flatness: dict.fromkeys(FLAT, FormZone),
+    tolerances.Roundness: dict.fromkeys((*ROUND, SphereFeature), FormZone),
+    tolerances.Cylindricity: {CylinderFeature: FormZone},
 }
 
 
