@@ -36,6 +36,7 @@ def test_a_union_has_the_triangles_of_all_its_faces():
     )
     with pytest.raises(TypeError, match="whole for both, or for none"):
         tc.Brep(3) | tc.Brep(6, whole=True)
+    assert tc.Brep(np.int64(3), np.array([1.0, 2.0, 3.0])).which == (3, (1.0, 2.0, 3.0))
     assert "need numbers" in next(tc.Brep().faults())
 
 

@@ -158,7 +158,8 @@ class Brep(Readable):
 def _brep_face(which: Any) -> int | str | Vector:
     if isinstance(which, str):
         return which
-    return int(which) if hasattr(which, "__index__") and not isinstance(which, bool) else vector(which)
+    is_number = np.ndim(which) == 0 and hasattr(which, "__index__") and not isinstance(which, bool)
+    return int(which) if is_number else vector(which)
 
 
 def _brep_words(which: int | str | Vector) -> str:
