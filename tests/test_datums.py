@@ -89,3 +89,19 @@ def test_worst_cases_shift_the_datum_too():
     # Half of the zone both ways, and half of the side's zone, by which its datum lies farther out.
     for name in ("worst", "bound"):
         assert found[name].sel(measure="far", state="corrected").values == pytest.approx([-0.2, 0.05], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    "declare",
+    [
+        lambda model, shift: model.variable("heat", tc.Tolerance(0.1), drives={shift: 1.0}),
+        lambda model, shift: model.correlate([shift, "plate.side.tilt z"], 0.5),
+        lambda model, shift: model.population({"measured": np.linspace(0, 1, 20)}, {shift: "measured"}),
+    ],
+    ids=["variable", "correlation", "population"],
+)
+def test_a_shift_that_follows_from_tilts_has_no_other_cause(declare):
+    model = plate("outside")
+    declare(model, "plate.far.datum B of A|B|C")
+    (fault,) = tc.check(model)
+    assert '"plate.far.datum B of A|B|C" follows from the tilts of its datum' in fault

@@ -2,7 +2,7 @@
 
 import difflib
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
@@ -67,7 +67,8 @@ def discretize(assembly: Assembly) -> Nominal:
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
-            faults.extend(_contributor_faults(assembly, labels))
+            shifts = {labels[column] for feature in features.features for column in feature.leans}
+            faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(_reserved_names(assembly))
     if faults:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
@@ -123,8 +124,8 @@ def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
             )
 
 
-def _contributor_faults(assembly: Assembly, labels: Sequence[str]) -> Iterator[str]:
-    """Yield references to unknown contributors, and contributors with two sources of draws."""
+def _contributor_faults(assembly: Assembly, labels: Sequence[str], shifts: Set[str]) -> Iterator[str]:
+    """Yield references to unknown contributors, or to `shifts` that follow from others, and contributors drawn twice."""
     recognized, variables = set(labels), {variable.name for variable in assembly.variables}
     sources: dict[str, str] = {}
     for kind, place, references in (
@@ -136,6 +137,8 @@ def _contributor_faults(assembly: Assembly, labels: Sequence[str]) -> Iterator[s
             if label not in recognized:
                 similar = difflib.get_close_matches(label, labels, 3, 0.3) or list(labels[:3])
                 yield f'{place}: unknown contributor "{label}"; contributors are, for example: {", ".join(similar)}'
+            elif label in shifts:
+                yield f'{place}: "{label}" follows from the tilts of its datum; leave it out, and state those tilts'
             elif kind == "variable" and label in variables:
                 yield f'{place}: it drives the variable "{label}"; a variable drives locators and features alone'
             elif kind != "variable" and label in sources:
