@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.spatial
 import trimesh
 
 from tolcontact.errors import GeometryFault
@@ -22,7 +23,8 @@ from tolcontact.geometry.files.step_text import StepText
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
 MAX_COORDINATE = 1e7  # [mm]
-COORDINATE_DIGITS = 9  # after the point [mm]: vertices of neighbouring faces that agree in these are one
+COORDINATE_DIGITS = 9  # of vertices after the point [mm]
+MERGE_DISTANCE = 1e-7  # [mm], beyond 1 mm from the origin a share: vertices of a shape that are closer are one
 STRETCH_TOLERANCE = 1e-6  # relative, for a rigid motion
 MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
@@ -172,13 +174,21 @@ def check_numbers(vertices: np.ndarray, subject: str) -> None:
 
 
 def _merge_vertices(vertices: np.ndarray, faces: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return vertices (vertex, 3) [mm] without repeated ones, and `faces` (face, 3) that refer to them.
+    """Return vertices (vertex, 3) [mm] without those that nearly repeat others, and `faces` (face, 3) that refer to them.
 
-    Vertices in one place stay apart if their `shape` (vertex,) differs.
+    Vertices stay apart if their `shape` (vertex,) differs. The ends of an edge that is shorter than the kernel's triangulation
+    resolves fall together.
     """
     rounded = np.round(vertices, COORDINATE_DIGITS) + 0.0  # no negative zeros
-    _, representative, number = np.unique(np.column_stack([shape, rounded]), axis=0, return_index=True, return_inverse=True)
-    return rounded[representative], number.ravel()[faces]
+    rows, number = np.unique(np.column_stack([shape, rounded]), axis=0, return_inverse=True)
+    radius = MERGE_DISTANCE * max(1.0, float(np.abs(rounded).max(initial=0)))
+    pairs = scipy.spatial.cKDTree(rows[:, 1:]).query_pairs(radius, output_type="ndarray")
+    pairs = pairs[rows[pairs[:, 0], 0] == rows[pairs[:, 1], 0]]
+    if not len(pairs):
+        return rows[:, 1:], number.ravel()[faces]
+    label = trimesh.graph.connected_component_labels(pairs, node_count=len(rows))
+    _, first, cluster = np.unique(label, return_index=True, return_inverse=True)
+    return rows[first, 1:], cluster.ravel()[number.ravel()][faces]
 
 
 def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:

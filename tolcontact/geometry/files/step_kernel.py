@@ -31,20 +31,22 @@ from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.STEPCAFControl import STEPCAFControl_Reader
+from OCP.StepShape import StepShape_ClosedShell
 from OCP.TCollection import TCollection_AsciiString, TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_AttributeIterator, TDF_Label, TDF_Tool
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHAPE, TopAbs_SHELL, TopAbs_SOLID
+from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS
+from OCP.TopoDS import TopoDS, TopoDS_Iterator
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
+SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 NAMELESS = ("NONE", "")  # written by some systems where a face has no name
 LABEL = "=>["  # begins the kernel's label of a nameless shape
 
@@ -53,7 +55,7 @@ Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (fac
 
 @dataclass(frozen=True)
 class BodyShape:
-    """The faces of a body. A solid has the `name` and the number of faces that its record states; otherwise "" and 0."""
+    """The faces of a body; its `name` if it is a solid, and the number of faces that the file states for a solid, else 0."""
 
     faces: list[Any]
     is_solid: bool
@@ -139,7 +141,8 @@ class Document:
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
-        self.has_face_names = NAMED_FACE.search(path.read_bytes()) is not None
+        content = path.read_bytes()
+        self.has_face_names, self.has_solids = (pattern.search(content) is not None for pattern in (NAMED_FACE, SOLID))
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -167,16 +170,40 @@ class Document:
         """Yield the bodies of a product's shape, in its own frame, with triangles on their faces."""
         shape = XCAFDoc_ShapeTool.GetShape_s(label).Located(TopLoc_Location())
         BRepMesh_IncrementalMesh(shape, chord, False, angle, False)
-        for solid in explore(shape, TopAbs_SOLID):
-            entity = self._entity(solid)
-            yield BodyShape([*explore(solid, TopAbs_FACE)], True, entity_name(entity), stated_face_count(entity))
-        shells = [shell for shell in explore(shape, TopAbs_SHELL, TopAbs_SOLID) if BRep_Tool.IsClosed_s(shell)]
-        for shell in shells:
-            yield BodyShape([*explore(shell, TopAbs_FACE)], False)
-        closed = {hash(face) for shell in shells for face in explore(shell, TopAbs_FACE)}
-        sheets = [face for face in explore(shape, TopAbs_FACE, TopAbs_SOLID) if hash(face) not in closed]
+        pieces = list(self._pieces(shape))
+        yield from (
+            BodyShape([*explore(piece, TopAbs_FACE)], True, name, count) for piece, name, count, solid in pieces if solid
+        )
+        sheets: list[Any] = []
+        lost_count = 0
+        for piece, _, count, is_solid in pieces:
+            if is_solid:
+                continue
+            faces = [*explore(piece, TopAbs_FACE)]
+            if piece.ShapeType() == TopAbs_SHELL and BRep_Tool.IsClosed_s(piece):
+                yield BodyShape(faces, False)
+            else:
+                sheets.extend(faces)
+                lost_count += count
         if sheets:
-            yield BodyShape(sheets, False)
+            yield BodyShape(sheets, False, "", lost_count)
+
+    def _pieces(self, shape: Any) -> Iterator[tuple[Any, str, int, bool]]:
+        """Yield the solids, shells and loose faces of a shape: name and number of faces in the file, whether it is a solid.
+
+        Where the kernel mends a solid it may make several pieces of it, or one that is open.
+        """
+        entity = self._entity(shape)
+        if hasattr(entity, "Outer") or shape.ShapeType() == TopAbs_SOLID:
+            yield shape, entity_name(entity), stated_face_count(entity), True
+        elif shape.ShapeType() == TopAbs_COMPOUND:
+            children = TopoDS_Iterator(shape)
+            while children.More():
+                yield from self._pieces(children.Value())
+                children.Next()
+        else:
+            is_lost = self.has_solids and isinstance(entity, StepShape_ClosedShell)
+            yield shape, "", entity.NbCfsFaces() if is_lost else 0, False
 
     def face_names(self, faces: Sequence[Any]) -> list[str]:
         """Return the names of faces in the file, "" for a face without a name."""
@@ -208,7 +235,7 @@ def stated_face_count(entity: Any) -> int:
 
 
 def label_name(label: Any) -> str:
-    """Return the name of a label; "" if it has none. (Label.FindAttribute gives a copy of the attribute that has no label.)"""
+    """Return the name of a label; "" if it has none."""
     attributes = TDF_AttributeIterator(label, True)
     while attributes.More():
         if isinstance(attributes.Value(), TDataStd_Name):
@@ -229,9 +256,9 @@ def entry(label: Any) -> str:
     return str(text.ToCString())
 
 
-def explore(shape: Any, kind: Any, outside: Any = TopAbs_SHAPE) -> Iterator[Any]:
-    """Yield the pieces of a kind that are in no piece of the kind `outside`, each once, in the order of the shells."""
-    explorer = TopExp_Explorer(shape, kind, outside)
+def explore(shape: Any, kind: Any) -> Iterator[Any]:
+    """Yield the pieces of a kind in a shape, each once, in their order."""
+    explorer = TopExp_Explorer(shape, kind)
     visited: set[int] = set()
     while explorer.More():
         piece = explorer.Current()

@@ -18,9 +18,8 @@ def stated_surfaces(text: str) -> list[AnalyticSurface | None]:
 
 
 def _surface(entry: dict[str, Any]) -> AnalyticSurface | None:
-    numbers = {name: np.array(value, dtype=float) if isinstance(value, list) else value for name, value in entry.items()}
-    kind = ANALYTIC_SURFACES[numbers.pop("kind")]
-    return kind.of(numbers) if all(np.isfinite(value).all() for value in numbers.values()) else None
+    numbers = {name: np.array(value) if isinstance(value, list) else value for name, value in entry.items() if name != "kind"}
+    return ANALYTIC_SURFACES[entry["kind"]].of(numbers) if all(np.isfinite(value).all() for value in numbers.values()) else None
 
 
 def credible(
