@@ -18,15 +18,6 @@ from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
-from OCP.GeomAbs import (
-    GeomAbs_BezierSurface,
-    GeomAbs_BSplineSurface,
-    GeomAbs_Cone,
-    GeomAbs_Cylinder,
-    GeomAbs_Plane,
-    GeomAbs_Sphere,
-    GeomAbs_Torus,
-)
 from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
@@ -302,20 +293,12 @@ def surface(face: Any) -> dict[str, Any] | None:
     The axis of a plane is its normal on the outside of the face.
     """
     adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
-    kind = adaptor.GetType()
-    if kind in (GeomAbs_BSplineSurface, GeomAbs_BezierSurface):
+    kind = adaptor.GetType().name.removeprefix("GeomAbs_")
+    if kind in ("BSplineSurface", "BezierSurface"):
         return recognized_surface(face)
-    simple = {
-        GeomAbs_Plane: ("plane", adaptor.Plane),
-        GeomAbs_Cylinder: ("cylinder", adaptor.Cylinder),
-        GeomAbs_Cone: ("cone", adaptor.Cone),
-        GeomAbs_Sphere: ("sphere", adaptor.Sphere),
-        GeomAbs_Torus: ("torus", adaptor.Torus),
-    }
-    if kind not in simple:
+    if kind not in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
         return None
-    name, geometry = simple[kind]
-    return described(name, geometry(), face.Orientation() == TopAbs_REVERSED)
+    return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
 
 
 def recognized_surface(face: Any) -> dict[str, Any] | None:

@@ -26,7 +26,7 @@ _POINT = re.compile(
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
 # A number that is none, or exceeds double precision.
 _ENDLESS = re.compile(
-    rb"[(,]\s*([-+]?(?:nan|inf|infinity|\d+\.?\d*e\+?0*(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309)))\s*(?=[,)])", re.IGNORECASE
+    rb"[(,]\s*+([-+]?(?:nan|inf|infinity|\d++\.?+\d*+e\+?+0*+(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309)))\s*+(?=[,)])", re.IGNORECASE
 )
 _UNIT_NAMES = {
     "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
