@@ -89,6 +89,19 @@ class Step:
         shell = self.shell(square, "OPEN_SHELL", [(0, 1, 2, 3)])
         return self.add(f"SHELL_BASED_SURFACE_MODEL('',(#{shell}))")
 
+    def ball(self, radius):
+        """A solid ball, whose face has its seam from pole to pole."""
+        poles = [self.add(f"VERTEX_POINT('',#{self.point((0, 0, z))})") for z in (-radius, radius)]
+        circle = self.add(f"CIRCLE('',#{self.placement(z=(0, -1, 0), x=(0, 0, -1))},{float(radius)!r})")
+        seam = self.add(f"EDGE_CURVE('',#{poles[0]},#{poles[1]},#{circle},.T.)")
+        around = [self.add(f"ORIENTED_EDGE('',*,*,#{seam},.{sense}.)") for sense in "TF"]
+        loop = self.add(f"EDGE_LOOP('',(#{around[0]},#{around[1]}))")
+        bound = self.add(f"FACE_OUTER_BOUND('',#{loop},.T.)")
+        sphere = self.add(f"SPHERICAL_SURFACE('',#{self.placement()},{float(radius)!r})")
+        face = self.add(f"ADVANCED_FACE('',(#{bound}),#{sphere},.T.)")
+        shell = self.add(f"CLOSED_SHELL('',(#{face}))")
+        return self.add(f"MANIFOLD_SOLID_BREP('',#{shell})")
+
     def double(self, shell):
         """Let the first face of a shell stand in it a second time."""
         first = int(re.search(r"\(#(\d+)", self.lines[shell - 1])[1])

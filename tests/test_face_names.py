@@ -3,6 +3,7 @@
 import itertools
 import re
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -102,19 +103,21 @@ def test_bodies_of_an_assembly_have_their_own_names(tmp_path):
 
 
 @pytest.mark.slow
-def test_names_that_are_not_sure_are_left_out(tmp_path):
+def test_names_of_solids_that_are_alike_are_told_apart(tmp_path):
     """Of solids that are alike in their own frames, but not in their names; of a shell that has a face twice."""
-    made, path = Step(), tmp_path / "unsure.step"
+    made, path = Step(), tmp_path / "alike.step"
     solids = [made.solid((0, 0, 0), (5, 5, 5)) for _ in range(2)]
     whole = made.product("whole")
     for k, solid in enumerate(solids):
         made.place(made.product(f"pin {k}", [solid]), whole, f"pin {k}", (10 * k, 0, 0))
-    assert names_in(path, counted(str(made)), 1, 2) == 2 * [6 * [""]]
+    assert names_in(path, counted(str(made)), 1, 2) == [[f"f{k}" for k in part] for part in (range(6), range(6, 12))]
     twice = Step()
     shell = twice.shell(corners((0, 0, 0), (10, 20, 30)))
     twice.double(shell)
     twice.product("twice", [twice.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
-    assert names_in(path, counted(str(twice)), 1) == [6 * [""]]  # the kernel moves it to the end
+    path.write_text(named(str(twice), DIRECTIONS))
+    found = {face.name: face.direction for face in tc.faces_in(path)}  # the kernel moves a face to the end
+    assert found == {name: pytest.approx(np.eye(3)["xyz".index(name[1])] * float(f"{name[0]}1")) for name in DIRECTIONS}
 
 
 @pytest.mark.slow
@@ -137,10 +140,10 @@ def test_surfaces_are_compared_in_the_units_of_the_shapes(assigned, size, tmp_pa
     assert body.units == assigned and body.upper == pytest.approx((2 * size, 3 * size, 4 * size))
 
 
-def test_faces_that_are_out_of_order_have_no_names(tmp_path):
+def test_faces_of_several_colours_have_their_names(tmp_path):
     made = Step()
     shell = made.shell(corners((0, 0, 0), (10, 20, 30)))
     made.product("painted", [made.add(f"MANIFOLD_SOLID_BREP('',#{shell})")])
     made.paint(shell, red=1.0)
     (tmp_path / "painted.step").write_text(named(str(made), DIRECTIONS))
-    assert {face.name for face in tc.faces_in(tmp_path / "painted.step")} == {""}
+    assert [face.name for face in tc.faces_in(tmp_path / "painted.step")] == list(DIRECTIONS)

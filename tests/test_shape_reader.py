@@ -16,7 +16,7 @@ import trimesh
 import tolcontact as tc
 from tests.helpers import finish, run, script, start
 from tests.shapes import BLOCK, refusal
-from tests.step_files import step_block
+from tests.step_files import Step, step_block
 from tolcontact.discretization import discretize
 from tolcontact.geometry.files import Limits, read_files
 from tolcontact.geometry.shapes import shape
@@ -28,8 +28,12 @@ def crashing():
 
 
 def stalling():
-    """A coordinate that is no number: its reader goes on for ever."""
-    return re.sub(r"CARTESIAN_POINT\('',\(0.0", "CARTESIAN_POINT('',(NaN", step_block(), count=1)
+    """A ball of 1 km beside many points that make its file look small: its reader cuts it into triangles for ever."""
+    made = Step()
+    for _ in range(300):
+        made.point((0, 0, 0))
+    made.product("ball", [made.ball(1e6)])
+    return str(made)
 
 
 def alone(folder, *names):
@@ -52,6 +56,15 @@ def test_a_file_that_stalls_its_reader_is_a_fault(tmp_path):
     (tmp_path / "endless.step").write_text(stalling())
     said = alone(tmp_path, "endless.step")
     assert "endless.step" in said and "took too long" in said and "within 2 s of processor time" in said
+
+
+def test_numbers_that_are_not_finite_are_named(tmp_path):
+    for number in ("NaN", "-inf", "1.E999"):
+        content = re.sub(r"CARTESIAN_POINT\('',\(0.0", f"CARTESIAN_POINT('',({number}", step_block(), count=1)
+        said = refusal(tmp_path / "endless.step", content)
+        assert f"holds the number {number}, which is not finite" in said and "export it again" in said
+    (tmp_path / "named.step").write_text(step_block().replace("'part'", "'(inf)'"))
+    assert shape(tc.Mesh(tmp_path / "named.step")).mesh.is_watertight
 
 
 @pytest.mark.slow

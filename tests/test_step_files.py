@@ -44,7 +44,7 @@ def test_a_step_file_of_several_bodies_is_refused_with_their_list(kind, tmp_path
 
 
 def test_names_in_a_file_do_not_spoil_a_message(tmp_path):
-    long = "\x1b[31m red\n" + 300 * "long "
+    long = "\x1b[31m red \n" + 300 * "long "
     content = step_of(("solid", (0, 0, 0), (1, 1, 1), long), ("solid", (2, 0, 0), (3, 1, 1), long))
     said = refusal(tmp_path / "named.step", content)
     assert "\x1b" not in said and "[31m red long long" in said and len(said) < 500

@@ -28,7 +28,7 @@ ROOMS = {
     "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/"),
     "igl": ("geometry/", "report/html/decimation.py"),
-    "cascadio": ("geometry/files/worker.py",),
+    "OCP": ("geometry/files/step_kernel.py",),
 }
 NOT_IN = {
     "xarray": (

@@ -16,6 +16,10 @@ except ImportError:  # not on Windows, where nothing is limited
 STALL_FACTOR = 10  # times the processor time that a child may take: longer it does not wait for a processor, but for ever
 
 
+class Refusal(Exception):
+    """The fault of a file, as the rest of a sentence that begins with its name."""
+
+
 class ChildDiedError(Exception):
     """The process did not finish; the message states why."""
 

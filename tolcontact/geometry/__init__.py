@@ -35,23 +35,24 @@ triangles.
 
 ## STEP files
 
-STEP files need the package cascadio: `pip install '.[step]'`. Faces are triangulated to within 2 um, or 5e-6 of the extent of
-a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks for 0.1 mm instead; contact on surfaces that the file
+STEP files need the package cadquery-ocp-novtk: `pip install '.[step]'`. Its licence is Apache-2.0; it contains the CAD kernel
+Open CASCADE Technology, whose licence is LGPL 2.1 with an exception. Faces are triangulated to within 2 um, or 5e-6 of the
+extent of a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks for 0.1 mm instead; contact on surfaces that the file
 states does not depend on this chord. If there would be more than a million triangles, or triangulation takes too long, faces
 are triangulated 30 times as coarsely and to 0.5 rad, with a warning.
 
 The triangles keep the boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states
-a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet at a vertex agree. Elsewhere
-they are rounded to the resolution of single precision: 1e-5 mm at 100 mm, 2e-4 mm at 1 m.
+a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet at a vertex agree. Vertices of
+a body that are closer than 1e-5 mm at 100 mm, 1e-4 mm at 1 m, are one.
 
 An assembly holds several bodies. `tolcontact bodies FILE.stp` and `tc.bodies_in` list them; `tc.Mesh(file, body=...)` is one
 of them in the frame of its product; `tc.parts_from(model, file)` declares all of them, or only the named ones, as parts in
 their positions. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
 directions, radii and areas, and with their names if the file has any; `tc.Brep("...")` chooses a face by its name. Faces of one
 surface that touch, such as the halves of a hole, are listed with each other's numbers; `tc.Brep(6, whole=True)` chooses all of
-them by any of their numbers. If the faces of a body have several colours, they are not in the file's order and their names are
-unknown. Where a file states no simple surface, a plane, cylinder, cone or sphere is fitted to within 1 um, and its residual is
-listed. STEP files that refer to other files are rejected.
+them by any of their numbers. A B-spline surface within 0.1 um of a plane, cylinder, cone or sphere is taken for it. Where a
+file states no simple surface, one is fitted to the vertices to within 1 um, and its residual is listed. STEP files that refer
+to other files are rejected.
 
 ## Untrusted files
 

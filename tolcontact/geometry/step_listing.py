@@ -24,7 +24,7 @@ class BodyInFile(Readable):
 
     number, name   from 1 in the file's order; a name that no other body of the file has
     path           names of the products that contain the body, from the root on
-    lower, upper   corners of the box around the body in its place [mm]; None if its triangles are unknown
+    lower, upper   corners of the box around the body in its place [mm]
     at, rotation   place of its own frame, as of a Part [mm, rad]
     faces          number of its B-rep faces
     is_open        whether its faces do not close
@@ -34,8 +34,8 @@ class BodyInFile(Readable):
     number: int
     name: str
     path: tuple[str, ...]
-    lower: Vector | None
-    upper: Vector | None
+    lower: Vector
+    upper: Vector
     at: Vector
     rotation: Vector
     faces: int
@@ -44,8 +44,6 @@ class BodyInFile(Readable):
 
     def __str__(self) -> str:
         title = f"{self.number}. {shown(self.name) or 'without a name'}"
-        if self.lower is None or self.upper is None:
-            return f"{title}: its faces cannot be told from those of others"
         size = " x ".join(f"{up - low:.4g}" for low, up in zip(self.lower, self.upper, strict=True))
         return f"{title}: {'open, ' if self.is_open else ''}{size} mm, {self.faces} faces"
 
@@ -121,7 +119,7 @@ def _product(path: str | Path) -> Product:
 
 def _body(product: Product, number: int) -> BodyInFile:
     body = product.bodies[number - 1]
-    lower, upper = (None if corner is None else plain_vector(corner) for corner in (body.lower, body.upper))
+    lower, upper = plain_vector(body.lower), plain_vector(body.upper)
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
     faces = len(np.unique(product.brep[body.triangles]))
     place = plain_vector(body.place[:3, 3]), plain_vector(rotation)

@@ -1,27 +1,31 @@
-"""The product in a STEP file: shapes, moved onto the surfaces that it states, and bodies in their places. Lengths in mm."""
+"""The product in a STEP file: shapes of bodies, moved onto the surfaces that it states, and bodies in their places.
+
+Lengths in mm.
+"""
 
 import json
 import logging
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.spatial
 import trimesh
 
-from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
-from tolcontact.geometry.files.bodies import Body, ShapePlace, StepMesh, bodies, listed
+from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
-MAX_COORDINATE = 1e7  # [mm]; single precision resolves only whole millimetres there
-STRETCH_TOLERANCE = 1e-5  # relative, for a rigid motion that passed through single precision
+MAX_COORDINATE = 1e7  # [mm]
+COORDINATE_DIGITS = 9  # of vertices after the point [mm]
+MERGE_DISTANCE = 1e-7  # [mm], beyond 1 mm from the origin a share: vertices of a shape that are closer are one
+STRETCH_TOLERANCE = 1e-6  # relative, for a rigid motion
 MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of their B-rep face are not moved onto it
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
 SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
@@ -66,10 +70,6 @@ class Product:
         )
         if not 0 <= number < len(self.bodies):
             raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {len(self.bodies)}: {listed(self.bodies)}')
-        if not len(self.bodies[number].triangles):
-            raise GeometryFault(
-                f'"{self.path}": the triangles of body {selector!r} cannot be told from others; export it alone'
-            )
         return self.bodies[number]
 
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
@@ -83,7 +83,7 @@ class Product:
         vertices = np.asarray(self.mesh.vertices)[corners]
         numbers, brep = np.unique(self.brep[triangles], return_inverse=True)
         stated = self.surfaces[int(self.shape[triangles[0]])]
-        surfaces = [stated[number] if number < len(stated) else None for number in numbers]
+        surfaces = [stated[number] for number in numbers]
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
             surfaces = [
@@ -94,54 +94,55 @@ class Product:
         mesh.face_attributes[BREP] = brep.ravel()
         mesh.metadata[SURFACES] = surfaces
         mesh.metadata[FACE_NAMES] = body.face_names if any(body.face_names) else ()
-        self._check_closed(mesh, brep)
+        self._check_closed(body, mesh)
         return mesh
 
-    def _check_closed(self, mesh: trimesh.Trimesh, brep: np.ndarray) -> None:
-        gaps = len(rim(mesh.faces)) if self.text.solids and len(self.bodies) == 1 else 0
+    def _check_closed(self, body: Body, mesh: trimesh.Trimesh) -> None:
+        gaps = len(rim(mesh.faces)) if body.stated_faces and len(self.bodies) == 1 else 0
         if gaps:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-                f"{len(np.unique(brep))} of {len(self.text.solids[0].faces)} faces could be read); repair it in CAD, or "
+                f"{len(mesh.metadata[SURFACES])} of {body.stated_faces} faces could be read); repair it in CAD, or "
                 "export it again"
             )
 
 
 def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Product:
-    """Return the product in a STEP file, in double precision, from the `arrays` of `worker` and the file's text.
+    """Return the product in a STEP file from the `arrays` of `worker` and the file's text.
 
     Raises GeometryFault if the file holds no surfaces, or coordinates are not finite or too large.
     """
-    if not len(arrays["faces"]):
+    check_numbers(arrays["vertices"], f'"{path}"')
+    shape_of_vertex = np.zeros(len(arrays["vertices"]), dtype=np.int64)
+    shape_of_vertex[arrays["faces"].ravel()] = np.repeat(arrays["piece"], 3)
+    vertices, faces = _merge_vertices(arrays["vertices"], arrays["faces"], shape_of_vertex)
+    proper = _proper_triangles(path, faces)
+    faces, shape, brep = faces[proper], arrays["piece"][proper], arrays["brep"][proper]
+    max_distance = MAX_OFFSET * float(arrays["chord"])
+    if not len(faces):
         raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
-    mesh = trimesh.Trimesh(arrays["vertices"], arrays["faces"], process=False)
-    mesh.apply_scale(UNITS["m"])
-    check_numbers(mesh.vertices, f'"{path}"')
-    mesh.vertices = _rounded(np.asarray(mesh.vertices))
-    shape_of_vertex = np.zeros(len(mesh.vertices), dtype=np.int64)
-    shape_of_vertex[np.asarray(mesh.faces).ravel()] = np.repeat(arrays["piece"], 3)
-    mesh = _merge_vertices(mesh, shape_of_vertex)
-    proper = _proper_triangles(path, mesh.faces)
-    mesh.update_faces(proper)
-    shape, brep = arrays["piece"][proper], arrays["brep"][proper]
-    vertices, max_distance = np.array(mesh.vertices), MAX_OFFSET * float(arrays["chord"])
     surfaces: list[list[AnalyticSurface | None]] = []
     for k, stated in enumerate(arrays["surfaces"]):
         triangles = np.flatnonzero(shape == k)
-        corners, faces = np.unique(mesh.faces[triangles], return_inverse=True)
-        faces, face_numbers = faces.reshape(-1, 3), brep[triangles]
-        surfaces.append(credible(vertices[corners], faces, face_numbers, stated_surfaces(str(stated)), max_distance))
-        vertices[corners] = onto(vertices[corners], faces, face_numbers, surfaces[-1], max_distance)
-    mesh = trimesh.Trimesh(vertices, mesh.faces, process=False)
+        corners, own_faces = np.unique(faces[triangles], return_inverse=True)
+        own_faces, face_numbers = own_faces.reshape(-1, 3), brep[triangles]
+        surfaces.append(credible(vertices[corners], own_faces, face_numbers, stated_surfaces(str(stated)), max_distance))
+        vertices[corners] = onto(vertices[corners], own_faces, face_numbers, surfaces[-1], max_distance)
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    has_triangles = np.isin(arrays["shape"], shape)
     places = [
-        ShapePlace(int(number), rigid_motion(path, transform), tuple(json.loads(str(names))))
-        for number, transform, names in zip(arrays["shape"], arrays["transforms"], arrays["paths"], strict=True)
+        ShapePlace(int(number), rigid_motion(path, transform), tuple(json.loads(str(names))), str(name))
+        for number, transform, names, name in zip(
+            *(arrays[name][has_triangles] for name in ("shape", "transforms", "paths", "names")), strict=True
+        )
     ]
-    step_mesh = StepMesh(
-        np.asarray(mesh.triangles), np.asarray(mesh.faces), shape, brep, arrays["products"], arrays["coloured"],
-        surfaces, text.unit,
-    )  # fmt: skip
-    return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(step_mesh, places, text.solids)), text)
+    shapes = []
+    for k, (names, stated_faces) in enumerate(zip(arrays["face_names"], arrays["face_count"], strict=True)):
+        triangles = np.flatnonzero(shape == k)
+        face_names = np.array(json.loads(str(names)), dtype=str)[np.unique(brep[triangles])]
+        is_open = len(rim(faces[triangles])) > 0
+        shapes.append(StepShape(triangles, vertices[faces[triangles]], is_open, tuple(map(str, face_names)), int(stated_faces)))
+    return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(shapes, places)), text)
 
 
 def _proper_triangles(path: Path, faces: np.ndarray) -> np.ndarray:
@@ -172,26 +173,28 @@ def check_numbers(vertices: np.ndarray, subject: str) -> None:
         )
 
 
-def _rounded(vertices: np.ndarray) -> np.ndarray:
-    """Return vertices [mm] that passed through single precision, rounded to its resolution: round lengths come back."""
-    resolution = UNITS["m"] * float(np.spacing(np.float32(np.abs(vertices).max(initial=0) / UNITS["m"])))
-    power = 10.0 ** math.floor(math.log10(resolution))
-    step = power * next(digit for digit in (1, 2, 5, 10) if digit * power >= resolution)
-    return np.round(np.round(vertices / step) * step, 12)
+def _merge_vertices(vertices: np.ndarray, faces: np.ndarray, shape: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return vertices (vertex, 3) [mm] without those that nearly repeat others, and `faces` (face, 3) that refer to them.
 
-
-def _merge_vertices(mesh: trimesh.Trimesh, shape: np.ndarray) -> trimesh.Trimesh:
-    """Return a mesh without repeated vertices; vertices in one place stay apart if their `shape` (vertex,) differs."""
-    _, representative, number = np.unique(
-        np.column_stack([shape, np.asarray(mesh.vertices)]), axis=0, return_index=True, return_inverse=True
-    )
-    return trimesh.Trimesh(np.asarray(mesh.vertices)[representative], number.ravel()[np.asarray(mesh.faces)], process=False)
+    Vertices stay apart if their `shape` (vertex,) differs. The ends of an edge that is shorter than the kernel's triangulation
+    resolves fall together.
+    """
+    rounded = np.round(vertices, COORDINATE_DIGITS) + 0.0  # no negative zeros
+    rows, number = np.unique(np.column_stack([shape, rounded]), axis=0, return_inverse=True)
+    radius = MERGE_DISTANCE * max(1.0, float(np.abs(rounded).max(initial=0)))
+    pairs = scipy.spatial.cKDTree(rows[:, 1:]).query_pairs(radius, output_type="ndarray")
+    pairs = pairs[rows[pairs[:, 0], 0] == rows[pairs[:, 1], 0]]
+    if not len(pairs):
+        return rows[:, 1:], number.ravel()[faces]
+    label = trimesh.graph.connected_component_labels(pairs, node_count=len(rows))
+    _, first, cluster = np.unique(label, return_index=True, return_inverse=True)
+    return rows[first, 1:], cluster.ravel()[number.ravel()][faces]
 
 
 def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:
-    """Return a rigid motion (4, 4) [mm] from a transform [m] that passed through single precision.
+    """Return a transform (4, 4) [mm] whose rotation is orthogonal to the last digit.
 
-    Its rotation is orthogonal again, and its translation is rounded. Raises GeometryFault if the transform mirrors or scales.
+    Raises GeometryFault if the transform mirrors or scales.
     """
     place = np.eye(4)
     U, scales, V = np.linalg.svd(transform[:3, :3])
@@ -200,5 +203,5 @@ def rigid_motion(path: Path, transform: np.ndarray) -> np.ndarray:
             f'"{path}" places a body mirrored or scaled, which bodies of a rigid assembly are not; export it as it is'
         )
     place[:3, :3] = U @ V
-    place[:3, 3] = _rounded(UNITS["m"] * transform[:3, 3]) if transform[:3, 3].any() else 0.0
+    place[:3, 3] = transform[:3, 3]
     return place

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from tolcontact.declaration.geometry import STEP
 from tolcontact.errors import GeometryFault, clipped
-from tolcontact.geometry.files.step_text import StepText, step_text
+from tolcontact.geometry.files.step_text import StepText, endless_number, step_text
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 HEAD_SIZE = 10_000  # [byte] at the beginning of a file, by which its kind is recognized
@@ -159,6 +159,10 @@ def _check_step(path: Path) -> StepText:
         )
     if b"END-ISO-10303-21" not in content:
         raise GeometryFault(f'"{path}" is cut off: it does not end with END-ISO-10303-21; export it again')
+    if number := endless_number(content):
+        raise GeometryFault(
+            f'"{path}" is damaged: it holds the number {clipped(number, 40)}, which is not finite; export it again'
+        )
     return text
 
 

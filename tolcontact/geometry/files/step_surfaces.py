@@ -8,34 +8,18 @@ import numpy as np
 
 from tolcontact.geometry.analytic_surfaces import ANALYTIC_SURFACES, AnalyticSurface
 
-METRE = 1e3  # [mm], the reader's unit
 MAX_ITERATIONS = 4  # of Newton's method: they bring vertices that are off by micrometres to the last digit
 PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex whose surfaces count as different
-# The reader's names of what AnalyticSurface calls otherwise.
-_KEYS = {
-    "plane": {"axis": "normal"},
-    "cone": {"origin": "apex", "angle": "semi_angle"},
-    "sphere": {"origin": "center"},
-    "torus": {"origin": "center", "radius": "major_radius", "minor": "minor_radius"},
-}
 
 
 def stated_surfaces(text: str) -> list[AnalyticSurface | None]:
-    """Return the surface of each B-rep face, from the reader's JSON; None for a face of another kind."""
-    return [_surface(entry) if entry and entry.get("type") in ANALYTIC_SURFACES else None for entry in json.loads(text)]
+    """Return the surface of each B-rep face, from the JSON of `step_kernel`; None for a face of another kind."""
+    return [None if entry is None else _surface(entry) for entry in json.loads(text)]
 
 
 def _surface(entry: dict[str, Any]) -> AnalyticSurface | None:
-    surface, keys = ANALYTIC_SURFACES[entry["type"]], _KEYS.get(entry["type"], {})
-    origin = METRE * np.array(entry[keys.get("origin", "origin")], dtype=float)
-    axis = np.array(entry.get(keys.get("axis", "axis"), (0.0, 0.0, 1.0)), dtype=float)
-    sizes = {name: (1.0 if name == "angle" else METRE) * float(entry.get(keys.get(name, name), 0.0)) for name in surface.sizes}
-    if not (np.isfinite([*origin, *axis, *sizes.values()]).all() and np.linalg.norm(axis) > 0):
-        return None
-    direction = np.sign(sizes.get("angle") or 1.0) * axis / np.linalg.norm(axis)
-    if "angle" in sizes:  # the kernel's cones may open against their axis
-        sizes["angle"] = abs(sizes["angle"])
-    return surface.of({"origin": origin, "axis": direction, **sizes})
+    numbers = {name: np.array(value) if isinstance(value, list) else value for name, value in entry.items() if name != "kind"}
+    return ANALYTIC_SURFACES[entry["kind"]].of(numbers) if all(np.isfinite(value).all() for value in numbers.values()) else None
 
 
 def credible(

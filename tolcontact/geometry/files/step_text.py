@@ -1,4 +1,4 @@
-"""Solids, units and references in the text of a STEP file (ISO 10303-21)."""
+"""Units, lengths and references in the text of a STEP file (ISO 10303-21)."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -14,59 +14,34 @@ from tolcontact.declaration.geometry import UNITS
 _RECORD = re.compile(rb"(?:[^';/]++|'[^']*+'?|/\*(?:[^*]++|\*(?!/))*+(?:\*/)?|/)++;?")
 _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
 _INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
-_KINDS = {
-    b"PLANE": "plane", b"CYLINDRICAL_SURFACE": "cylinder", b"CONICAL_SURFACE": "cone", b"SPHERICAL_SURFACE": "sphere",
-    b"TOROIDAL_SURFACE": "torus",
-}  # fmt: skip
-_SOLIDS = (b"MANIFOLD_SOLID_BREP", b"BREP_WITH_VOIDS", b"FACETED_BREP")
 _DOCUMENTS = (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
-_ENTITY = re.compile(
-    rb"\b(%b|(?:ORIENTED_)?CLOSED_SHELL|ADVANCED_FACE|AXIS2_PLACEMENT_3D|GLOBAL_UNIT_ASSIGNED_CONTEXT"
-    rb"|LENGTH_UNIT)\s*\(" % b"|".join((*_SOLIDS, *_DOCUMENTS, *_KINDS))
-)
-_NAMELESS = ("NONE", "")  # written by some systems where a face has no name
+_ENTITY = re.compile(rb"\b(%b|GLOBAL_UNIT_ASSIGNED_CONTEXT|LENGTH_UNIT)\s*\(" % b"|".join(_DOCUMENTS))
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _REFERENCE = re.compile(rb"#(\d+)")
 _LINK = re.compile(rb"<([^<>]*)>")
 _WIDE = re.compile(r"\\X2\\((?:[0-9A-F]{4})*)\\X0\\|\\X\\([0-9A-F]{2})")
 _POINT = re.compile(
-    rb"#(\d++)\s*+=\s*+CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
+    rb"CARTESIAN_POINT\s*\(\s*'(?:[^']|'')*+'\s*,\s*\(\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*,\s*([-+.\dEe]+)\s*\)"
 )
 _METRES = re.compile(rb"SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.")
+# A number that is none, or exceeds double precision.
+_ENDLESS = re.compile(
+    rb"[(,]\s*+([-+]?(?:nan|inf|infinity|\d++\.?+\d*+e\+?+0*+(?:\d{4,}|[4-9]\d\d|3[1-9]\d|309)))\s*+(?=[,)])", re.IGNORECASE
+)
 _UNIT_NAMES = {
     "micrometre": "um", "millimetre": "mm", "centimetre": "cm", "metre": "m", "inch": "in", "foot": "ft", "feet": "ft",
 }  # fmt: skip
 SHAPES = (".step", ".stp", ".p21", ".stpz", ".stpx", ".stpnc")
 
 
-class NamedFace(NamedTuple):
-    """A B-rep face: its `name`, "" if it has none, and the `kind` of its surface in SURFACE_KINDS, "" for any other.
-
-    location   a point of a plane or of the axis, or the centre, in the file's units; None if it is unknown
-    """
-
-    name: str = ""
-    kind: str = ""
-    location: tuple[float, ...] | None = None
-
-
-@dataclass(frozen=True)
-class Solid:
-    """A solid with its `name`, and the B-rep `faces` of its shells in their order, those of its cavities included."""
-
-    name: str
-    faces: tuple[NamedFace, ...]
-
-
 @dataclass(frozen=True)
 class StepText:
-    """Solids in the file's order, and the names of shape `files` and other `documents` to which the file refers.
+    """The names of shape `files` and other `documents` to which a STEP file refers, and its lengths.
 
     units   of lengths of shapes, as the file names them: "millimetre", "inch"; empty if not stated
     extent  the longest side of the box around nearly all points (98 % along each axis), in these units; 0 without points
     """
 
-    solids: tuple[Solid, ...]
     files: tuple[str, ...]
     documents: tuple[str, ...]
     units: str
@@ -91,26 +66,22 @@ class _Record(NamedTuple):
     def name(self) -> str:
         return self.strings[0] if self.strings else ""
 
-    @property
-    def reference(self) -> int:
-        return self.references[0] if self.references else 0
-
 
 def step_text(content: bytes) -> StepText:
     """Return what a STEP file's `content` states; for a damaged file, what is legible."""
     records = list(_records(content))
-    faces = _named_faces(records, content)
-    shells = {record.number: record.references for record in records if record.entity == b"CLOSED_SHELL"}
-    oriented = {record.number: record.references for record in records if record.entity == b"ORIENTED_CLOSED_SHELL"}
-    solids = []
-    for record in (record for record in records if record.entity in _SOLIDS):
-        outer = [shell for reference in record.references for shell in oriented.get(reference, [reference])]
-        numbers = [face for shell in outer for face in shells.get(shell, ())]
-        solids.append(Solid(record.name, tuple(faces.get(number, NamedFace()) for number in numbers)))
     documents = _documents(records, content)
     files = tuple(name for name in documents if _suffix(name) in SHAPES)
     others = tuple(name for name in documents if name not in files)
-    return StepText(tuple(solids), files, others, _units(records), _extent(content))
+    return StepText(files, others, _units(records), _extent(content))
+
+
+def endless_number(content: bytes) -> str:
+    """Return the first number in a STEP file's `content` that is none, or is too large; "" if all numbers are finite."""
+    if _ENDLESS.search(content) is None:  # the usual case, in which strings and comments need not be left out
+        return ""
+    match = _ENDLESS.search(b"".join(_STRING.sub(b"''", _COMMENT.sub(b"", record[0])) for record in _RECORD.finditer(content)))
+    return match[1].decode() if match else ""
 
 
 def _records(content: bytes) -> Iterator[_Record]:
@@ -124,20 +95,6 @@ def _records(content: bytes) -> Iterator[_Record]:
         if entity := _ENTITY.search(outside):
             strings = [_decoded(string) for string in _STRING.findall(text)]
             yield _Record(int(instance[1]), entity[1], text, strings, [int(number) for number in _REFERENCE.findall(outside)])
-
-
-def _named_faces(records: Sequence[_Record], content: bytes) -> dict[int, NamedFace]:
-    """Return the B-rep faces by their numbers. Locations are read only if the file names a face."""
-    surfaces = {record.number: (_KINDS[record.entity], record.reference) for record in records if record.entity in _KINDS}
-    placements = {record.number: record.reference for record in records if record.entity == b"AXIS2_PLACEMENT_3D"}
-    faces = [record for record in records if record.entity == b"ADVANCED_FACE"]
-    names = {record.number: "" if record.name.strip() in _NAMELESS else record.name.strip() for record in faces}
-    points = _points(content) if any(names.values()) else {}
-    named = {}
-    for record in faces:
-        kind, placement = surfaces.get(record.references[-1] if record.references else 0, ("", 0))
-        named[record.number] = NamedFace(names[record.number], kind, points.get(placements.get(placement, 0)))
-    return named
 
 
 def _documents(records: Sequence[_Record], content: bytes) -> list[str]:
@@ -160,17 +117,9 @@ def _units(records: Sequence[_Record]) -> str:
     return next((unit for unit in candidates if not unit.endswith("metre")), candidates[0] if candidates else "")
 
 
-def _points(content: bytes) -> dict[int, tuple[float, ...]]:
-    """Return the points of a file by their numbers; none for a damaged one."""
-    try:
-        return {int(number): tuple(map(float, corner)) for number, *corner in _POINT.findall(content)}
-    except ValueError:
-        return {}
-
-
 def _extent(content: bytes) -> float:
     """Return the extent of StepText: a few points may be far off, on axes, or on planes that a body does not reach."""
-    numbers = np.array([corner for _, *point in _POINT.findall(content) for corner in point], dtype="S32")
+    numbers = np.array([corner for point in _POINT.findall(content) for corner in point], dtype="S32")
     try:
         points = numbers.astype(float).reshape(-1, 3)
     except ValueError:  # damaged

@@ -2,36 +2,25 @@
 
 `python -P worker.py FOLDER` writes FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. For job
 k it writes FOLDER/k.npz with the arrays it read, or FOLDER/k.txt with the fault of the file. Of tolcontact it imports only
-`child`, so that it starts quickly.
+`child`, and loads `step_kernel` when a STEP file comes, so that it starts quickly.
 """
 
-import hashlib
+import importlib.util
 import io
 import json
 import os
-import struct
 import sys
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from tolcontact.child import limit_resources
-
-try:
-    import cascadio
-except ImportError:  # an extra: only STEP files need it
-    cascadio = None
+from tolcontact.child import Refusal, limit_resources
 
 Arrays = dict[str, np.ndarray]
-COMPONENT_TYPES = {5121: np.uint8, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}  # of glTF's accessors
-WIDTHS = {"SCALAR": 1, "VEC3": 3}
 ENCODING_GUESSERS = ("charset_normalizer", "chardet")  # trimesh would ask one for the encoding of binary content
-
-
-class Refusal(Exception):
-    """The fault of a file, as the rest of a sentence that begins with its name."""
 
 
 class FolderResolver(trimesh.resolvers.Resolver):  # type: ignore[misc]
@@ -105,135 +94,30 @@ def in_utf8(content: bytes) -> bytes:
     return content
 
 
-def read_step(path: Path, chord: float, angle: float, folder: Path) -> Arrays:
-    """Return the shapes of a STEP file, each in its own frame [m], and the places where they stand.
+def read_step(path: Path, chord: float, angle: float) -> Arrays:
+    """Return the shapes of a STEP file [mm] with the arrays that `step_kernel.read` describes, and their chord [mm].
 
     vertices, faces, piece  as from `join`; a piece is a shape
-    brep                    (face,) the B-rep face of each triangle within its shape
-    products                (shape,) names in the file
-    coloured                (shape,) whether a shape has several colours: its B-rep faces are out of order then
-    surfaces                (shape,) JSON with the surfaces of the B-rep faces
-    shape, transforms       (place,), (place, 4, 4) the shape at each place in the file's order, and its motion to there
-    paths                   (place,) JSON with the names of the products that contain the shape, and its own name
     """
-    if cascadio is None:
-        raise Refusal('is a STEP file, which needs the package cascadio; install it with: pip install "tolcontact[step]"')
-    converted = folder / "converted.glb"
-    converted.unlink(missing_ok=True)
-    failed = cascadio.step_to_glb(str(path), str(converted), tol_linear=chord, tol_angular=angle, include_brep=True)
-    if failed or not converted.is_file():
-        raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
-    glb = Glb(converted.read_bytes())
-    shape_of_digest: dict[bytes, int] = {}
-    shapes: list[tuple[np.ndarray, np.ndarray]] = []
-    breps: list[np.ndarray] = []
-    products: list[str] = []
-    coloured: list[bool] = []
-    surfaces: list[str] = []
-    places: list[tuple[int, np.ndarray, str]] = []
-    for names, transform, mesh in glb.places():
-        corners, faces, brep, stated = glb.piece(mesh)
-        if not len(faces):
-            continue
-        content_hash = hashlib.blake2b(json.dumps([mesh.get("name", ""), stated]).encode())  # one shape may have many places
-        for array in (corners, faces, brep):
-            content_hash.update(np.ascontiguousarray(array).data)
-        digest = content_hash.digest()
-        if digest not in shape_of_digest:
-            shape_of_digest[digest] = len(shapes)
-            shapes.append((corners, faces))
-            breps.append(brep)
-            products.append(mesh.get("name", ""))
-            coloured.append(sum(is_surface(primitive) for primitive in mesh["primitives"]) > 1)
-            surfaces.append(stated)
-        places.append((shape_of_digest[digest], transform, json.dumps(names)))
-    return {
-        **join(shapes),
-        "chord": np.array(chord),
-        "brep": np.concatenate([np.zeros(0, dtype=np.int64), *breps]),
-        "products": np.array(products, dtype=str),
-        "coloured": np.array(coloured, dtype=bool),
-        "surfaces": np.array(surfaces, dtype=str),
-        "shape": np.array([shape for shape, _, _ in places], dtype=np.int64),
-        "transforms": np.array([transform for _, transform, _ in places]).reshape(-1, 4, 4),
-        "paths": np.array([names for _, _, names in places], dtype=str),
-    }
+    pieces, arrays = step_kernel().read(path, chord, angle)
+    return {**join(pieces), **arrays, "chord": np.array(chord)}
 
 
-def is_surface(primitive: dict[str, Any]) -> bool:
-    """Return whether a primitive of a GLB consists of triangles, and not of lines or points."""
-    return bool(primitive.get("mode", 4) == 4)
-
-
-class Glb:
-    """The GLB that cascadio writes."""
-
-    def __init__(self, content: bytes) -> None:
-        (length,) = struct.unpack_from("<I", content, 12)
-        self.tree = json.loads(content[20 : 20 + length])
-        self.binary = content[28 + length :]
-
-    def places(self) -> list[tuple[list[str], np.ndarray, dict[str, Any]]]:
-        """Return names from the root on, transform (4, 4) and mesh of each node with a mesh, in the file's order."""
-        nodes, places = self.tree.get("nodes", []), []
-        stack: list[tuple[int, np.ndarray, list[str]]] = [
-            (k, np.eye(4), []) for k in reversed(self.tree["scenes"][0].get("nodes", []))
-        ]
-        while stack:
-            index, parent_transform, parents = stack.pop()
-            node = nodes[index]
-            transform = parent_transform @ np.reshape(node.get("matrix", np.eye(4)), (4, 4)).T
-            name = node.get("name", "")
-            names = parents if name.startswith("=>[") else [*parents, name]  # the kernel's label of a nameless shape
-            if "mesh" in node:
-                places.append((names, transform, self.tree["meshes"][node["mesh"]]))
-            stack.extend((k, transform, names) for k in reversed(node.get("children", [])))
-        return places
-
-    def piece(self, mesh: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
-        """Return vertices (vertex, 3) [m], faces (face, 3), B-rep faces (face,) and JSON with the surfaces of a mesh.
-
-        Each of its primitives has the faces of one colour.
-        """
-        corners, faces, breps = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-        count = 0
-        surfaces: list[dict[str, Any] | None] = []
-        for primitive in mesh["primitives"]:
-            if not is_surface(primitive):
-                continue
-            vertices = self.array(primitive["attributes"]["POSITION"]).astype(float)
-            triangles = self.array(primitive["indices"]).astype(np.int64).reshape(-1, 3)
-            extension = primitive.get("extensions", {}).get("TM_brep_faces")
-            brep = self.array(extension["faceIndices"]).astype(np.int64).ravel() if extension else np.zeros(0, dtype=np.int64)
-            if len(brep) != len(triangles):  # cascadio may give a colour of a product the extension of another colour
-                extension, brep = None, connected_faces(triangles, len(vertices))
-            corners.append(vertices)
-            faces.append(triangles + count)
-            breps.append(brep + len(surfaces))
-            count += len(vertices)
-            stated = extension["faces"] if extension else []
-            surfaces.extend([*stated, *[None] * (int(brep.max(initial=-1)) + 1 - len(stated))])
-        return np.concatenate(corners), np.concatenate(faces), np.concatenate(breps), json.dumps(surfaces)
-
-    def array(self, index: int) -> np.ndarray:
-        """Return the numbers (row, column) of an accessor."""
-        accessor = self.tree["accessors"][index]
-        view = self.tree["bufferViews"][accessor["bufferView"]]
-        dtype, width = np.dtype(COMPONENT_TYPES[accessor["componentType"]]), WIDTHS[accessor["type"]]
-        start = view.get("byteOffset", 0) + accessor.get("byteOffset", 0)
-        flat = np.frombuffer(self.binary, dtype, accessor["count"] * width, start)
-        return flat.reshape(-1, width)
-
-
-def connected_faces(triangles: np.ndarray, count: int) -> np.ndarray:
-    """Return the B-rep face (face,) of each of `triangles` (face, 3) with `count` vertices.
-
-    Triangles of one B-rep face share vertices; triangles of two do not.
-    """
-    links = np.concatenate([triangles[:, :2], triangles[:, 1:]])
-    label = trimesh.graph.connected_component_labels(links, node_count=count)
-    _, start, number = np.unique(label[triangles[:, 0]], return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(start))[number.ravel()].astype(np.int64)
+@cache
+def step_kernel() -> Any:
+    """Return the module that reads STEP files. The CAD kernel takes 230 MB and 1 s: only STEP files load it."""
+    spec = importlib.util.spec_from_file_location("step_kernel", Path(__file__).with_name("step_kernel.py"))
+    if spec is None or spec.loader is None:
+        raise Refusal("cannot be read: a file of tolcontact, step_kernel.py, is missing; install it again")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    try:
+        spec.loader.exec_module(module)
+    except ModuleNotFoundError as error:
+        raise Refusal(
+            'is a STEP file, which needs the package cadquery-ocp-novtk; install it with: pip install "tolcontact[step]"'
+        ) from error
+    return module
 
 
 def join(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:
@@ -258,10 +142,8 @@ def work(folder: Path) -> None:
     for k, job in enumerate(jobs["files"]):
         path = Path(job["path"])
         try:
-            if job["kind"] == "step":
-                arrays = read_step(path, job["chord"], job["angle"], folder)
-            else:
-                arrays = read_mesh(path, job["kind"])
+            is_step = job["kind"] == "step"
+            arrays = read_step(path, job["chord"], job["angle"]) if is_step else read_mesh(path, job["kind"])
             count = len(arrays["faces"])
             write_arrays(folder, k, arrays if count <= jobs["max_triangles"] else {"count": np.array(count)})
         except MemoryError:
