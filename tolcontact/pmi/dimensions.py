@@ -1,5 +1,6 @@
 """Dimensions in the records of a file: sizes, distances and angles, with their limits."""
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -83,7 +84,10 @@ def _limit(values: _Values, bounds: _Bounds, side: str) -> float | None:
     if side in values.by_role:
         return values.by_role[side].value
     nominal, deviation = values.by_role.get("nominal"), bounds.lower if side == "lower" else bounds.upper
-    return nominal.value + deviation.value if nominal and deviation and nominal.unit == deviation.unit else None
+    if not (nominal and deviation and nominal.unit == deviation.unit):
+        return None
+    limit = nominal.value + deviation.value
+    return limit if math.isfinite(limit) else None
 
 
 def _values(records: Records) -> dict[int, _Values]:
@@ -120,7 +124,8 @@ def _qualifiers(records: Records, item: int) -> Iterator[str]:
 
 def _notes(records: Records, item: int) -> Iterator[str]:
     """Yield the texts in an item, also those in a compound of items."""
-    waiting, visited = [item], set()
+    visited: set[int] = set()
+    waiting = [item]
     while waiting and len(visited) < MAX_NOTES:
         number = waiting.pop()
         if number in visited:

@@ -54,7 +54,7 @@ class Typed(NamedTuple):
     values: "Parameters"
 
 
-Value: TypeAlias = "None | float | str | Reference | Word | Typed | Parameters"
+Value: TypeAlias = "float | str | Reference | Word | Typed | Parameters | None"
 
 
 class Parameters(tuple[Value, ...]):

@@ -13,8 +13,9 @@ from tolcontact.pmi.quantities import length
 KINDS = {
     f"{kind.replace(' ', '_').upper()}_TOLERANCE": kind
     for kind in (
-        "angularity", "circular runout", "coaxiality", "concentricity", "cylindricity", "flatness", "line profile", "parallelism",
-        "perpendicularity", "position", "roundness", "straightness", "surface profile", "symmetry", "total runout",
+        "angularity", "circular runout", "coaxiality", "concentricity", "cylindricity", "flatness", "line profile",
+        "parallelism", "perpendicularity", "position", "roundness", "straightness", "surface profile", "symmetry",
+        "total runout",
     )
 }  # fmt: skip
 _BASE = "GEOMETRIC_TOLERANCE"
