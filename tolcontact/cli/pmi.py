@@ -83,11 +83,13 @@ def _sections(information: Pmi) -> Iterator[RenderableType]:
             yield _table(columns, rows)
         if count > len(rows):
             yield Text(f"and {count - len(rows)} more, which --json lists")
+    if any(item.other_records and not item.face_records for item in (*information.tolerances, *information.datums)):
+        yield Text("\nin parentheses: edges, curves and points, where the file states no faces")
     bare = sum(not tolerance.face_records for tolerance in information.tolerances)
     if bare:
-        yield Text(f"\ntolerances for which the file states no face: {bare}")
+        yield Text(f"tolerances for which the file states no face: {bare}")
     if information.is_tessellated:
-        yield Text("\nthe shapes of the file are triangles, without faces")
+        yield Text("the shapes of the file are triangles, without faces")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
@@ -127,8 +129,8 @@ def _datum_row(datum: Datum) -> tuple[str, ...]:
 
 
 def _faces(faces: Sequence[int], others: Sequence[int]) -> str:
-    """Return how many faces there are, and how many other records if there are no faces."""
-    return str(len(faces)) if faces or not others else f"0 ({len(others)} others)"
+    """Return how many faces there are; if there are none, how many other items, in parentheses."""
+    return str(len(faces)) if faces or not others else f"({len(others)})"
 
 
 def _figure(value: float | None) -> str:

@@ -13,6 +13,10 @@ _SIGNS = {
     "tangent plane": "T", "statistical tolerance": "ST", "common zone": "CZ", "separate requirement": "SEP REQT",
     "each radial element": "EACH RADIAL ELEMENT", "line element": "LE",
 }  # fmt: skip
+_ZONES = {
+    "cylindrical or circular": "diameter", "within a cylinder": "diameter", "within a circle": "diameter",
+    "between two equidistant surfaces": "equidistant surfaces",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -82,7 +86,7 @@ class Tolerance(Readable):
     @property
     def details(self) -> str:
         """The zone and everything that modifies it, in one line."""
-        details = [{"cylindrical or circular": "diameter", "within a cylinder": "diameter"}.get(self.zone, self.zone)]
+        details = [_ZONES.get(self.zone, self.zone)]
         details += [] if self.projected is None else [f"projected {self.projected:.6g}"]
         details += map(sign, self.modifiers)
         shape = f" {self.unit_shape}" if self.unit_shape else ""
