@@ -83,7 +83,10 @@ def _sections(information: Pmi) -> Iterator[RenderableType]:
             yield _table(columns, rows)
         if count > len(rows):
             yield Text(f"and {count - len(rows)} more, which --json lists")
-    if any(item.other_records and not item.face_records for item in (*information.tolerances, *information.datums)):
+    listed = [(row.face_records, row.other_records) for row in information.tolerances]
+    listed += [(row.face_records, row.other_records) for row in information.dimensions]
+    listed += [(row.face_records, row.other_records) for row in information.datums]
+    if any(others and not faces for faces, others in listed):
         yield Text("\nin parentheses: edges, curves and points, where the file states no faces")
     bare = sum(not tolerance.face_records for tolerance in information.tolerances)
     if bare:
@@ -107,7 +110,7 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
 def _tolerance_row(tolerance: Tolerance) -> tuple[str, ...]:
     faces = _faces(tolerance.face_records, tolerance.other_records)
     return (
-        str(tolerance.number), tolerance.kind, _figure(tolerance.value), tolerance.details, tolerance.datum_system, faces
+        str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details, tolerance.datum_system, faces
     )  # fmt: skip
 
 

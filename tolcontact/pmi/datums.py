@@ -72,8 +72,8 @@ def _modifiers(records: Records, value: object) -> Iterator[str]:
 
 
 def _letter(records: Records, datum: int) -> str:
-    """Return the letter of a datum: its last parameter, in a complex instance that of the entity DATUM."""
-    parameters = records.parameters(datum, "DATUM")
+    """Return the letter of a datum, which is its last parameter."""
+    parameters = records.parameters(datum, "DATUM", "COMMON_DATUM")
     return parameters.text(len(parameters) - 1) if parameters else ""
 
 

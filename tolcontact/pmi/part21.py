@@ -4,6 +4,7 @@ Time and memory are linear in the size of the text, whatever it holds: the patte
 """
 
 import re
+import sys
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple, TypeAlias
@@ -101,6 +102,7 @@ class Records:
         self.schema = ""
         self._title = title
         self._bodies: dict[int, bytes] = {}
+        self._entities: dict[int, str] = {}  # of simple instances, so that most records are never parsed
         self._parsed: dict[int, Mapping[str, Parameters]] = {}
         self._numbers: dict[str, list[int]] = defaultdict(list)
         if not self._scan(_COMMENT.sub(rb"\1", content) if b"/*" in content else content):
@@ -122,6 +124,8 @@ class Records:
 
     def has(self, number: int, *entities: str) -> bool:
         """Return whether a record is of one of these entities."""
+        if number in self._entities:
+            return self._entities[number] in entities
         return not self.entities(number).keys().isdisjoint(entities)
 
     def entities(self, number: int) -> Mapping[str, Parameters]:
@@ -163,12 +167,17 @@ class Records:
             return
         if entity is None:
             self._bodies[number] = body
-            names = dict.fromkeys(_ENTITY.findall(_STRING.sub(b"", body)))
-        else:
-            self._bodies[number] = entity + body
-            names = {entity: None}
-        for name in names:
-            self._numbers[name.decode("latin-1").upper()].append(number)
+            for name in dict.fromkeys(_ENTITY.findall(_STRING.sub(b"", body))):
+                self._numbers[_name(name)].append(number)
+            return
+        name = sys.intern(_name(entity))
+        self._bodies[number] = entity + body
+        self._entities[number] = name
+        self._numbers[name].append(number)
+
+
+def _name(entity: bytes) -> str:
+    return entity.decode("latin-1").upper()
 
 
 def _parse(text: bytes) -> Parameters | None:
@@ -182,7 +191,7 @@ def _parse(text: bytes) -> Parameters | None:
         position = token.end()
         match token.lastgroup:
             case "open":
-                stack.append((token["open"][:-1].strip().decode("latin-1").upper(), []))
+                stack.append((_name(token["open"][:-1].strip()), []))
             case "close":
                 name, values = stack.pop()
                 if not stack:
