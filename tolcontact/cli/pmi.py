@@ -110,7 +110,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
 def _tolerance_row(tolerance: Tolerance) -> tuple[str, ...]:
     faces = _faces(tolerance.face_records, tolerance.other_records)
     return (
-        str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details, tolerance.datum_system, faces
+        str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details,
+        tolerance.datum_system, faces,
     )  # fmt: skip
 
 
