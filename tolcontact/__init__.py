@@ -24,6 +24,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 |---|---|---|
 | declare | `tolcontact.declaration` | parts, faces, locators, features, tolerances, contact pairs, forces, measures |
 | read shapes | `tolcontact.geometry` | meshes, STEP files, faces and their surfaces |
+| read tolerances | `tolcontact.pmi` | tolerances, dimensions and datums that a STEP file states |
 | tolerances of a drawing | `tolcontact.features` | kinds of features and tolerances, datums |
 | discretize | `tolcontact.discretization` | contact points, balls and shafts, warnings |
 | draw | `tolcontact.variation` | distributions of deviations, zones of features, seeds |
@@ -50,7 +51,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Feature`, `Variable` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
-| STEP files | `bodies_in`, `faces_in`, `parts_from` |
+| STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
 | run | `run`, `build`, `check`, `check_population`, `compare`, `simulate`, `study`, `simulate_blocks`; `Method`, `Program` |
 | commands | `main`, `command_line` |

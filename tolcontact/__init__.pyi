@@ -58,6 +58,7 @@ from .errors import (
 )
 from .geometry import bodies_in as bodies_in, faces_in as faces_in, parts_from as parts_from
 from .method import Method as Method
+from .pmi import read_pmi as read_pmi
 from .simulation import simulate_blocks as simulate_blocks
 from .version import __version__ as __version__
 from .vocabulary import Status as Status

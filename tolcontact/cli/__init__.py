@@ -22,6 +22,7 @@
     tolcontact view MODEL.py | FILE.stp                  show an assembly or a file before a run
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
+    tolcontact pmi FILE.stp [--json | --csv]             the tolerances, dimensions and datums that a STEP file states
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` enables completion in the
@@ -58,7 +59,7 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 (True, 0)
 """
 
-from tolcontact.cli import analyses, archives, compare, models, run, step_files
+from tolcontact.cli import analyses, archives, compare, models, pmi, run, step_files
 from tolcontact.cli.app import command_line, main
 
-__all__ = ["analyses", "archives", "command_line", "compare", "main", "models", "run", "step_files"]
+__all__ = ["analyses", "archives", "command_line", "compare", "main", "models", "pmi", "run", "step_files"]

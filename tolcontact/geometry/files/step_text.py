@@ -93,7 +93,7 @@ def _records(content: bytes) -> Iterator[_Record]:
         text = instance[2]
         outside = _STRING.sub(b"", text)
         if entity := _ENTITY.search(outside):
-            strings = [_decoded(string) for string in _STRING.findall(text)]
+            strings = [decoded(string) for string in _STRING.findall(text)]
             yield _Record(int(instance[1]), entity[1], text, strings, [int(number) for number in _REFERENCE.findall(outside)])
 
 
@@ -101,7 +101,7 @@ def _documents(records: Sequence[_Record], content: bytes) -> list[str]:
     """Return the names of the files to which a file refers, each once."""
     links = re.search(rb"\bREFERENCE\s*;(.*?)\bENDSEC\s*;", content, re.DOTALL)
     names = [record.name for record in records if record.entity in _DOCUMENTS]
-    names.extend(_decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
+    names.extend(decoded(link).partition("#")[0] for link in _LINK.findall(links[1] if links else b""))
     return [name for name in dict.fromkeys(names) if name.strip()]
 
 
@@ -128,7 +128,8 @@ def _extent(content: bytes) -> float:
     return float(np.ptp(np.quantile(finite, [0.01, 0.99], axis=0), axis=0).max()) if len(finite) else 0.0
 
 
-def _decoded(string: bytes) -> str:
+def decoded(string: bytes) -> str:
+    """Return a string of a STEP file, without its quotes, as a text."""
     text = string.decode("utf-8", errors="replace").replace("''", "'")
     return _WIDE.sub(_wide, text)
 

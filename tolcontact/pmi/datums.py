@@ -1,0 +1,89 @@
+"""Datums, and the datum systems of tolerances."""
+
+from collections.abc import Iterator, Sequence
+
+from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget
+from tolcontact.pmi.aspects import TARGETS, Aspects
+from tolcontact.pmi.part21 import Parameters, Records, Reference, Typed, Word, flat
+from tolcontact.pmi.quantities import length
+
+_COMPARTMENT, _ELEMENT = "DATUM_REFERENCE_COMPARTMENT", "DATUM_REFERENCE_ELEMENT"
+_EARLIER = ("DATUM_REFERENCE", "REFERENCED_MODIFIED_DATUM")  # references without a datum system
+
+
+def datums_of(records: Records, aspects: Aspects) -> tuple[Datum, ...]:
+    """Return the datums of a file, in the order of their records."""
+    datums = []
+    for number in records.numbers("DATUM"):
+        features = aspects.datum_features.get(number, [])
+        targets = tuple(_target(records, aspects, feature, _letter(records, number)) for feature in _targets(records, features))
+        named = [part for target in targets for part in aspects.datum_features.get(target.record, ())]
+        items = aspects.items(number, *features, *named)
+        datums.append(Datum(_letter(records, number), number, targets, items.faces, items.others))
+    return tuple(datums)
+
+
+def datum_system(records: Records, systems: Sequence[int]) -> tuple[DatumReference, ...]:
+    """Return the references of datum systems, or of references without a system, in order of precedence."""
+    references: list[tuple[float, DatumReference]] = []
+    for number in systems:
+        if records.has(number, "DATUM_SYSTEM"):
+            compartments = records.parameters(number, "DATUM_SYSTEM").references(4)
+            references += [(float(place), _reference(records, part)) for place, part in enumerate(compartments)]
+        elif records.has(number, *_EARLIER):
+            references.append(_earlier_reference(records, number))
+    return tuple(reference for _, reference in sorted(references, key=lambda item: item[0]))
+
+
+def _reference(records: Records, compartment: int) -> DatumReference:
+    """Return the reference in a compartment: a datum, or several elements, which form a common datum."""
+    parameters = records.parameters(compartment, _COMPARTMENT, _ELEMENT)
+    modifiers = list(_modifiers(records, parameters.value(5)))
+    letters: list[str] = []
+    for base in parameters.references(4):
+        if records.has(base, _ELEMENT):
+            element = records.parameters(base, _ELEMENT)
+            modifiers += _modifiers(records, element.value(5))
+            letters += [_letter(records, datum) for datum in element.references(4)]
+        else:
+            letters.append(_letter(records, base))
+    return DatumReference(tuple(letters), tuple(dict.fromkeys(modifiers)))
+
+
+def _earlier_reference(records: Records, number: int) -> tuple[float, DatumReference]:
+    """Return the precedence of a reference without a datum system, and the reference."""
+    parameters = records.parameters(number, *_EARLIER)
+    modified = records.parameters(number, "REFERENCED_MODIFIED_DATUM")
+    modifiers = tuple(word for index in (0, 2) for word in modified.words(index))
+    precedence = parameters.value(0)
+    place = precedence if isinstance(precedence, float) else 0.0
+    return place, DatumReference((_letter(records, parameters.reference(1)),), modifiers)
+
+
+def _modifiers(records: Records, value: object) -> Iterator[str]:
+    """Yield the modifiers of a datum reference in words; those with a value are records of their own."""
+    for item in flat(value) if isinstance(value, Typed | Parameters | Word | Reference) else ():
+        if isinstance(item, Word):
+            yield item.text
+        elif isinstance(item, Reference):
+            parameters = records.parameters(item, "DATUM_REFERENCE_MODIFIER_WITH_VALUE")
+            size = length(records, parameters.reference(1))
+            yield from (f"{word} {'' if size is None else f'{size:.6g}'}".strip() for word in parameters.words(0))
+
+
+def _letter(records: Records, datum: int) -> str:
+    """Return the letter of a datum, which is its last parameter."""
+    parameters = records.parameters(datum, "DATUM", "COMMON_DATUM")
+    return parameters.text(len(parameters) - 1) if parameters else ""
+
+
+def _targets(records: Records, features: Sequence[int]) -> list[int]:
+    return [feature for feature in features if records.has(feature, *TARGETS)]
+
+
+def _target(records: Records, aspects: Aspects, number: int, letter: str) -> DatumTarget:
+    parameters = records.parameters(number, *TARGETS)
+    label = letter + parameters.text(len(parameters) - 1)
+    kind = records.parameters(number, *TARGETS, "SHAPE_ASPECT").text(1)
+    items = aspects.items(number, *aspects.datum_features.get(number, ()))
+    return DatumTarget(label, kind, number, items.faces, items.others)

@@ -1,0 +1,150 @@
+"""Dimensions in the records of a file: sizes, distances and angles, with their limits."""
+
+import math
+from collections import defaultdict
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from tolcontact.pmi.annotations import Dimension
+from tolcontact.pmi.aspects import DATUM_SIZE, LOCATIONS, SIZES, Aspects, features_of
+from tolcontact.pmi.part21 import Records
+from tolcontact.pmi.quantities import Quantity, quantity
+
+_KINDS = {
+    "ANGULAR_SIZE": "angular size", "DIMENSIONAL_SIZE_WITH_PATH": "size with path", DATUM_SIZE: "size",
+    "DIMENSIONAL_SIZE": "size", "ANGULAR_LOCATION": "angular location", "DIRECTED_DIMENSIONAL_LOCATION": "directed location",
+    "DIMENSIONAL_LOCATION_WITH_PATH": "location with path", "DIMENSIONAL_LOCATION": "location",
+}  # fmt: skip
+_LIMITS = {"upper limit": "upper", "lower limit": "lower"}
+MAX_NOTES = 1000  # records of notes of a dimension, which may refer to each other
+
+
+class _Values(NamedTuple):
+    """The values of a dimension by their roles "nominal", "lower" and "upper", and its notes."""
+
+    by_role: dict[str, Quantity]
+    notes: list[str]
+
+
+class _Bounds(NamedTuple):
+    """Deviations from the nominal value, or the class of a fit."""
+
+    lower: Quantity | None = None
+    upper: Quantity | None = None
+    fit: str = ""
+
+
+def dimensions_of(records: Records, aspects: Aspects) -> tuple[Dimension, ...]:
+    """Return the dimensions of a file, in the order of their records."""
+    values, bounds = _values(records), _bounds(records)
+    numbers = records.numbers(*_KINDS)
+    return tuple(
+        _dimension(records, aspects, (number, record), values.get(record, _Values({}, [])), bounds.get(record, _Bounds()))
+        for number, record in enumerate(numbers, 1)
+    )
+
+
+def _dimension(records: Records, aspects: Aspects, numbers: tuple[int, int], values: _Values, bounds: _Bounds) -> Dimension:
+    number, record = numbers
+    entities = records.entities(record)
+    start, *end = features_of(records, record)
+    items, end_items = aspects.items(start), aspects.items(*end)
+    nominal = values.by_role.get("nominal")
+    sides = {side: _limit(values, bounds, side) for side in ("lower", "upper")}
+    measures = [*values.by_role.values(), *(side for side in (bounds.lower, bounds.upper) if side)]
+    return Dimension(
+        number=number,
+        record=record,
+        kind=next(kind for entity, kind in _KINDS.items() if entity in entities),
+        name=_name(records, record),
+        unit=measures[0].unit if measures else "",
+        nominal=nominal.value if nominal else None,
+        lower=sides["lower"],
+        upper=sides["upper"],
+        fit=bounds.fit,
+        modifiers=tuple(dict.fromkeys(values.notes)),
+        face_records=items.faces,
+        other_records=items.others,
+        end_face_records=end_items.faces,
+        end_other_records=end_items.others,
+    )
+
+
+def _name(records: Records, record: int) -> str:
+    """Return what a dimension measures: its own name, after those that it has as a shape aspect."""
+    if records.has(record, DATUM_SIZE):
+        return records.parameters(record, DATUM_SIZE).text(5) or records.parameters(record, "DIMENSIONAL_SIZE").text(1)
+    if records.has(record, *SIZES):
+        return records.parameters(record, *SIZES).text(1)
+    return records.parameters(record, *LOCATIONS, "SHAPE_ASPECT_RELATIONSHIP").text(0)
+
+
+def _limit(values: _Values, bounds: _Bounds, side: str) -> float | None:
+    """Return a limit that the file states, or the nominal value plus its deviation."""
+    if side in values.by_role:
+        return values.by_role[side].value
+    nominal, deviation = values.by_role.get("nominal"), bounds.lower if side == "lower" else bounds.upper
+    if not (nominal and deviation and nominal.unit == deviation.unit):
+        return None
+    limit = nominal.value + deviation.value
+    return limit if math.isfinite(limit) else None
+
+
+def _values(records: Records) -> dict[int, _Values]:
+    """Return values and notes by the records of their dimensions."""
+    dimensions: dict[int, _Values] = defaultdict(lambda: _Values({}, []))
+    for number in records.numbers("DIMENSIONAL_CHARACTERISTIC_REPRESENTATION"):
+        parameters = records.parameters(number, "DIMENSIONAL_CHARACTERISTIC_REPRESENTATION")
+        values = dimensions[parameters.reference(0)]
+        shape = records.parameters(parameters.reference(1), "SHAPE_DIMENSION_REPRESENTATION", "REPRESENTATION")
+        for item in shape.references(1):
+            measure = quantity(records, item)
+            if measure is None:
+                values.notes.extend(_notes(records, item))
+                continue
+            qualifiers = [note for note in _qualifiers(records, item) if note not in ("designed", "nominal")]
+            role = _LIMITS.get(_item_name(records, item), "nominal")
+            values.notes.extend(qualifiers)
+            values.by_role.setdefault(role, measure)
+    return dimensions
+
+
+def _item_name(records: Records, item: int) -> str:
+    simple = next((parameters.text(0) for parameters in records.entities(item).values() if parameters.text(0)), "")
+    return records.parameters(item, "REPRESENTATION_ITEM").text(0) or simple
+
+
+def _qualifiers(records: Records, item: int) -> Iterator[str]:
+    """Yield the qualifiers of a value, such as "maximum"."""
+    for qualifier in records.parameters(item, "QUALIFIED_REPRESENTATION_ITEM").references(0):
+        name = records.parameters(qualifier, "TYPE_QUALIFIER").text(0)
+        if name:
+            yield name
+
+
+def _notes(records: Records, item: int) -> Iterator[str]:
+    """Yield the texts in an item, also those in a compound of items."""
+    visited: set[int] = set()
+    waiting = [item]
+    while waiting and len(visited) < MAX_NOTES:
+        number = waiting.pop()
+        if number in visited:
+            continue
+        visited.add(number)
+        text = records.parameters(number, "DESCRIPTIVE_REPRESENTATION_ITEM").text(1)
+        if text:
+            yield text
+        waiting.extend(reversed(records.parameters(number, "COMPOUND_REPRESENTATION_ITEM").references(1)))
+
+
+def _bounds(records: Records) -> dict[int, _Bounds]:
+    """Return deviations and fits by the records of their dimensions."""
+    bounds = {}
+    for number in records.numbers("PLUS_MINUS_TOLERANCE"):
+        parameters = records.parameters(number, "PLUS_MINUS_TOLERANCE")
+        source, dimension = parameters.reference(0), parameters.reference(1)
+        deviations = records.parameters(source, "TOLERANCE_VALUE")
+        fit = records.parameters(source, "LIMITS_AND_FITS")
+        lower, upper = (quantity(records, deviations.reference(index)) for index in (0, 1))
+        bounds[dimension] = _Bounds(lower, upper, " ".join(filter(None, (fit.text(0), fit.text(1)))))
+    return bounds
