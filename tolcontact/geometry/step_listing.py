@@ -17,6 +17,8 @@ from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
 from tolcontact.readable import Readable
 
+LISTING_CHORD = 0.5  # [mm] of triangles that are only counted by their faces
+
 
 @dataclass(frozen=True, repr=False)
 class BodyInFile(Readable):
@@ -67,6 +69,32 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
     return describe_faces(mesh)
 
 
+@dataclass(frozen=True, repr=False)
+class RecordedFace(Readable):
+    """A B-rep face by its `number` and `name` in a body, and the numbers of the `bodies` that have it: one for each place."""
+
+    number: int
+    name: str
+    bodies: tuple[int, ...]
+
+    def __str__(self) -> str:
+        return f"{self.number}" if self.bodies == (1,) else f"{self.number} of body {', '.join(map(str, self.bodies))}"
+
+
+def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
+    """Return the B-rep faces of a STEP file that states PMI, by the numbers of their records in the file's text.
+
+    Raises OptionError if the file cannot be read.
+    """
+    found: dict[int, RecordedFace] = {}
+    for number, body in enumerate(_product(path, LISTING_CHORD).bodies, start=1):
+        for face, (record, name) in enumerate(zip(body.face_records, body.face_names, strict=True), start=1):
+            if record:
+                bodies = (*(found[record].bodies if record in found else ()), number)
+                found[record] = RecordedFace(face, name, bodies)
+    return found
+
+
 def parts_from(
     model: Assembly,
     path: str | Path,
@@ -105,8 +133,8 @@ def _part_name(body: BodyInFile) -> str:
     return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 
 
-def _product(path: str | Path) -> Product:
-    geometry = Mesh(path)
+def _product(path: str | Path, chord: float | None = None) -> Product:
+    geometry = Mesh(path, chord=chord)
     for fault in geometry.faults():
         raise OptionError(fault)
     content = read_files([geometry])[key_of(geometry)]

@@ -21,6 +21,7 @@ class Body:
     lower, upper  (3,) corners of the box around the body in its place
     is_open       whether its triangles do not close
     face_names    of its B-rep faces, "" for a face without a name
+    face_records  of its B-rep faces: their numbers in the file's text, 0 if it states no PMI
     stated_faces  number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
@@ -32,6 +33,7 @@ class Body:
     upper: np.ndarray
     is_open: bool
     face_names: tuple[str, ...]
+    face_records: tuple[int, ...]
     stated_faces: int
 
     def __str__(self) -> str:
@@ -48,6 +50,7 @@ class StepShape:
     corners       (face, 3, 3) of these triangles
     is_open       whether the triangles do not close
     face_names    of its B-rep faces, "" for a face without a name
+    face_records  of its B-rep faces: their numbers in the file's text, 0 if it states no PMI
     stated_faces  number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
@@ -55,6 +58,7 @@ class StepShape:
     corners: np.ndarray
     is_open: bool
     face_names: tuple[str, ...]
+    face_records: tuple[int, ...]
     stated_faces: int
 
 
@@ -98,5 +102,5 @@ def _body(shape: StepShape, place: ShapePlace, *, is_alone: bool) -> Body:
     is_open = shape.is_open and not (is_alone and shape.stated_faces)
     return Body(
         place.name, place.path, place.place, shape.triangles, corners.min(axis=0), corners.max(axis=0), is_open,
-        shape.face_names, shape.stated_faces,
+        shape.face_names, shape.face_records, shape.stated_faces,
     )  # fmt: skip

@@ -137,11 +137,15 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         )
     ]
     shapes = []
-    for k, (names, stated_faces) in enumerate(zip(arrays["face_names"], arrays["face_count"], strict=True)):
+    described = zip(*(arrays[name] for name in ("face_names", "face_records", "face_count")), strict=True)
+    for k, (names, records, stated_faces) in enumerate(described):
         triangles = np.flatnonzero(shape == k)
-        face_names = np.array(json.loads(str(names)), dtype=str)[np.unique(brep[triangles])]
+        numbers = np.unique(brep[triangles])
+        face_names = tuple(map(str, np.array(json.loads(str(names)), dtype=str)[numbers]))
+        face_records = np.array(json.loads(str(records)) or np.zeros(len(json.loads(str(names)))), dtype=np.int64)[numbers]
         is_open = len(rim(faces[triangles])) > 0
-        shapes.append(StepShape(triangles, vertices[faces[triangles]], is_open, tuple(map(str, face_names)), int(stated_faces)))
+        described_faces = face_names, tuple(map(int, face_records))
+        shapes.append(StepShape(triangles, vertices[faces[triangles]], is_open, *described_faces, int(stated_faces)))
     return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(shapes, places)), text)
 
 

@@ -38,6 +38,9 @@ from tolcontact.child import Refusal
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
+PMI_FACE = re.compile(rb"\b(?:GEOMETRIC_ITEM_SPECIFIC_USAGE|ITEM_IDENTIFIED_REPRESENTATION_USAGE)\s*\(")
+COMMENT, STRING = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/"), re.compile(rb"'[^']*+'")
+RECORD = re.compile(rb"(?:^|;)\s*#(\d+)\s*=")
 NAMELESS = ("NONE", "")  # written by some systems where a face has no name
 LABEL = "=>["  # begins the kernel's label of a nameless shape
 
@@ -70,6 +73,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
     brep                (face,) the B-rep face of each triangle, from 0 in the file's order within its body
     surfaces            (shape,) JSON with the surfaces of the B-rep faces, null for one that is not simple
     face_names          (shape,) JSON with the names of the B-rep faces
+    face_records        (shape,) JSON with the numbers of the records of the B-rep faces if the file states PMI, else empty
     face_count          (shape,) number of B-rep faces that the file states for a solid; 0 if it is unknown
     shape, transforms   (body,), (body, 4, 4) the shape of each body in the file's order, and its motion to its place
     paths, names        (body,) JSON with the names of the products that contain the body, and its own name
@@ -98,6 +102,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
         "brep": np.concatenate(breps),
         "surfaces": np.array([json.dumps([surface(face) for face in body.faces]) for body in shapes], dtype=str),
         "face_names": np.array([json.dumps(document.face_names(body.faces)) for body in shapes], dtype=str),
+        "face_records": np.array([json.dumps(document.face_records(body.faces)) for body in shapes], dtype=str),
         "face_count": np.array([body.face_count for body in shapes], dtype=np.int64),
         "shape": np.array([number for number, _ in placed], dtype=np.int64),
         "transforms": np.array([place.transform for _, place in placed]).reshape(-1, 4, 4),
@@ -134,6 +139,7 @@ class Document:
         self.transfer = self.reader.Reader().WS().TransferReader()
         content = path.read_bytes()
         self.has_face_names, self.has_solids = (pattern.search(content) is not None for pattern in (NAMED_FACE, SOLID))
+        self.record_of = self._records(content) if PMI_FACE.search(content) else {}
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -202,6 +208,23 @@ class Document:
             return [""] * len(faces)
         names = [entity_name(self._entity(face)).strip() for face in faces]
         return ["" if name in NAMELESS else name for name in names]
+
+    def face_records(self, faces: Sequence[Any]) -> list[int]:
+        """Return the numbers of the records of faces, 0 for one without a record; none if the file states no PMI."""
+        if not self.record_of:
+            return []
+        return [self.record_of.get(id(self._entity(face)), 0) for face in faces]
+
+    def _records(self, text: bytes) -> dict[int, int]:
+        """Return the numbers of records by the identities of their entities; none if they cannot be told.
+
+        The kernel finds no number of an entity, but its entities are in the order of the file's records. It makes one object
+        for each as long as that is kept.
+        """
+        model = self.reader.Reader().WS().Model()
+        self.entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]
+        numbers = [int(number) for number in RECORD.findall(STRING.sub(b"", COMMENT.sub(b"", text)))]
+        return dict(zip(map(id, self.entities), numbers, strict=True)) if len(numbers) == len(self.entities) else {}
 
     def _entity(self, shape: Any) -> Any:
         """Return the record of which the kernel made a solid or a face; None if it is unknown."""
