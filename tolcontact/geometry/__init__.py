@@ -37,9 +37,9 @@ triangles.
 
 STEP files need the package cadquery-ocp-novtk: `pip install '.[step]'`. Its licence is Apache-2.0; it contains the CAD kernel
 Open CASCADE Technology, whose licence is LGPL 2.1 with an exception. Faces are triangulated to within 2 um, or 5e-6 of the
-extent of a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks for 0.1 mm instead; contact on surfaces that the file
-states does not depend on this chord. If there would be more than a million triangles, or triangulation takes too long, faces
-are triangulated 30 times as coarsely and to 0.5 rad, with a warning.
+extent of a file larger than 0.4 m, and 0.1 rad. `tc.Mesh(file, chord=0.1)` asks for 0.1 mm instead; contact on surfaces that
+the file states does not depend on this chord. If there would be more than a million triangles, or triangulation takes too
+long, faces are triangulated 30 times as coarsely and to 0.5 rad, with a warning.
 
 The triangles keep the boundary representation, to which `tc.Brep`, `tc.Cylinder` and `tc.Largest` refer. Where the file states
 a surface, vertices are moved onto it in double precision, as closely as the surfaces that meet at a vertex agree. Vertices of

@@ -8,7 +8,7 @@ is no part of a solid. All other faces of a shape are one body together: surface
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
 from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
 from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
 from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.StepShape import StepShape_ClosedShell
@@ -36,7 +37,6 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 from tolcontact.child import Refusal
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
-NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 NAMELESS = ("NONE", "")  # written by some systems where a face has no name
 LABEL = "=>["  # begins the kernel's label of a nameless shape
@@ -46,9 +46,13 @@ Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (fac
 
 @dataclass(frozen=True)
 class BodyShape:
-    """The faces of a body; its `name` if it is a solid, and the number of faces that the file states for a solid, else 0."""
+    """The faces of a body with their names; its `name` if it is a solid, and the number of faces that the file states for it.
+
+    This number is 0 for a body that is no solid.
+    """
 
     faces: list[Any]
+    face_names: list[str]
     is_solid: bool
     name: str = ""
     face_count: int = 0
@@ -85,7 +89,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
         key = entry(place.label)
         if key not in shape_numbers:
             shape_numbers[key] = []
-            for body in document.body_shapes(place.label, chord, angle):
+            for body in document.body_shapes(place.label, chord, angle, is_alone=len(places) == 1):
                 piece, brep = triangulation(body.faces)
                 if len(brep):
                     shape_numbers[key].append(len(shapes))
@@ -97,7 +101,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
     return pieces, {
         "brep": np.concatenate(breps),
         "surfaces": np.array([json.dumps([surface(face) for face in body.faces]) for body in shapes], dtype=str),
-        "face_names": np.array([json.dumps(document.face_names(body.faces)) for body in shapes], dtype=str),
+        "face_names": np.array([json.dumps(body.face_names) for body in shapes], dtype=str),
         "face_count": np.array([body.face_count for body in shapes], dtype=np.int64),
         "shape": np.array([number for number, _ in placed], dtype=np.int64),
         "transforms": np.array([place.transform for _, place in placed]).reshape(-1, 4, 4),
@@ -129,11 +133,11 @@ class Document:
             self.reader.SetMatMode,
         ):  # fmt: skip
             set_mode(False)
+        Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)  # names of solids and faces
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
-        content = path.read_bytes()
-        self.has_face_names, self.has_solids = (pattern.search(content) is not None for pattern in (NAMED_FACE, SOLID))
+        self.has_solids = SOLID.search(path.read_bytes()) is not None
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -157,59 +161,68 @@ class Document:
             product = label_name(referred)
             yield PlacedShape(names, "" if is_nameless(product) else product, matrix(location), referred)
 
-    def body_shapes(self, label: Any, chord: float, angle: float) -> Iterator[BodyShape]:
-        """Yield the bodies of a product's shape, in its own frame, with triangles on their faces."""
+    def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
+        """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.
+
+        A shape that `is_alone` in its file may have records of more kinds, and it takes time to look for records.
+        """
         shape = XCAFDoc_ShapeTool.GetShape_s(label).Located(TopLoc_Location())
         BRepMesh_IncrementalMesh(shape, chord, False, angle, False)
-        pieces = list(self._pieces(shape))
-        yield from (
-            BodyShape([*explore(piece, TopAbs_FACE)], True, name, count) for piece, name, count, solid in pieces if solid
-        )
+        names = subshape_names(label)
+        pieces = list(self._pieces(shape, names, is_alone=is_alone))
+        yield from (self._body(piece, names, name, count) for piece, name, count, is_solid in pieces if is_solid)
         sheets: list[Any] = []
         lost_count = 0
         for piece, _, count, is_solid in pieces:
             if is_solid:
                 continue
-            faces = [*explore(piece, TopAbs_FACE)]
             if piece.ShapeType() == TopAbs_SHELL and BRep_Tool.IsClosed_s(piece):
-                yield BodyShape(faces, False)
+                yield self._body(piece, names)
             else:
-                sheets.extend(faces)
+                sheets.extend(explore(piece, TopAbs_FACE))
                 lost_count += count
         if sheets:
-            yield BodyShape(sheets, False, "", lost_count)
+            yield BodyShape(sheets, face_names(sheets, names), False, "", lost_count)
 
-    def _pieces(self, shape: Any) -> Iterator[tuple[Any, str, int, bool]]:
+    def _body(self, piece: Any, names: Mapping[int, str], name: str = "", count: int = 0) -> BodyShape:
+        faces = [*explore(piece, TopAbs_FACE)]
+        return BodyShape(faces, face_names(faces, names), count > 0, name, count)
+
+    def _pieces(self, shape: Any, names: Mapping[int, str], *, is_alone: bool) -> Iterator[tuple[Any, str, int, bool]]:
         """Yield the solids, shells and loose faces of a shape: name and number of faces in the file, whether it is a solid.
 
         Where the kernel mends a solid it may make several pieces of it, or one that is open.
         """
-        entity = self._entity(shape)
+        is_compound = shape.ShapeType() == TopAbs_COMPOUND
+        entity = self._entity(shape) if is_alone or is_compound else None
         if hasattr(entity, "Outer") or shape.ShapeType() == TopAbs_SOLID:
-            yield shape, entity_name(entity), stated_face_count(entity), True
-        elif shape.ShapeType() == TopAbs_COMPOUND:
+            name = entity_name(entity) or names.get(hash(shape), "")
+            yield shape, name, stated_face_count(entity) or len([*explore(shape, TopAbs_FACE)]), True
+        elif is_compound:
             children = TopoDS_Iterator(shape)
             while children.More():
-                yield from self._pieces(children.Value())
+                yield from self._pieces(children.Value(), names, is_alone=is_alone and shape.NbChildren() == 1)
                 children.Next()
         else:
             is_lost = self.has_solids and isinstance(entity, StepShape_ClosedShell)
             yield shape, "", entity.NbCfsFaces() if is_lost else 0, False
 
-    def face_names(self, faces: Sequence[Any]) -> list[str]:
-        """Return the names of faces in the file, "" for a face without a name."""
-        if not self.has_face_names:  # looking for the records of faces takes time
-            return [""] * len(faces)
-        names = [entity_name(self._entity(face)).strip() for face in faces]
-        return ["" if name in NAMELESS else name for name in names]
-
     def _entity(self, shape: Any) -> Any:
-        """Return the record of which the kernel made a solid or a face; None if it is unknown."""
-        for candidate in (shape, shape.Located(TopLoc_Location())):
-            entity = self.transfer.EntityFromShapeResult(candidate, 1)
-            if entity is not None:
-                return entity
-        return None
+        """Return the record of which the kernel made a shape; None if it is unknown."""
+        return self.transfer.EntityFromShapeResult(shape, 1)
+
+
+def subshape_names(label: Any) -> dict[int, str]:
+    """Return the names of the solids and faces in the shape of a label that have one, by their hashes."""
+    labels = Sequence_TDF_Label()
+    XCAFDoc_ShapeTool.GetSubShapes_s(label, labels)
+    return {hash(XCAFDoc_ShapeTool.GetShape_s(piece)): label_name(piece) for piece in labels}
+
+
+def face_names(faces: Sequence[Any], names: Mapping[int, str]) -> list[str]:
+    """Return the names of faces in the file, "" for a face without a name."""
+    stripped = [names.get(hash(face), "").strip() for face in faces]
+    return ["" if name in NAMELESS or is_nameless(name) else name for name in stripped]
 
 
 def entity_name(entity: Any) -> str:
