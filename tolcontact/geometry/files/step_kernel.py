@@ -8,7 +8,7 @@ is no part of a solid. All other faces of a shape are one body together: surface
 
 import json
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 from tolcontact.child import Refusal
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
+NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 NAMELESS = ("NONE", "")  # written by some systems where a face has no name
 LABEL = "=>["  # begins the kernel's label of a nameless shape
@@ -128,16 +129,14 @@ class Document:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
-        for set_mode in (
-            self.reader.SetColorMode, self.reader.SetLayerMode, self.reader.SetPropsMode, self.reader.SetGDTMode,
-            self.reader.SetMatMode,
-        ):  # fmt: skip
-            set_mode(False)
+        for content in ("Color", "Layer", "Props", "GDT", "Mat"):
+            getattr(self.reader, f"Set{content}Mode")(False)
         Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)  # names of solids and faces
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
-        self.has_solids = SOLID.search(path.read_bytes()) is not None
+        text = path.read_bytes()
+        self.has_face_names, self.has_solids = (pattern.search(text) is not None for pattern in (NAMED_FACE, SOLID))
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -184,11 +183,14 @@ class Document:
         if sheets:
             yield BodyShape(sheets, face_names(sheets, names), False, "", lost_count)
 
-    def _body(self, piece: Any, names: Mapping[int, str], name: str = "", count: int = 0) -> BodyShape:
+    def _body(self, piece: Any, names: dict[int, str], name: str = "", count: int = 0) -> BodyShape:
+        """Return the body of a solid or shell. The document has no labels for faces of cavities: their records have names."""
         faces = [*explore(piece, TopAbs_FACE)]
-        return BodyShape(faces, face_names(faces, names), count > 0, name, count)
+        cavities = [*explore(piece, TopAbs_SHELL)][1:] if self.has_face_names else []
+        within = {hash(face): entity_name(self._entity(face)) for shell in cavities for face in explore(shell, TopAbs_FACE)}
+        return BodyShape(faces, face_names(faces, within | names if within else names), count > 0, name, count)
 
-    def _pieces(self, shape: Any, names: Mapping[int, str], *, is_alone: bool) -> Iterator[tuple[Any, str, int, bool]]:
+    def _pieces(self, shape: Any, names: dict[int, str], *, is_alone: bool) -> Iterator[tuple[Any, str, int, bool]]:
         """Yield the solids, shells and loose faces of a shape: name and number of faces in the file, whether it is a solid.
 
         Where the kernel mends a solid it may make several pieces of it, or one that is open.
@@ -204,8 +206,8 @@ class Document:
                 yield from self._pieces(children.Value(), names, is_alone=is_alone and shape.NbChildren() == 1)
                 children.Next()
         else:
-            is_lost = self.has_solids and isinstance(entity, StepShape_ClosedShell)
-            yield shape, "", entity.NbCfsFaces() if is_lost else 0, False
+            is_damaged_solid = self.has_solids and isinstance(entity, StepShape_ClosedShell)
+            yield shape, "", int(entity.NbCfsFaces()) if is_damaged_solid and entity is not None else 0, False
 
     def _entity(self, shape: Any) -> Any:
         """Return the record of which the kernel made a shape; None if it is unknown."""
@@ -219,7 +221,7 @@ def subshape_names(label: Any) -> dict[int, str]:
     return {hash(XCAFDoc_ShapeTool.GetShape_s(piece)): label_name(piece) for piece in labels}
 
 
-def face_names(faces: Sequence[Any], names: Mapping[int, str]) -> list[str]:
+def face_names(faces: Sequence[Any], names: dict[int, str]) -> list[str]:
     """Return the names of faces in the file, "" for a face without a name."""
     stripped = [names.get(hash(face), "").strip() for face in faces]
     return ["" if name in NAMELESS or is_nameless(name) else name for name in stripped]
