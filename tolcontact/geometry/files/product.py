@@ -18,7 +18,7 @@ from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
-from tolcontact.geometry.files.step_text import StepText
+from tolcontact.geometry.files.step_text import StepText, record_numbers
 
 STEP_CHORD, STEP_ANGLE = 0.002, 0.1  # largest distance [mm] and angle [rad] between triangles and true faces of a STEP file
 STEP_SHARE = 5e-6  # the chord of files larger than 0.4 m, as a share of their extent
@@ -137,16 +137,23 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
         )
     ]
     shapes = []
+    numbers_of_records = _record_numbers(path, int(arrays["record_count"]))
     described = zip(*(arrays[name] for name in ("face_names", "face_records", "face_count")), strict=True)
     for k, (names, records, stated_faces) in enumerate(described):
         triangles = np.flatnonzero(shape == k)
         numbers = np.unique(brep[triangles])
         face_names = tuple(map(str, np.array(json.loads(str(names)), dtype=str)[numbers]))
-        face_records = np.array(json.loads(str(records)) or np.zeros(len(json.loads(str(names)))), dtype=np.int64)[numbers]
+        places_of_records = np.array(json.loads(str(records)) or [0] * len(json.loads(str(names))), dtype=np.int64)[numbers]
         is_open = len(rim(faces[triangles])) > 0
-        described_faces = face_names, tuple(map(int, face_records))
+        described_faces = face_names, tuple(map(int, numbers_of_records[places_of_records]))
         shapes.append(StepShape(triangles, vertices[faces[triangles]], is_open, *described_faces, int(stated_faces)))
     return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(shapes, places)), text)
+
+
+def _record_numbers(path: Path, count: int) -> np.ndarray:
+    """Return the numbers (record + 1,) of the `count` records in a file's text, after a 0; zeros if they cannot be told."""
+    numbers = record_numbers(path.read_bytes()) if count else []
+    return np.array([0, *numbers] if len(numbers) == count else np.zeros(count + 1), dtype=np.int64)
 
 
 def _proper_triangles(path: Path, faces: np.ndarray) -> np.ndarray:

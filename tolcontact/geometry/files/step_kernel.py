@@ -20,6 +20,7 @@ from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
 from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
 from OCP.IFSelect import IFSelect_RetDone
+from OCP.Interface import Interface_Static
 from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.StepShape import StepShape_ClosedShell
@@ -39,19 +40,17 @@ RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple s
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 PMI_FACE = re.compile(rb"\b(?:GEOMETRIC_ITEM_SPECIFIC_USAGE|ITEM_IDENTIFIED_REPRESENTATION_USAGE)\s*\(")
-COMMENT, STRING = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/"), re.compile(rb"'[^']*+'")
-RECORD = re.compile(rb"(?:^|;)\s*#(\d+)\s*=")
-NAMELESS = ("NONE", "")  # written by some systems where a face has no name
-LABEL = "=>["  # begins the kernel's label of a nameless shape
+NAMELESS, LABEL = ("NONE", ""), "=>["  # some systems' names of nameless faces; begins the kernel's label of a nameless shape
 
 Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (face, 3)
 
 
 @dataclass(frozen=True)
 class BodyShape:
-    """The faces of a body; its `name` if it is a solid, and the number of faces that the file states for a solid, else 0."""
+    """The faces of a body, their names, its name if it is a solid, and the number of faces stated for it; 0 for no solid."""
 
     faces: list[Any]
+    face_names: list[str]
     is_solid: bool
     name: str = ""
     face_count: int = 0
@@ -73,7 +72,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
     brep                (face,) the B-rep face of each triangle, from 0 in the file's order within its body
     surfaces            (shape,) JSON with the surfaces of the B-rep faces, null for one that is not simple
     face_names          (shape,) JSON with the names of the B-rep faces
-    face_records        (shape,) JSON with the numbers of the records of the B-rep faces if the file states PMI, else empty
+    face_records        (shape,) JSON with the places of the records of B-rep faces among all, `record_count`, if it has PMI
     face_count          (shape,) number of B-rep faces that the file states for a solid; 0 if it is unknown
     shape, transforms   (body,), (body, 4, 4) the shape of each body in the file's order, and its motion to its place
     paths, names        (body,) JSON with the names of the products that contain the body, and its own name
@@ -89,7 +88,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
         key = entry(place.label)
         if key not in shape_numbers:
             shape_numbers[key] = []
-            for body in document.body_shapes(place.label, chord, angle):
+            for body in document.body_shapes(place.label, chord, angle, is_alone=len(places) == 1):
                 piece, brep = triangulation(body.faces)
                 if len(brep):
                     shape_numbers[key].append(len(shapes))
@@ -101,8 +100,9 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
     return pieces, {
         "brep": np.concatenate(breps),
         "surfaces": np.array([json.dumps([surface(face) for face in body.faces]) for body in shapes], dtype=str),
-        "face_names": np.array([json.dumps(document.face_names(body.faces)) for body in shapes], dtype=str),
+        "face_names": np.array([json.dumps(body.face_names) for body in shapes], dtype=str),
         "face_records": np.array([json.dumps(document.face_records(body.faces)) for body in shapes], dtype=str),
+        "record_count": np.array(len(document.entities)),
         "face_count": np.array([body.face_count for body in shapes], dtype=np.int64),
         "shape": np.array([number for number, _ in placed], dtype=np.int64),
         "transforms": np.array([place.transform for _, place in placed]).reshape(-1, 4, 4),
@@ -116,9 +116,9 @@ def body_names(placed: Sequence[tuple[BodyShape, PlacedShape]]) -> list[str]:
     is_one_place = len({id(place) for _, place in placed}) == 1 and all(body.is_solid for body, _ in placed)
     if is_one_place and len(placed) > 1:
         return [body.name for body, _ in placed]
+    own = [body.name if is_one_place else "" for body, _ in placed]
     return [
-        (body.name if is_one_place else "") or (place.names[-1] if place.names else "") or place.product
-        for body, place in placed
+        name or (place.names[-1] if place.names else "") or place.product for name, (_, place) in zip(own, placed, strict=True)
     ]
 
 
@@ -129,17 +129,15 @@ class Document:
         self.document = TDocStd_Document(TCollection_ExtendedString("STEP"))
         self.reader = STEPCAFControl_Reader()
         self.reader.SetNameMode(True)
-        for set_mode in (
-            self.reader.SetColorMode, self.reader.SetLayerMode, self.reader.SetPropsMode, self.reader.SetGDTMode,
-            self.reader.SetMatMode,
-        ):  # fmt: skip
-            set_mode(False)
+        for content in ("Color", "Layer", "Props", "GDT", "Mat"):
+            getattr(self.reader, f"Set{content}Mode")(False)
+        Interface_Static.SetIVal_s("read.stepcaf.subshapes.name", 1)  # names of solids and faces
         if self.reader.ReadFile(str(path)) != IFSelect_RetDone or not self.reader.Transfer(self.document):
             raise Refusal("cannot be read as STEP: it is cut off, damaged, or holds no shape; export it again")
         self.transfer = self.reader.Reader().WS().TransferReader()
-        content = path.read_bytes()
-        self.has_face_names, self.has_solids = (pattern.search(content) is not None for pattern in (NAMED_FACE, SOLID))
-        self.record_of = self._records(content) if PMI_FACE.search(content) else {}
+        text = path.read_bytes()
+        self.has_face_names, self.has_solids = (pattern.search(text) is not None for pattern in (NAMED_FACE, SOLID))
+        self.entities = self._entities() if PMI_FACE.search(text) else {}
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
@@ -163,76 +161,80 @@ class Document:
             product = label_name(referred)
             yield PlacedShape(names, "" if is_nameless(product) else product, matrix(location), referred)
 
-    def body_shapes(self, label: Any, chord: float, angle: float) -> Iterator[BodyShape]:
-        """Yield the bodies of a product's shape, in its own frame, with triangles on their faces."""
+    def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
+        """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.
+
+        A shape that `is_alone` in its file may have records of more kinds, and it takes time to look for records.
+        """
         shape = XCAFDoc_ShapeTool.GetShape_s(label).Located(TopLoc_Location())
         BRepMesh_IncrementalMesh(shape, chord, False, angle, False)
-        pieces = list(self._pieces(shape))
-        yield from (
-            BodyShape([*explore(piece, TopAbs_FACE)], True, name, count) for piece, name, count, solid in pieces if solid
-        )
+        names = subshape_names(label)
+        pieces = list(self._pieces(shape, names, is_alone=is_alone))
+        yield from (self._body(piece, names, name, count) for piece, name, count, is_solid in pieces if is_solid)
         sheets: list[Any] = []
         lost_count = 0
         for piece, _, count, is_solid in pieces:
             if is_solid:
                 continue
-            faces = [*explore(piece, TopAbs_FACE)]
             if piece.ShapeType() == TopAbs_SHELL and BRep_Tool.IsClosed_s(piece):
-                yield BodyShape(faces, False)
+                yield self._body(piece, names)
             else:
-                sheets.extend(faces)
+                sheets.extend(explore(piece, TopAbs_FACE))
                 lost_count += count
         if sheets:
-            yield BodyShape(sheets, False, "", lost_count)
+            yield BodyShape(sheets, face_names(sheets, names), False, "", lost_count)
 
-    def _pieces(self, shape: Any) -> Iterator[tuple[Any, str, int, bool]]:
+    def _body(self, piece: Any, names: dict[int, str], name: str = "", count: int = 0) -> BodyShape:
+        """Return the body of a solid or shell. The document has no labels for faces of cavities: their records have names."""
+        faces = [*explore(piece, TopAbs_FACE)]
+        cavities = [*explore(piece, TopAbs_SHELL)][1:] if self.has_face_names else []
+        within = {hash(face): entity_name(self._entity(face)) for shell in cavities for face in explore(shell, TopAbs_FACE)}
+        return BodyShape(faces, face_names(faces, within | names if within else names), count > 0, name, count)
+
+    def _pieces(self, shape: Any, names: dict[int, str], *, is_alone: bool) -> Iterator[tuple[Any, str, int, bool]]:
         """Yield the solids, shells and loose faces of a shape: name and number of faces in the file, whether it is a solid.
 
         Where the kernel mends a solid it may make several pieces of it, or one that is open.
         """
-        entity = self._entity(shape)
+        is_compound = shape.ShapeType() == TopAbs_COMPOUND
+        entity = self._entity(shape) if is_alone or is_compound else None
         if hasattr(entity, "Outer") or shape.ShapeType() == TopAbs_SOLID:
-            yield shape, entity_name(entity), stated_face_count(entity), True
-        elif shape.ShapeType() == TopAbs_COMPOUND:
+            name = entity_name(entity) or names.get(hash(shape), "")
+            yield shape, name, stated_face_count(entity) or len([*explore(shape, TopAbs_FACE)]), True
+        elif is_compound:
             children = TopoDS_Iterator(shape)
             while children.More():
-                yield from self._pieces(children.Value())
+                yield from self._pieces(children.Value(), names, is_alone=is_alone and shape.NbChildren() == 1)
                 children.Next()
         else:
-            is_lost = self.has_solids and isinstance(entity, StepShape_ClosedShell)
-            yield shape, "", entity.NbCfsFaces() if is_lost else 0, False
-
-    def face_names(self, faces: Sequence[Any]) -> list[str]:
-        """Return the names of faces in the file, "" for a face without a name."""
-        if not self.has_face_names:  # looking for the records of faces takes time
-            return [""] * len(faces)
-        names = [entity_name(self._entity(face)).strip() for face in faces]
-        return ["" if name in NAMELESS else name for name in names]
+            is_damaged_solid = self.has_solids and isinstance(entity, StepShape_ClosedShell)
+            yield shape, "", int(entity.NbCfsFaces()) if is_damaged_solid and entity is not None else 0, False
 
     def face_records(self, faces: Sequence[Any]) -> list[int]:
-        """Return the numbers of the records of faces, 0 for one without a record; none if the file states no PMI."""
-        if not self.record_of:
-            return []
-        return [self.record_of.get(id(self._entity(face)), 0) for face in faces]
+        """Return the numbers of the records of faces, from 1 in the file's order, 0 for none; nothing if there is no PMI."""
+        return [self.entities.get(self._entity(face), 0) for face in faces] if self.entities else []
 
-    def _records(self, text: bytes) -> dict[int, int]:
-        """Return the numbers of records by the identities of their entities; none if they cannot be told.
-
-        The kernel finds no number of an entity, but its entities are in the order of the file's records. It makes one object
-        for each as long as that is kept.
-        """
+    def _entities(self) -> dict[Any, int]:
+        """Return the records in the order of the file. The kernel itself finds no number, but has one object for each."""
         model = self.reader.Reader().WS().Model()
-        self.entities = [model.Value(k) for k in range(1, model.NbEntities() + 1)]
-        numbers = [int(number) for number in RECORD.findall(STRING.sub(b"", COMMENT.sub(b"", text)))]
-        return dict(zip(map(id, self.entities), numbers, strict=True)) if len(numbers) == len(self.entities) else {}
+        return {model.Value(number): number for number in range(1, model.NbEntities() + 1)}
 
     def _entity(self, shape: Any) -> Any:
-        """Return the record of which the kernel made a solid or a face; None if it is unknown."""
-        for candidate in (shape, shape.Located(TopLoc_Location())):
-            entity = self.transfer.EntityFromShapeResult(candidate, 1)
-            if entity is not None:
-                return entity
-        return None
+        """Return the record of which the kernel made a shape; None if it is unknown."""
+        return self.transfer.EntityFromShapeResult(shape, 1)
+
+
+def subshape_names(label: Any) -> dict[int, str]:
+    """Return the names of the solids and faces in the shape of a label that have one, by their hashes."""
+    labels = Sequence_TDF_Label()
+    XCAFDoc_ShapeTool.GetSubShapes_s(label, labels)
+    return {hash(XCAFDoc_ShapeTool.GetShape_s(piece)): label_name(piece) for piece in labels}
+
+
+def face_names(faces: Sequence[Any], names: dict[int, str]) -> list[str]:
+    """Return the names of faces in the file, "" for a face without a name."""
+    stripped = [names.get(hash(face), "").strip() for face in faces]
+    return ["" if name in NAMELESS or is_nameless(name) else name for name in stripped]
 
 
 def entity_name(entity: Any) -> str:
@@ -311,10 +313,7 @@ def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray]:
 
 
 def surface(face: Any) -> dict[str, Any] | None:
-    """Return the plane, cylinder, cone, sphere or torus of a face; None for another surface.
-
-    The axis of a plane is its normal on the outside of the face.
-    """
+    """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
     adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
     kind = adaptor.GetType().name.removeprefix("GeomAbs_")
     if kind in ("BSplineSurface", "BezierSurface"):
@@ -327,14 +326,9 @@ def surface(face: Any) -> dict[str, Any] | None:
 def recognized_surface(face: Any) -> dict[str, Any] | None:
     """Return the simple surface that a B-spline surface represents; None if there is none."""
     recognition = ShapeAnalysis_CanonicalRecognition(face)
-    for name, geometry, is_recognized in (
-        ("plane", gp_Pln(), recognition.IsPlane),
-        ("cylinder", gp_Cylinder(), recognition.IsCylinder),
-        ("cone", gp_Cone(), recognition.IsCone),
-        ("sphere", gp_Sphere(), recognition.IsSphere),
-    ):
-        if is_recognized(RECOGNITION_TOLERANCE, geometry):
-            return described(name, geometry, False)
+    for kind, geometry in (("Plane", gp_Pln()), ("Cylinder", gp_Cylinder()), ("Cone", gp_Cone()), ("Sphere", gp_Sphere())):
+        if getattr(recognition, f"Is{kind}")(RECOGNITION_TOLERANCE, geometry):
+            return described(kind.lower(), geometry, False)
     return None
 
 

@@ -16,6 +16,7 @@ _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
 _INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
 _DOCUMENTS = (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
 _ENTITY = re.compile(rb"\b(%b|GLOBAL_UNIT_ASSIGNED_CONTEXT|LENGTH_UNIT)\s*\(" % b"|".join(_DOCUMENTS))
+_NUMBER = re.compile(rb"(?:^|;)\s*#(\d+)\s*=")
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _REFERENCE = re.compile(rb"#(\d+)")
 _LINK = re.compile(rb"<([^<>]*)>")
@@ -82,6 +83,11 @@ def endless_number(content: bytes) -> str:
         return ""
     match = _ENDLESS.search(b"".join(_STRING.sub(b"''", _COMMENT.sub(b"", record[0])) for record in _RECORD.finditer(content)))
     return match[1].decode() if match else ""
+
+
+def record_numbers(content: bytes) -> list[int]:
+    """Return the numbers of all records in a STEP file, in their order."""
+    return [int(number) for number in _NUMBER.findall(_STRING.sub(b"", _COMMENT.sub(b"", content)))]
 
 
 def _records(content: bytes) -> Iterator[_Record]:
