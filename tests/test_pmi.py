@@ -4,13 +4,16 @@ import csv
 import io
 import json
 import random
+import re
 import time
 
 import pytest
 
 import tolcontact as tc
 from tests.helpers import call
+from tests.test_cad import COVER
 from tolcontact.errors import OptionError
+from tolcontact.geometry.step_listing import faces_of_records
 from tolcontact.pmi.part21 import Records
 
 AP242 = "AP242_MANAGED_MODEL_BASED_3D_ENGINEERING_MIM_LF { 1 0 10303 442 %d 1 4 }"
@@ -327,3 +330,34 @@ def test_a_file_that_states_nothing_is_told_in_a_sentence(content, words, tmp_pa
     done = call(tmp_path, "pmi", "part.stp")
     assert done.returncode == 0 and words in done.stdout and done.stdout.count("\n") == 1
     assert call(tmp_path, "pmi", "part.stp", "--csv").stdout.count("\n") == 1
+
+
+def cover_with_pmi(path):
+    """The cover with a flatness of its second face, between texts and comments that hold signs of records."""
+    text = COVER.read_text()
+    text = re.sub(r"FILE_SCHEMA\(.*?\);", f"FILE_SCHEMA(('{AP242 % 1}'));", text, flags=re.DOTALL)
+    faces = [int(number) for number in re.findall(r"#(\d+)", re.search(r"CLOSED_SHELL\('',\((.*?)\)", text, re.DOTALL)[1])]
+    length = re.search(r"#(\d+) = \( LENGTH_UNIT", text)[1]
+    more = f"""/* ; #5 = X( */ #90001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.05),#{length});
+#90003=FLATNESS_TOLERANCE('it''s; #7 = ','',#90001,#90004); #90004=SHAPE_ASPECT('','',#9,.T.);
+#90005=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#90004,#8,#{faces[1]});
+"""
+    end = text.rindex("ENDSEC;")
+    path.write_text(text[:end] + more + text[end:])
+    return faces
+
+
+def test_faces_of_tolerances_have_the_numbers_of_the_listing(tmp_path):
+    path = tmp_path / "cover.stp"
+    records = cover_with_pmi(path)
+    found = faces_of_records(path)
+    assert [found[record].number for record in records] == list(range(1, len(records) + 1))
+    done = call(tmp_path, "pmi", path.name, "--faces")
+    assert done.returncode == 0, done.stderr
+    (row,) = [line for line in done.stdout.splitlines() if "flatness" in line]
+    assert row.split() == ["1", "flatness", "0.05", "2"]
+    (row,) = csv.DictReader(io.StringIO(call(tmp_path, "pmi", path.name, "--csv", "--faces").stdout))
+    assert (row["faces"], row["face_records"]) == ("2", str(records[1]))
+    data = json.loads(call(tmp_path, "pmi", path.name, "--json", "--faces").stdout)
+    assert data["faces"][str(records[4])] == {"number": 5, "name": "", "bodies": [1]}
+    assert not faces_of_records(COVER)
