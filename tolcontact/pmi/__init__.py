@@ -44,7 +44,8 @@ AP242 edition 1: 1 tolerances, 0 dimensions, 0 datums
 `face_records` are the numbers of B-rep faces in the text of the file, `other_records` those of edges, curves and points: a
 tolerance of a thread is often stated on curves. Patterns, groups and derived features, such as a centre of symmetry, are
 resolved into their faces. A tolerance of the whole product (`extent` "all over") has all faces of the file. Some tolerances
-have no faces, because the file states none.
+have no faces, because the file states none. `tolcontact pmi FILE.stp --faces` reads the shapes, too, and gives the numbers that
+`tolcontact faces` lists.
 
 ## Limits
 
