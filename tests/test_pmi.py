@@ -338,7 +338,8 @@ def cover_with_pmi(path):
     text = re.sub(r"FILE_SCHEMA\(.*?\);", f"FILE_SCHEMA(('{AP242 % 1}'));", text, flags=re.DOTALL)
     faces = [int(number) for number in re.findall(r"#(\d+)", re.search(r"CLOSED_SHELL\('',\((.*?)\)", text, re.DOTALL)[1])]
     length = re.search(r"#(\d+) = \( LENGTH_UNIT", text)[1]
-    more = f"""/* ; #5 = X( */ #90001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.05),#{length});
+    more = f"""/* ; #5 = X( ' */ #90002=DESCRIPTIVE_REPRESENTATION_ITEM('/* no comment','it''s; #8=');
+#90001=LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(0.05),#{length});
 #90003=FLATNESS_TOLERANCE('it''s; #7 = ','',#90001,#90004); #90004=SHAPE_ASPECT('','',#9,.T.);
 #90005=GEOMETRIC_ITEM_SPECIFIC_USAGE('','',#90004,#8,#{faces[1]});
 """

@@ -58,6 +58,7 @@ def test_a_feature_on_half_a_hole_is_doubted_and_a_whole_one_has_its_axis():
         warnings.simplefilter("error")
         whole = discretize(plate_with(tc.Brep(7, whole=True))[0])
         discretize(plate_with(tc.Brep(6, 7))[0])
+        discretize(plate_with(tc.Brep(6), tc.Inside((0, 0, 2), (200, 200, 18)))[0])  # a part of the hole is what was asked for
     hole = next(nominal for nominal in whole.features if nominal.feature.name == "hole")
     assert np.allclose(hole.geometry.centre[:2], [47.5, 75 + 7.5 * 3**0.5], atol=1e-5)
     with pytest.raises(tc.ModelError, match="spans more than one surface"):

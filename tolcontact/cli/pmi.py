@@ -29,7 +29,6 @@ _CSV = (
 _TOLERANCES = ("", "kind", "value", "zone, modifiers", "datums", "faces")
 _DIMENSIONS = ("", "kind", "name", "nominal", "limits", "details", "faces")
 _DATUMS = ("", "faces", "targets")
-
 MAX_FACES = 12  # in a cell
 
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the tolerances and dimensions as CSV.")]
@@ -46,6 +45,8 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, with_fac
     only_one(json=as_json, csv=as_csv)
     information = read_pmi(file)
     faces = faces_of_records(file) if with_faces else {}
+    if with_faces and not faces and not information.is_empty:
+        typer.echo("warning: the faces have no numbers here: their records cannot be told, or the file has none", err=True)
     if as_json:
         listed = {"faces": {record: asdict(face) for record, face in faces.items()}} if with_faces else {}
         typer.echo(json.dumps(asdict(information) | listed, allow_nan=False))
@@ -96,7 +97,7 @@ def _sections(information: Pmi, faces: FacesOfRecords) -> Iterator[RenderableTyp
     listed = [(row.face_records, row.other_records) for row in information.tolerances]
     listed += [(row.face_records, row.other_records) for row in information.dimensions]
     listed += [(row.face_records, row.other_records) for row in information.datums]
-    if any(others and not faces for faces, others in listed):
+    if any(items and not records for records, items in listed):
         yield Text("\nin parentheses: edges, curves and points, where the file states no faces")
     bare = sum(not tolerance.face_records for tolerance in information.tolerances)
     if bare:

@@ -37,7 +37,9 @@ def _faces(assembly: Assembly) -> Iterator[tuple[str, Face]]:
 def _doubts(face: Face, meshes: Meshes) -> Iterator[str]:
     choices = [selection for selection in face.selections if isinstance(selection, Brep)]
     mesh = meshes[face.part]
-    if not choices or any(choice.whole for choice in choices) or BREP not in mesh.face_attributes:
+    if not choices or len(choices) < len(face.selections) or BREP not in mesh.face_attributes:
+        return
+    if any(choice.whole for choice in choices):
         return
     chosen = {int(number) + 1 for number in np.unique(np.asarray(mesh.face_attributes[BREP]).ravel()[triangles(face, meshes)])}
     for description in describe_faces(mesh):

@@ -60,8 +60,8 @@ class FaceInFile(Readable):
         if self.residual:
             entries.append(f"fitted within {self.residual:.1g} mm")
         if self.whole:
-            others = ", ".join(str(number) for number in self.whole if number != self.number)
-            entries.append(f"one surface with {others}")
+            neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
+            entries.append(f"one surface with {neighbours}")
         return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
@@ -110,18 +110,18 @@ def _wholes(mesh: trimesh.Trimesh, number_of: np.ndarray, faces: Sequence[FaceOn
         yield members if len(members) > 1 else ()
 
 
-def are_one_surface(mesh: trimesh.Trimesh, one: FaceOnSurface, other: FaceOnSurface) -> bool:
+def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceOnSurface) -> bool:
     """Return whether two faces are parts of one surface, with their outside on the same side of it."""
-    (surface, triangles), (other_surface, other_triangles) = one, other
-    if surface is None or other_surface is None or surface.kind != other_surface.kind:
+    (surface, triangles), (next_surface, next_triangles) = face, neighbour
+    if surface is None or next_surface is None or surface.kind != next_surface.kind:
         return False
-    if surface.is_fitted != other_surface.is_fitted:
+    if surface.is_fitted != next_surface.is_fitted:
         return False
-    if _is_outside(mesh, surface, triangles) != _is_outside(mesh, surface, other_triangles):
+    if _is_outside(mesh, surface, triangles) != _is_outside(mesh, surface, next_triangles):
         return False
-    vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[other_triangles])]
+    vertices = np.asarray(mesh.vertices)[np.unique(np.asarray(mesh.faces)[next_triangles])]
     distance = float(np.abs(surface.distance(vertices)[0]).max())
-    return distance <= RESIDUAL_FACTOR * (surface.residual + other_surface.residual) + POSITION_TOLERANCE * float(mesh.scale)
+    return distance <= RESIDUAL_FACTOR * (surface.residual + next_surface.residual) + POSITION_TOLERANCE * float(mesh.scale)
 
 
 def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.ndarray) -> bool:

@@ -87,7 +87,10 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
     Raises OptionError if the file cannot be read.
     """
     found: dict[int, RecordedFace] = {}
-    for number, body in enumerate(_product(path, LISTING_CHORD).bodies, start=1):
+    product = _product(path, LISTING_CHORD)
+    if not product.has_all_faces:  # faces without triangles have no number, and finer triangles may leave fewer of them
+        product = _product(path)
+    for number, body in enumerate(product.bodies, start=1):
         for face, (record, name) in enumerate(zip(body.face_records, body.face_names, strict=True), start=1):
             if record:
                 bodies = (*(found[record].bodies if record in found else ()), number)

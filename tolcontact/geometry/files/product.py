@@ -72,6 +72,12 @@ class Product:
             raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {len(self.bodies)}: {listed(self.bodies)}')
         return self.bodies[number]
 
+    @property
+    def has_all_faces(self) -> bool:
+        """Whether each B-rep face has triangles."""
+        pairs = np.unique(np.column_stack([self.shape, self.brep]), axis=0)
+        return len(pairs) == sum(map(len, self.surfaces))
+
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 

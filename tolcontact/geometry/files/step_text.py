@@ -16,6 +16,7 @@ _COMMENT = re.compile(rb"/\*(?:[^*]++|\*(?!/))*+\*/")
 _INSTANCE = re.compile(rb"\s*#(\d+)\s*=\s*(.*)", re.DOTALL)
 _DOCUMENTS = (b"DOCUMENT_FILE", b"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT")
 _ENTITY = re.compile(rb"\b(%b|GLOBAL_UNIT_ASSIGNED_CONTEXT|LENGTH_UNIT)\s*\(" % b"|".join(_DOCUMENTS))
+_IGNORED = re.compile(rb"'[^']*+'|" + _COMMENT.pattern)  # together: strings may hold signs of comments, and these quotes
 _NUMBER = re.compile(rb"(?:^|;)\s*#(\d+)\s*=")
 _STRING = re.compile(rb"'((?:[^']|'')*+)'")
 _REFERENCE = re.compile(rb"#(\d+)")
@@ -87,7 +88,7 @@ def endless_number(content: bytes) -> str:
 
 def record_numbers(content: bytes) -> list[int]:
     """Return the numbers of all records in a STEP file, in their order."""
-    return [int(number) for number in _NUMBER.findall(_STRING.sub(b"", _COMMENT.sub(b"", content)))]
+    return [int(number) for number in _NUMBER.findall(_IGNORED.sub(b"", content))]
 
 
 def _records(content: bytes) -> Iterator[_Record]:
