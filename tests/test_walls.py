@@ -58,7 +58,7 @@ APART = {
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "interrupts", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method",
-    "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "pmi", "features", "discretization",
+    "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features", "pmi", "discretization",
     "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report", "plot", "workflow",
     "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip

@@ -1,6 +1,5 @@
 """Descriptions of the faces of a part: B-rep faces of a STEP file, or smooth pieces of a mesh. Lengths in mm."""
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +18,7 @@ FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the
 RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 DESCRIPTIONS = "descriptions"
+ON_SURFACES = "on_surfaces"
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
@@ -79,19 +79,27 @@ def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSu
 def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
     """Return the faces of a part. Its mesh keeps them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
+        on_surfaces = faces_on_surfaces(mesh)
+        faces = [_description(mesh, number, own, surface) for number, (surface, own) in enumerate(on_surfaces, start=1)]
+        if BREP in mesh.face_attributes:
+            names = mesh.metadata.get(FACE_NAMES) or [""] * len(faces)
+            faces = [replace(face, name=name) for face, name in zip(faces, names, strict=True)]
+            wholes = _wholes(mesh, number_faces(mesh)[0], on_surfaces)
+            faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
+        mesh.metadata[DESCRIPTIONS] = tuple(faces)
+    return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
+
+
+def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
+    """Return for each face of a part its surface, stated or fitted, and its triangles. Its mesh keeps them."""
+    if ON_SURFACES not in mesh.metadata:
         number_of, stated = number_faces(mesh)
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
         surfaces = [surface or fit_surface(corners[own], FIT_TOLERANCE) for own, surface in zip(groups, stated, strict=True)]
-        faces = [_description(mesh, *entry) for entry in zip(itertools.count(1), groups, surfaces)]
-        if BREP in mesh.face_attributes:
-            names = mesh.metadata.get(FACE_NAMES) or [""] * len(stated)
-            faces = [replace(face, name=name) for face, name in zip(faces, names, strict=True)]
-            wholes = _wholes(mesh, number_of, list(zip(surfaces, groups, strict=True)))
-            faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
-        mesh.metadata[DESCRIPTIONS] = tuple(faces)
-    return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
+        mesh.metadata[ON_SURFACES] = tuple(zip(surfaces, groups, strict=True))
+    return mesh.metadata[ON_SURFACES]  # type: ignore[no-any-return]
 
 
 def whole_surfaces(mesh: trimesh.Trimesh) -> np.ndarray:

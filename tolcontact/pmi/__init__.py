@@ -56,6 +56,11 @@ own is listed without it. A damaged file leads to a single message.
 """
 
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance
+from tolcontact.pmi.declared import DeclaredAnnotation, DeclaredPmi
+from tolcontact.pmi.declaring import features_from_pmi
 from tolcontact.pmi.reading import read_pmi
 
-__all__ = ["Datum", "DatumReference", "DatumTarget", "Dimension", "Pmi", "Tolerance", "read_pmi"]
+__all__ = [
+    "Datum", "DatumReference", "DatumTarget", "DeclaredAnnotation", "DeclaredPmi", "Dimension", "Pmi", "Tolerance",
+    "features_from_pmi", "read_pmi",
+]  # fmt: skip

@@ -5,6 +5,7 @@ Records are numbers of the file: #12 is 12. `face_records` are B-rep faces; `oth
 
 from dataclasses import dataclass
 
+from tolcontact.declaration.values import Vector
 from tolcontact.errors import shown
 from tolcontact.readable import Readable
 
@@ -141,11 +142,15 @@ class Dimension(Readable):
 
 @dataclass(frozen=True, repr=False)
 class DatumTarget(Readable):
-    """A datum target: its `label` (A1), its `kind` in the file's words ("point", "circle", ...), and its records."""
+    """A datum target: its `label` (A1), its `kind` in the file's words ("point", "circle", ...), and its records.
+
+    point   its place in the frame of its product [mm]; None if the file states none
+    """
 
     label: str
     kind: str
     record: int
+    point: Vector | None
     face_records: tuple[int, ...]
     other_records: tuple[int, ...]
 

@@ -2,10 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 
+from tolcontact.declaration.values import Vector
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget
 from tolcontact.pmi.aspects import TARGETS, Aspects
 from tolcontact.pmi.part21 import Parameters, Records, Reference, Typed, Word, flat
 from tolcontact.pmi.quantities import length
+from tolcontact.pmi.target_points import target_points
 
 _COMPARTMENT, _ELEMENT = "DATUM_REFERENCE_COMPARTMENT", "DATUM_REFERENCE_ELEMENT"
 _EARLIER = ("DATUM_REFERENCE", "REFERENCED_MODIFIED_DATUM")  # references without a datum system
@@ -14,12 +16,16 @@ _EARLIER = ("DATUM_REFERENCE", "REFERENCED_MODIFIED_DATUM")  # references withou
 def datums_of(records: Records, aspects: Aspects) -> tuple[Datum, ...]:
     """Return the datums of a file, in the order of their records."""
     datums = []
+    points = target_points(records)
     for number in records.numbers("DATUM"):
         features = aspects.datum_features.get(number, [])
-        targets = tuple(_target(records, aspects, feature, _letter(records, number)) for feature in _targets(records, features))
+        letter = _letter(records, number)
+        targets = tuple(
+            _target(records, aspects, feature, letter, points.get(feature)) for feature in _targets(records, features)
+        )
         named = [part for target in targets for part in aspects.datum_features.get(target.record, ())]
         items = aspects.items(number, *features, *named)
-        datums.append(Datum(_letter(records, number), number, targets, items.faces, items.others))
+        datums.append(Datum(letter, number, targets, items.faces, items.others))
     return tuple(datums)
 
 
@@ -81,9 +87,9 @@ def _targets(records: Records, features: Sequence[int]) -> list[int]:
     return [feature for feature in features if records.has(feature, *TARGETS)]
 
 
-def _target(records: Records, aspects: Aspects, number: int, letter: str) -> DatumTarget:
+def _target(records: Records, aspects: Aspects, number: int, letter: str, point: Vector | None) -> DatumTarget:
     parameters = records.parameters(number, *TARGETS)
     label = letter + parameters.text(len(parameters) - 1)
     kind = records.parameters(number, *TARGETS, "SHAPE_ASPECT").text(1)
     items = aspects.items(number, *aspects.datum_features.get(number, ()))
-    return DatumTarget(label, kind, number, items.faces, items.others)
+    return DatumTarget(label, kind, number, point, items.faces, items.others)

@@ -105,7 +105,8 @@ class Records:
         self._entities: dict[int, str] = {}  # of simple instances, so that most records are never parsed
         self._parsed: dict[int, Mapping[str, Parameters]] = {}
         self._numbers: dict[str, list[int]] = defaultdict(list)
-        if not self._scan(_COMMENT.sub(rb"\1", content) if b"/*" in content else content):
+        self._content = _COMMENT.sub(rb"\1", content) if b"/*" in content else content
+        if not self._scan(self._content):
             raise OptionError(
                 f'"{title}" is cut off, or a text in it is not closed: it does not end with END-ISO-10303-21; export it again'
             )
@@ -149,6 +150,16 @@ class Records:
         """Return the parameters of a record as the first of `entities` that it is and that has any; else none."""
         instance = self.entities(number)
         return next((instance[entity] for entity in entities if instance.get(entity)), Parameters())
+
+    def shapes(self, *numbers: int) -> dict[int, Parameters]:
+        """Return the parameters of records of shapes, by their numbers. All of the file is searched, once for each call."""
+        found, wanted = dict[int, Parameters](), frozenset(numbers)
+        for match in _STATEMENT.finditer(self._content) if numbers else ():
+            number, entity, body, _ = match.groups()
+            if number is not None and entity is not None and int(number) in wanted:
+                values = _parse(body)
+                found[int(number)] = next((value for value in values or () if isinstance(value, Parameters)), Parameters())
+        return found
 
     def _scan(self, content: bytes) -> bool:
         """Take the records of a file, and return whether it is complete."""

@@ -30,6 +30,13 @@ def length(records: Records, number: int) -> float | None:
     return measure.value if measure and measure.unit == "mm" else None
 
 
+def length_unit(records: Records, context: int) -> float | None:
+    """Return the unit [mm] of lengths in the context of a representation; None if it states none."""
+    assigned = records.parameters(context, "GLOBAL_UNIT_ASSIGNED_CONTEXT")
+    units = (_unit(records, number, MAX_CONVERSIONS) for number in assigned.references(0))
+    return next((unit.value for unit in units if unit is not None and unit.unit == "mm"), None)
+
+
 def _quantity(records: Records, number: int, conversions: int) -> Quantity | None:
     for entity, parameters in records.entities(number).items():
         if entity.endswith(("MEASURE_WITH_UNIT", "MEASURE_REPRESENTATION_ITEM")) and parameters:

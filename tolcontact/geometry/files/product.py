@@ -30,6 +30,7 @@ MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
 SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
 FACE_NAMES = "face_names"  # in its metadata: the name of each B-rep face; empty if the file names none
+FACE_RECORDS = "face_records"  # in its metadata: the number of the record of each B-rep face; 0 if the file states no PMI
 
 log = logging.getLogger(__name__)
 
@@ -81,7 +82,7 @@ class Product:
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES and FACE_NAMES.
+        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and FACE_RECORDS.
         """
         body = self.body(selector)
         triangles = body.triangles
@@ -100,6 +101,7 @@ class Product:
         mesh.face_attributes[BREP] = brep.ravel()
         mesh.metadata[SURFACES] = surfaces
         mesh.metadata[FACE_NAMES] = body.face_names if any(body.face_names) else ()
+        mesh.metadata[FACE_RECORDS] = body.face_records
         self._check_closed(body, mesh)
         return mesh
 

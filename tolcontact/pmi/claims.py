@@ -1,0 +1,108 @@
+"""Where on a part the annotations of a file apply: each claims surfaces, which become features."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
+from tolcontact.pmi.declarable import Undeclared
+from tolcontact.pmi.declared import Annotation, DeclaredAnnotation
+from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
+
+Place = tuple[frozenset[int], ...]  # of a feature: the numbers of the faces of its surface, or of each of its two planes
+_MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
+
+
+@dataclass(eq=False)
+class Claim:
+    """An annotation, the faces that it claims, the names of the features that state it, and the reasons why others do not.
+
+    stated    number of faces and targets that the file states for it
+    numbers   of those of its faces that are on the part
+    places    of the features that are to state it
+    """
+
+    annotation: Annotation
+    stated: int
+    numbers: list[int]
+    places: list[Place] = field(default_factory=list)
+    features: list[str] = field(default_factory=list)
+    reasons: list[str] = field(default_factory=list)
+
+    @property
+    def result(self) -> DeclaredAnnotation:
+        return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(dict.fromkeys(self.reasons)))
+
+
+def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
+    """Return the claims of all annotations of a file on the surfaces of a part, in the order of the file.
+
+    Those of fewest faces find their places first, so that a note for many faces cannot join what others tell apart.
+    """
+    claims = [_datum_claim(datum, surfaces) for datum in pmi.datums]
+    for annotation in (*pmi.dimensions, *pmi.tolerances):
+        records = annotation.face_records
+        claims.append(Claim(annotation, len(records), surfaces.numbers(records)))
+    place_of: dict[int, Place] = {}
+    for claim in sorted(claims, key=lambda claim: len(claim.numbers)):
+        try:
+            _check(claim.annotation)
+            claim.places = _places(claim, surfaces, place_of)
+        except Undeclared as reason:
+            claim.reasons.append(str(reason))
+        place_of |= {number: place for place in claim.places for surface in place for number in surface if number not in place_of}
+    return claims
+
+
+def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
+    """Return the claim of a datum: of its features, else of its targets, which may be areas of faces or points on them."""
+    if datum.face_records:
+        return Claim(datum, len(datum.face_records), surfaces.numbers(datum.face_records))
+    records = [record for target in datum.targets for record in target.face_records]
+    points = [target.point for target in datum.targets if target.point is not None and not target.face_records]
+    numbers = list(dict.fromkeys([*surfaces.numbers(records), *surfaces.numbers_at(points)]))
+    return Claim(datum, len(records) + len(points), numbers)
+
+
+def _check(annotation: Annotation) -> None:
+    """Raise Undeclared if an annotation is not one of features."""
+    if isinstance(annotation, Dimension) and annotation.kind != "size":
+        raise Undeclared(f"it is {'an' if annotation.kind[0] in 'aeiou' else 'a'} {annotation.kind}, and features have sizes only")
+    if isinstance(annotation, Tolerance) and annotation.extent == "all over":
+        raise Undeclared("it is for all faces of the file; declare it for the faces that matter")
+
+
+def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Place]) -> list[Place]:
+    """Return the places of a claim: those of earlier claims on the same faces, and new ones."""
+    numbers = claim.numbers
+    if not numbers:
+        raise Undeclared("none of its faces is on this part" if claim.stated else "the file states no face for it")
+    if len(numbers) < claim.stated and isinstance(claim.annotation, Tolerance | Dimension):
+        claim.reasons.append(f"{claim.stated - len(numbers)} of its {claim.stated} faces are not on this part")
+    groups = surfaces.surfaces(numbers)
+    if surfaces.are_opposed(groups) and _has_middle(claim.annotation, tuple(groups), place_of):
+        return [_pair(groups, place_of)]
+    claimed = {number for group in groups for number in group}
+    earlier = list(dict.fromkeys(place_of[number] for number in sorted(claimed) if number in place_of))
+    for place in earlier:
+        if not all(surface <= claimed for surface in place):
+            faces = ", ".join(str(number) for number in sorted(n for surface in place for n in surface))
+            raise Undeclared(f"it is for a part of what others tolerance as one feature, faces {faces}")
+    return [*earlier, *((surface,) for surface in surfaces.surfaces(sorted(claimed - place_of.keys())))]
+
+
+def _has_middle(annotation: Annotation, groups: Place, place_of: dict[int, Place]) -> bool:
+    """Return whether an annotation of two opposed planes is one of their middle, or of their distance."""
+    if isinstance(annotation, Tolerance):
+        return annotation.kind in _MEDIAN_KINDS or set(place_of.get(min(groups[0]), ())) == set(groups)
+    return True
+
+
+def _pair(groups: Sequence[frozenset[int]], place_of: dict[int, Place]) -> Place:
+    """Return the place of two opposed planes. Raises Undeclared if one of them belongs to another place."""
+    places = {place_of.get(number) for group in groups for number in group}
+    if places == {None}:
+        return tuple(groups)
+    (first, *others) = places
+    if not others and first is not None and set(first) == set(groups):
+        return first
+    raise Undeclared("its two planes have tolerances of their own, so they are no slot or tab")

@@ -1,0 +1,83 @@
+"""What features can state of the annotations of a file: tolerances and sizes as they are declared. Lengths in mm."""
+
+from collections.abc import Callable
+
+from tolcontact.declaration import feature_tolerance as declared
+from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance, Size
+from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
+
+_KINDS = {
+    "surface profile": declared.Profile, "circular runout": declared.CircularRunout, "total runout": declared.TotalRunout,
+    "concentricity": declared.Coaxiality,
+}  # fmt: skip
+_MATERIALS = {"maximum material requirement": "M", "least material requirement": "L"}
+_ROUND_ZONES = ("cylindrical or circular", "within a cylinder", "within a circle", "spherical", "within a sphere")
+_UNCHANGED = ("common zone", "separate requirement")  # modifiers that the faces of a tolerance have told already
+_MODIFIED = {
+    "free state": "it is for the part in its free state, and parts are rigid here",
+    "statistical tolerance": "it is a statistical tolerance, whose process the file does not state",
+}
+MAX_SIZE_DIFFERENCE = 1.0  # in widths of the limits: between them and the size of the shape
+
+
+class Undeclared(Exception):
+    """An annotation that no feature can state; the message is the reason."""
+
+
+def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
+    """Return a tolerance of a feature, with or without an axis, as it is declared. Raises Undeclared with the reason."""
+    kind = _KINDS.get(stated.kind) or DECLARED_KINDS.get(stated.kind)
+    if kind is None:
+        raise Undeclared("its kind is not stated" if not stated.kind else f"its kind, {stated.kind}, is none of a feature")
+    if stated.value is None:
+        raise Undeclared("its value is not stated")
+    if stated.maximum is not None:
+        raise Undeclared("its value has an upper bound, which zones do not have")
+    options: dict[str, object] = {}
+    for modifier in stated.modifiers:
+        if modifier in _MATERIALS:
+            options["material"] = _MATERIALS[modifier]
+        elif modifier not in _UNCHANGED:
+            raise Undeclared(_MODIFIED.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance"))
+    if stated.per_unit:
+        raise Undeclared("it is per unit of length or area")
+    if stated.projected is not None:
+        options["projected"] = stated.projected
+    if stated.displacement is not None:
+        options["outside"] = stated.displacement
+    has_zone = "zone" in kind.options
+    if is_axis and has_zone and stated.zone not in _ROUND_ZONES:
+        raise Undeclared("its zone is flat, and the file does not state across which direction")
+    system = "|".join(map(_compartment, stated.datums))
+    result = kind(stated.value, system, **options)
+    if not system and kind.needs_datums:
+        raise Undeclared("it needs datums, and the file states none")
+    for fault in result.faults():
+        raise Undeclared(fault)
+    return result
+
+
+def _compartment(reference: DatumReference) -> str:
+    """Return a place of a datum system as it is declared."""
+    materials = [_MATERIALS[modifier] for modifier in reference.modifiers if modifier in _MATERIALS]
+    if others := [modifier for modifier in reference.modifiers if modifier not in _MATERIALS]:
+        raise Undeclared(f"datum {'-'.join(reference.letters)} has the modifier {others[0]}, which datums here do not have")
+    return "-".join(reference.letters) + "".join(f"({material})" for material in materials[:1])
+
+
+def size(stated: Dimension, nominal: float) -> Size:
+    """Return the size of a shape of `nominal` size [mm], with the limits of a dimension about it.
+
+    Raises Undeclared with the reason.
+    """
+    if stated.lower is None or stated.upper is None:
+        raise Undeclared(f"its limits are not stated{f': its fit {stated.fit} is not turned into limits' if stated.fit else ''}")
+    if stated.unit != "mm":
+        raise Undeclared("it is an angle")
+    factor = 2.0 if "radius" in stated.name else 1.0
+    lower, upper = factor * stated.lower, factor * stated.upper
+    if not lower < upper:
+        raise Undeclared(f"its limits {lower:g} and {upper:g} leave no width")
+    if not lower - MAX_SIZE_DIFFERENCE * (upper - lower) <= nominal <= upper + MAX_SIZE_DIFFERENCE * (upper - lower):
+        raise Undeclared(f"its limits are {lower:.6g} to {upper:.6g}, and the size of the shape is {nominal:.6g}")
+    return Size(nominal, upper - nominal, lower - nominal)
