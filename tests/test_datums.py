@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
+from tests import cases
 from tolcontact.declaration.script import load_model
 from tolcontact.variation import draw
 
@@ -105,3 +106,45 @@ def test_a_shift_that_follows_from_tilts_has_no_other_cause(declare):
     declare(model, "plate.far.datum B of A|B|C")
     (fault,) = tc.check(model)
     assert '"plate.far.datum B of A|B|C" follows from the tilts of its datum' in fault
+
+
+
+
+def block_with_top(*tolerances):
+    model = tc.Assembly("composite")
+    block = model.part("block", tc.Box(100, 50, 10), at=(3, 4, 5), rotation=(0.1, 0.2, 0.3), fixed=True)
+    block.feature("foot", block.face("-z"), datum="A")
+    block.feature("side", block.face("-y"), datum="B")
+    block.feature("end", block.face("-x"), datum="C")
+    top = block.feature("top", block.face("+z"), *tolerances)
+    model.measure("height", top.point(0, 0, 10), along="z")
+    return model
+
+
+def test_the_lower_segment_of_a_composite_frame_limits_tilts_as_an_orientation_tolerance_does():
+    lower = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Profile(0.1, "A><"))
+    oriented = block_with_top(tc.Profile(0.5, "A|B|C"), tc.Parallelism(0.1, "A"))
+    spreads = [[contributor.spread for contributor in tc.build(model).draws.contributors] for model in (lower, oriented)]
+    assert spreads[0] == pytest.approx(spreads[1], rel=1e-9)
+    zones = tc.check_population(lower, samples=20_000).share_inside
+    assert (zones.sel(interval="lower") < 0.9973).all() and (zones.sel(interval="upper") > 0.9973).all()
+
+
+@pytest.mark.parametrize(("system", "follows"), [("A|D|C", True), ("A><|D><|C><", False)])
+def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system, follows):
+    model = tc.Assembly("cover")
+    part = model.part("cover", tc.Mesh(cases.MODELS / "cover.step"), fixed=True)
+    part.feature("under", part.face("-z"), datum="A")
+    part.feature("side", part.face("-y", lambda c, n: c[:, 1] < 1e-3), datum="B")
+    part.feature("end", part.face("-x", lambda c, n: c[:, 0] < 1e-3), datum="C")
+    part.feature("far", part.face(tc.Largest("plane", "+y")), tc.Profile(0.3, "A|B|C"), datum="D", association="least squares")
+    hole = part.feature("hole", part.face(tc.Brep((19.05, 15.0, 1))), tc.Position(1e-6, system))
+    model.measure("hole", hole.axis(1), along="y")
+    program = tc.build(model)
+    hole, deviations = program.nominal.features[-1], program.draws(seed=1, start=0, stop=100)
+    coordinates = dict(zip(hole.geometry.names, hole.coordinates @ deviations[:, : hole.coordinates.shape[1]].T, strict=True))
+    far = next(feature for feature in program.nominal.features if feature.feature.name == "far")
+    tilt = deviations[:, program.nominal.contributors.index("cover.far.tilt z")]
+    assert tilt.std() > 0.01
+    assert coordinates["tilt x"] == pytest.approx(0 * tilt, abs=1e-5)  # the hole is square to A first
+    assert (coordinates["shift y"].std() > 0.01) == follows

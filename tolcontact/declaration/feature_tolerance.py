@@ -18,7 +18,7 @@ MATERIALS = ("", "M", "L")
 MOVES = ("both", "first", "second")
 ZONES = ("round", "flat")
 AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
-COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?")
+COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 
 
 @dataclass(frozen=True, repr=False)
@@ -75,7 +75,8 @@ class Size(Readable):
 class GeometricTolerance(Readable):
     """A zone of full width `width` [mm] (of a round zone the diameter) for a feature.
 
-    datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier
+    datums      the datum system, "A|B|C": primary, secondary, tertiary; "A-B" is a common datum, "B(M)" one with a modifier,
+                and "A><" one that locks directions alone, and no places, as in the lower segment of a composite frame
     zone        "round" or "flat", for axes; by default round. `along` is the direction across a flat zone's planes
     material    "M" or "L": the zone grows as the feature's size departs from its maximum (least) material size
     bonus       "fills": the process fills the larger zone; "accepts": only a check of parts uses it; or "none"
@@ -120,6 +121,11 @@ class GeometricTolerance(Readable):
         return tuple(tuple(match.group(1).split("-")) for match in matches if match)
 
     @property
+    def orientation_only(self) -> tuple[bool, ...]:
+        """Whether a compartment locks directions alone: one for each."""
+        return tuple(compartment.endswith("><") for compartment in self._compartments)
+
+    @property
     def _compartments(self) -> list[str]:
         if not (self.datums and isinstance(self.datums, str)):
             return []
@@ -144,7 +150,7 @@ class GeometricTolerance(Readable):
             or not all(map(COMPARTMENT.fullmatch, self._compartments))
             or len(self._compartments) > 3
         ):
-            yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)" or "A-B"'
+            yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)", "A-B" or "A><"'
             return
         if self.needs_datums and not self.datums:
             yield f'it needs datums; give them as in tc.{type(self).__name__}({self.width!r}, "A|B|C")'

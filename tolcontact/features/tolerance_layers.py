@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
@@ -104,25 +105,30 @@ class Layer:
         return np.asarray(self.added @ self.added.T @ geometry.values @ self.frame.motion)
 
 
-def datum_frame(system: Sequence[Sequence[Datum]], centre: np.ndarray, reach: float, columns: int) -> DatumFrame:
+def datum_frame(
+    system: Sequence[Sequence[Datum]], centre: np.ndarray, reach: float, columns: int, orientation_only: Sequence[bool]
+) -> DatumFrame:
     """Return the frame of datums in their precedence: each takes what it notices of the freedoms left by those before it.
 
-    The datums of one compartment count together, by least squares of their coordinates. A plane by itself is then shifted to
+    Compartments that are `orientation_only` notice no translations (ISO 5459, "><"). The datums of one compartment count together, by least squares of their coordinates. A plane by itself is then shifted to
     its extreme outside of the material (ISO 5459), unless its association is by least squares. Angles are weighed by `reach`
     [mm].
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     motion, free, leans = np.zeros((6, columns)), np.eye(6), list[Lean]()
-    for compartment in system:
+    for compartment, is_turned in zip(system, orientation_only, strict=True):
         values = np.vstack([datum.geometry.about(centre) for datum in compartment]) @ to_twist
         coordinates = np.vstack([padded(datum.coordinates, motion.shape[1]) for datum in compartment])
+        if is_turned:
+            turns = scipy.linalg.null_space(values[:, :3].T, rcond=RANK_TOLERANCE)
+            values, coordinates = turns.T @ values, turns.T @ coordinates
         U, S, Vt = np.linalg.svd(values @ free)
         largest = S.max(initial=0.0)
         rank = int((S > MIN_NOTICED * max(largest, 1e-300)).sum()) if largest > MIN_NOTICED else 0
         if rank:
             inverse = Vt[:rank].T @ (U[:, :rank] / S[:rank]).T
             motion = motion + free @ inverse @ (coordinates - values @ motion)
-            lean = _lean(compartment, coordinates - values @ motion)
+            lean = None if is_turned else _lean(compartment, coordinates - values @ motion)
             if lean is not None:
                 leans.append(lean)
                 shift = free @ inverse @ compartment[0].geometry.values @ _translation(compartment[0].geometry)
@@ -187,7 +193,7 @@ def _layer(tolerance: GeometricTolerance, geometry: FeatureGeometry, datums: Map
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
     system = [[datums[letter] for letter in compartment] for compartment in tolerance.system]
     rows = zone_of(tolerance, geometry, system[0][0].geometry if system else None).rows
-    frame = datum_frame(system, geometry.centre, geometry.reach, columns)
+    frame = datum_frame(system, geometry.centre, geometry.reach, columns, tolerance.orientation_only)
     nothing = np.zeros((len(geometry.names), 0))
     controlled = _controlled(rows, geometry, frame) if system else nothing
     if len(rows) and system and not controlled.shape[1]:

@@ -48,7 +48,8 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     has_zone = "zone" in kind.options
     if is_axis and has_zone and stated.zone not in _ROUND_ZONES:
         raise Undeclared("its zone is flat, and the file does not state across which direction")
-    system = "|".join(map(_compartment, stated.datums))
+    mark = "" if stated.refines is None else "><"  # the lower segments of a composite frame lock directions alone
+    system = "|".join(_compartment(reference) + mark for reference in stated.datums)
     result = kind(stated.value, system, **options)
     if not system and kind.needs_datums:
         raise Undeclared("it needs datums, and the file states none")

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
 from tolcontact.declaration import OUTSIDE, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import INSIDE
@@ -76,7 +77,7 @@ def _measured_tolerance(
     zone = zone_of(tolerance, feature.geometry, system[0][0].geometry)
     places, directions = zone.probes
     measurement = _measurement(feature, places, directions, deviations, feature.geometry.centre)
-    motion, free = _fitted_frame(feature, system, deviations)
+    motion, free = _fitted_frame(feature, system, deviations, tolerance.orientation_only)
     residuals = measurement.values - motion @ measurement.rows.T
     # The zone follows the feature in the motions that the datums leave free.
     U, S, _ = np.linalg.svd(measurement.rows @ free, full_matrices=False)
@@ -115,7 +116,10 @@ def _touches_outside(datum: NominalFeature) -> bool:
 
 
 def _fitted_frame(
-    feature: NominalFeature, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
+    feature: NominalFeature,
+    system: Sequence[Sequence[NominalFeature]],
+    deviations: np.ndarray,
+    orientation_only: Sequence[bool],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the motions (n, 6) of the datum frame about the feature's centre, and a basis (6, freedom) of its free motions.
 
@@ -125,17 +129,20 @@ def _fitted_frame(
     centre = feature.geometry.centre
     free = np.diag([1.0] * 3 + [1 / feature.geometry.reach] * 3)
     motion = np.zeros((len(deviations), 6))
-    for compartment in system:
+    for compartment, is_turned in zip(system, orientation_only, strict=True):
         measurements = [_measurement(datum, *datum.geometry.extremes, deviations, centre) for datum in compartment]
         rows = np.vstack([measurement.rows for measurement in measurements])
         values = np.hstack([measurement.values for measurement in measurements])
+        if is_turned:  # what any translation changes is not measured
+            seen = scipy.linalg.orth(rows[:, :3])
+            rows, values = rows - seen @ (seen.T @ rows), values - values @ seen @ seen.T
         _, S, Vt = np.linalg.svd(rows @ free)
         rank = int((S > MIN_NOTICED * max(S.max(initial=0.0), 1.0)).sum())
         locked, free = free @ Vt[:rank].T, free @ Vt[rank:].T
         residuals = values - motion @ rows.T
         locked_motion, *_ = np.linalg.lstsq(rows @ locked, residuals.T, rcond=None)
         motion = motion + (locked @ locked_motion).T
-        if len(compartment) == 1 and _touches_outside(compartment[0]):
+        if not is_turned and len(compartment) == 1 and _touches_outside(compartment[0]):
             outermost = (values - motion @ rows.T).max(axis=1)
             shift, *_ = np.linalg.lstsq(rows @ locked, np.ones(len(rows)), rcond=None)
             motion = motion + outermost[:, None] * (locked @ shift)
