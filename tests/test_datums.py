@@ -108,8 +108,6 @@ def test_a_shift_that_follows_from_tilts_has_no_other_cause(declare):
     assert '"plate.far.datum B of A|B|C" follows from the tilts of its datum' in fault
 
 
-
-
 def block_with_top(*tolerances):
     model = tc.Assembly("composite")
     block = model.part("block", tc.Box(100, 50, 10), at=(3, 4, 5), rotation=(0.1, 0.2, 0.3), fixed=True)
@@ -143,7 +141,6 @@ def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system
     program = tc.build(model)
     hole, deviations = program.nominal.features[-1], program.draws(seed=1, start=0, stop=100)
     coordinates = dict(zip(hole.geometry.names, hole.coordinates @ deviations[:, : hole.coordinates.shape[1]].T, strict=True))
-    far = next(feature for feature in program.nominal.features if feature.feature.name == "far")
     tilt = deviations[:, program.nominal.contributors.index("cover.far.tilt z")]
     assert tilt.std() > 0.01
     assert coordinates["tilt x"] == pytest.approx(0 * tilt, abs=1e-5)  # the hole is square to A first

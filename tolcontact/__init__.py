@@ -69,7 +69,7 @@ from importlib import import_module
 
 import lazy_loader
 
-from tolcontact.readable import FORMATTERS, HTML
+from tolcontact.later import HTML, LATER, PMI
 
 
 def _notebook_html(thing: object) -> str:
@@ -77,6 +77,11 @@ def _notebook_html(thing: object) -> str:
     return str(import_module("tolcontact.report.notebook").html_of(thing))
 
 
-FORMATTERS[HTML] = _notebook_html
+def _features_from_pmi(part: object) -> object:
+    """Return what `Part.features_from_pmi` declares. Reading is imported when a script first asks for it."""
+    return import_module("tolcontact.pmi").features_from_pmi(part)
+
+
+LATER[HTML], LATER[PMI] = _notebook_html, _features_from_pmi
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

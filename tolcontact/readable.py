@@ -1,11 +1,8 @@
 """Base classes for objects that print as readable rows in a console, and show pictures in a notebook."""
 
 import html
-from collections.abc import Callable
 
-# Formatters by media type. The front of the package registers them, so that this file imports nothing that comes after it.
-FORMATTERS: dict[str, Callable[[object], str]] = {}
-HTML = "text/html"
+from tolcontact.later import HTML, LATER
 
 
 class Readable:
@@ -22,4 +19,4 @@ class Pictured(Readable):
     """An object that a notebook shows as a picture."""
 
     def _repr_html_(self) -> str:
-        return FORMATTERS[HTML](self)
+        return str(LATER[HTML](self))

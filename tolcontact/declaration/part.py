@@ -3,11 +3,13 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.values import Vector, is_finite, is_length, script_line, vector
+from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
 
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
@@ -60,6 +62,16 @@ class Part(Readable):
     def add(self, *features: "Feature") -> None:
         """Add declared features to this part."""
         self._features.extend(features)
+
+    def features_from_pmi(self) -> Any:
+        """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
+
+        It lists every tolerance, dimension and datum of the file with the features that state it, or with the reason why none
+        does. Faces of one surface are one feature, and so are the two planes of a slot or a tab whose size or position is
+        toleranced. A feature is named after the letter of its datum, else after its kind and the number of its first face, as
+        in "cylinder 12". Raises ModelError if the file cannot be read, or states no PMI.
+        """
+        return LATER[PMI](self)
 
     def point(self, x: float, y: float, z: float) -> "Point":
         """Return the point (x, y, z) [mm] of this part, in its own frame."""

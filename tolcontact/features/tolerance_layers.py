@@ -110,9 +110,9 @@ def datum_frame(
 ) -> DatumFrame:
     """Return the frame of datums in their precedence: each takes what it notices of the freedoms left by those before it.
 
-    Compartments that are `orientation_only` notice no translations (ISO 5459, "><"). The datums of one compartment count together, by least squares of their coordinates. A plane by itself is then shifted to
-    its extreme outside of the material (ISO 5459), unless its association is by least squares. Angles are weighed by `reach`
-    [mm].
+    Compartments that are `orientation_only` notice no translations (ISO 5459, "><"). The datums of one compartment count
+    together, by least squares of their coordinates. A plane by itself is then shifted to its extreme outside of the material
+    (ISO 5459), unless its association is by least squares. Angles are weighed by `reach` [mm].
     """
     to_twist = np.diag([1.0] * 3 + [1 / reach] * 3)
     motion, free, leans = np.zeros((6, columns)), np.eye(6), list[Lean]()

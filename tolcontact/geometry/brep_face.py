@@ -102,6 +102,15 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
     return mesh.metadata[ON_SURFACES]  # type: ignore[no-any-return]
 
 
+def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
+    """Return the numbers of the faces that are nearest to a point, several where they meet, and their distance [mm]."""
+    number_of, _ = number_faces(mesh)
+    places = np.tile(point, (len(number_of), 1))
+    distances = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, places) - places, axis=1)
+    nearest = np.unique(number_of[distances < distances.min() + POSITION_TOLERANCE * mesh.scale])
+    return [int(number) + 1 for number in nearest], float(distances.min())
+
+
 def whole_surfaces(mesh: trimesh.Trimesh) -> np.ndarray:
     """Return the number of the whole surface of each B-rep face (face,): faces of one surface that touch have the same one."""
     return np.array([face.whole[0] if face.whole else face.number for face in describe_faces(mesh)], dtype=np.int64)

@@ -12,7 +12,7 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces, whole_surfaces
+from tolcontact.geometry.brep_face import FaceInFile, describe_faces, faces_at, number_faces, whole_surfaces
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
@@ -166,19 +166,19 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
     if BREP not in mesh.face_attributes:
         raise GeometryFault(f"face {face}: its part is not a STEP file, so it has no B-rep faces; use another criterion")
     brep = np.asarray(mesh.face_attributes[BREP]).ravel()
-    numbers = [number for which in selection.which for number in _brep_numbers(face, mesh, brep, which)]
+    numbers = [number for which in selection.which for number in _brep_numbers(face, mesh, which)]
     if selection.whole:
         group = whole_surfaces(mesh)
         return np.isin(group[brep], group[numbers])
     return np.isin(brep, numbers)
 
 
-def _brep_numbers(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, which: int | str | Vector) -> np.ndarray:
+def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) -> np.ndarray:
     """Return the numbers of B-rep faces, from 0, that a number from 1, a name or a point chooses."""
     if isinstance(which, str):
         return _by_name(face, mesh.metadata[FACE_NAMES], which)
     if isinstance(which, tuple):
-        return _by_point(face, mesh, brep, which)
+        return _by_point(face, mesh, which)
     count = len(mesh.metadata[SURFACES])
     if not 1 <= which <= count:
         raise GeometryFault(f"face {face}: the part has faces 1 to {count}; tolcontact faces lists them")
@@ -194,18 +194,16 @@ def _by_name(face: Face, names: Sequence[str], name: str) -> np.ndarray:
     return np.flatnonzero(np.array(names) == name)
 
 
-def _by_point(face: Face, mesh: trimesh.Trimesh, brep: np.ndarray, place: Vector) -> np.ndarray:
-    point = np.tile(place, (len(brep), 1))
-    distance = np.linalg.norm(trimesh.triangles.closest_point(mesh.triangles, point) - point, axis=1)
-    if distance.min() > BREP_REACH * mesh.scale:
+def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
+    numbers, distance = faces_at(mesh, place)
+    if distance > BREP_REACH * mesh.scale:
         raise GeometryFault(
-            f"face {face}: the point is {distance.min():.4g} mm away from the part, which spans {_span(mesh)}; "
+            f"face {face}: the point is {distance:.4g} mm away from the part, which spans {_span(mesh)}; "
             "give a point on the face"
         )
-    hits = np.unique(brep[distance < distance.min() + CUT_MARGIN * mesh.scale])
-    if len(hits) > 1:
-        raise GeometryFault(f"face {face}: the point lies where {len(hits)} faces meet; give a point inside one of them")
-    return hits
+    if len(numbers) > 1:
+        raise GeometryFault(f"face {face}: the point lies where {len(numbers)} faces meet; give a point inside one of them")
+    return np.array(numbers) - 1
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:

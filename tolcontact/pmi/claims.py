@@ -39,9 +39,8 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
     Those of fewest faces find their places first, so that a note for many faces cannot join what others tell apart.
     """
     claims = [_datum_claim(datum, surfaces) for datum in pmi.datums]
-    for annotation in (*pmi.dimensions, *pmi.tolerances):
-        records = annotation.face_records
-        claims.append(Claim(annotation, len(records), surfaces.numbers(records)))
+    toleranced: tuple[Tolerance | Dimension, ...] = (*pmi.dimensions, *pmi.tolerances)
+    claims += [Claim(one, len(one.face_records), surfaces.numbers(one.face_records)) for one in toleranced]
     place_of: dict[int, Place] = {}
     for claim in sorted(claims, key=lambda claim: len(claim.numbers)):
         try:
@@ -49,7 +48,9 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
             claim.places = _places(claim, surfaces, place_of)
         except Undeclared as reason:
             claim.reasons.append(str(reason))
-        place_of |= {number: place for place in claim.places for surface in place for number in surface if number not in place_of}
+        place_of |= {
+            number: place for place in claim.places for surface in place for number in surface if number not in place_of
+        }
     return claims
 
 
@@ -67,7 +68,9 @@ def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
 def _check(annotation: Annotation) -> None:
     """Raise Undeclared if an annotation is not one of features."""
     if isinstance(annotation, Dimension) and annotation.kind != "size":
-        raise Undeclared(f"it is {'an' if annotation.kind[0] in 'aeiou' else 'a'} {annotation.kind}, and features have sizes only")
+        raise Undeclared(
+            f"it is {'an' if annotation.kind[0] in 'aeiou' else 'a'} {annotation.kind}, and features have sizes only"
+        )
     if isinstance(annotation, Tolerance) and annotation.extent == "all over":
         raise Undeclared("it is for all faces of the file; declare it for the faces that matter")
 

@@ -1,6 +1,6 @@
 """What features can state of the annotations of a file: tolerances and sizes as they are declared. Lengths in mm."""
 
-from collections.abc import Callable
+from typing import Any
 
 from tolcontact.declaration import feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance, Size
@@ -33,7 +33,7 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
         raise Undeclared("its value is not stated")
     if stated.maximum is not None:
         raise Undeclared("its value has an upper bound, which zones do not have")
-    options: dict[str, object] = {}
+    options: dict[str, Any] = {}
     for modifier in stated.modifiers:
         if modifier in _MATERIALS:
             options["material"] = _MATERIALS[modifier]
@@ -72,7 +72,9 @@ def size(stated: Dimension, nominal: float) -> Size:
     Raises Undeclared with the reason.
     """
     if stated.lower is None or stated.upper is None:
-        raise Undeclared(f"its limits are not stated{f': its fit {stated.fit} is not turned into limits' if stated.fit else ''}")
+        raise Undeclared(
+            f"its limits are not stated{f': its fit {stated.fit} is not turned into limits' if stated.fit else ''}"
+        )
     if stated.unit != "mm":
         raise Undeclared("it is an angle")
     factor = 2.0 if "radius" in stated.name else 1.0

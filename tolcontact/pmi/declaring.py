@@ -4,15 +4,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import trimesh
-
 from tolcontact.declaration import Brep, Face, Feature, Mesh, Part
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError, OptionError
 from tolcontact.features import Features, datum_order
-from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize
+from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, GeneralFeature, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.geometry.faces import Meshes, patch
 from tolcontact.geometry.shapes import shape
@@ -36,19 +34,19 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
     Raises ModelError if the file cannot be read, or states no PMI.
     """
     geometry = part.geometry
-    is_step = isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)
-    if not (is_step and Path(geometry.source).suffix.lower() in STEP):
+    source = geometry.source if isinstance(geometry, Mesh) else None
+    if not (isinstance(source, str | Path) and Path(source).suffix.lower() in STEP):
         raise ModelError(part.name, [f'part "{part.name}" is a {geometry}; only a STEP file of AP242 states PMI'])
     try:
-        pmi = read_pmi(geometry.source)
-        mesh = shape(geometry).mesh
+        pmi = read_pmi(source)
+        read = shape(geometry)
     except (OptionError, GeometryFault) as error:
         raise ModelError(part.name, [f'part "{part.name}": {error}']) from error
     if pmi.is_empty:
         raise ModelError(part.name, [f'part "{part.name}": its file states no tolerances, dimensions or datums as AP242 does'])
-    surfaces = TolerancedSurfaces(mesh)
+    surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
-    features = _declare(part, mesh, claims, surfaces)
+    features = _declare(part, {part: read.mesh}, claims, surfaces)
     return DeclaredPmi(features, tuple(claim.result for claim in claims))
 
 
@@ -67,15 +65,14 @@ class _Draft:
         return {letter for _, constituent in self.stated for letter in _letters(constituent)}
 
 
-def _declare(part: Part, mesh: trimesh.Trimesh, claims: Sequence[Claim], surfaces: TolerancedSurfaces) -> tuple[Feature, ...]:
+def _declare(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: TolerancedSurfaces) -> tuple[Feature, ...]:
     """Declare the features that claims state, and write into the claims which features state them, or why none does."""
-    meshes = {part: mesh}
     drafts: dict[Place, _Draft] = {}
     for claim in claims:
         for place in claim.places:
             try:
                 if place not in drafts:
-                    drafts[place] = _draft(part, mesh, place, surfaces)
+                    drafts[place] = _draft(part, meshes, place, surfaces)
                 _state(claim, drafts[place])
             except (Undeclared, GeometryFault) as reason:
                 claim.reasons.append(f"faces {_numbers(place)}: {reason}" if len(claim.places) > 1 else str(reason))
@@ -88,12 +85,14 @@ def _declare(part: Part, mesh: trimesh.Trimesh, claims: Sequence[Claim], surface
     return declared
 
 
-def _draft(part: Part, mesh: trimesh.Trimesh, place: Place, surfaces: TolerancedSurfaces) -> _Draft:
+def _draft(part: Part, meshes: Meshes, place: Place, surfaces: TolerancedSurfaces) -> _Draft:
     """Return a draft of the feature at a place. Raises GeometryFault if the place is no feature."""
     faces = tuple(Face(part, (Brep(*sorted(surface)),)) for surface in place)
-    geometry = feature_geometry([patch(face, {part: mesh}) for face in faces])
-    kind = surfaces.kind(place[0]) if len(place) == 1 else "slot" if geometry.is_inner else "tab"
-    name = f"{'surface' if kind == 'general' else kind} {min(min(surface) for surface in place)}"
+    geometry = feature_geometry([patch(face, meshes) for face in faces])
+    kind = "surface" if isinstance(geometry, GeneralFeature) else surfaces.kind(place[0])
+    if isinstance(geometry, SlabFeature):
+        kind = "slot" if geometry.is_inner else "tab"
+    name = f"{kind} {min(min(surface) for surface in place)}"
     return _Draft(Feature(name, part, faces, declared_at=script_line()), geometry)
 
 
@@ -108,7 +107,9 @@ def _state(claim: Claim, draft: _Draft) -> None:
             draft.feature, draft.datum = replace(draft.feature, name=datum.letter, datum=datum.letter), claim
         case Dimension() as dimension:
             if not isinstance(draft.geometry, FeatureOfSize):
-                raise Undeclared(f"a size is for cylinders, spheres and two opposed planes, and it is {draft.geometry.in_words}")
+                raise Undeclared(
+                    f"a size is for cylinders, spheres and two opposed planes, and it is {draft.geometry.in_words}"
+                )
             draft.stated.append((claim, declarable.size(dimension, draft.geometry.size)))
         case tolerance:
             draft.stated.append((claim, declarable.tolerance(tolerance, is_axis=isinstance(draft.geometry, AxisFeature))))

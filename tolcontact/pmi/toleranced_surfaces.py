@@ -3,14 +3,20 @@
 from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-import trimesh
 
 from tolcontact.declaration.values import Vector
-from tolcontact.geometry.brep_face import FaceInFile, FaceOnSurface, are_one_surface, describe_faces, faces_on_surfaces
-from tolcontact.geometry.files import BREP, FACE_RECORDS
+from tolcontact.geometry.brep_face import (
+    FaceInFile,
+    FaceOnSurface,
+    are_one_surface,
+    describe_faces,
+    faces_at,
+    faces_on_surfaces,
+)
+from tolcontact.geometry.files import FACE_RECORDS, Shape
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
-MAX_DISTANCE, SAME_DISTANCE = 1e-3, 1e-9  # of a part's size: of a point from its face, and between faces that meet in it
+MAX_DISTANCE = 1e-3  # of a part's size: of a point from the face on which it is
 _ROUND = ("cylinder", "cone", "sphere", "torus")
 
 
@@ -20,8 +26,8 @@ class TolerancedSurfaces:
     faces   the faces of the part, by their numbers less 1
     """
 
-    def __init__(self, mesh: trimesh.Trimesh) -> None:
-        self._mesh = mesh
+    def __init__(self, shape: Shape) -> None:
+        self._mesh = mesh = shape.mesh
         self._numbers = {record: number for number, record in enumerate(mesh.metadata[FACE_RECORDS], start=1) if record}
         self._surfaces: Sequence[FaceOnSurface] = faces_on_surfaces(mesh)
         self.faces: Sequence[FaceInFile] = describe_faces(mesh)
@@ -32,13 +38,10 @@ class TolerancedSurfaces:
 
     def numbers_at(self, points: Iterable[Vector]) -> Iterator[int]:
         """Yield the numbers of the faces on which points lie, for those that lie on one face alone."""
-        brep = np.asarray(self._mesh.face_attributes[BREP]).ravel()
         for point in points:
-            places = np.tile(point, (len(brep), 1))
-            distances = np.linalg.norm(trimesh.triangles.closest_point(self._mesh.triangles, places) - places, axis=1)
-            hits = np.unique(brep[distances < distances.min() + SAME_DISTANCE * self._mesh.scale])
-            if len(hits) == 1 and distances.min() < MAX_DISTANCE * self._mesh.scale:
-                yield int(hits[0]) + 1
+            numbers, distance = faces_at(self._mesh, point)
+            if len(numbers) == 1 and distance < MAX_DISTANCE * self._mesh.scale:
+                yield numbers[0]
 
     def surfaces(self, numbers: Iterable[int]) -> list[frozenset[int]]:
         """Return the surfaces that some faces make up, each with all of its faces.

@@ -8,7 +8,7 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.errors import ArchiveError
-from tolcontact.readable import FORMATTERS, HTML
+from tolcontact.later import HTML, LATER
 from tolcontact.realizations import finished, pieces, statuses
 from tolcontact.statistics import contact, intervals
 from tolcontact.statistics.checked_surfaces import surface_values
@@ -25,7 +25,7 @@ class Summary(xr.Dataset):  # type: ignore[no-untyped-call]
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        return FORMATTERS[HTML](self)
+        return str(LATER[HTML](self))
 
 
 def summarize(results: xr.DataTree) -> Summary:
