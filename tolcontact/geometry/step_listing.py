@@ -127,11 +127,12 @@ def parts_from(
     return {
         name: model.part(name, Mesh(path, body=body.number, chord=chord), at=body.at, rotation=body.rotation, fixed=fixed)
         for body in declared
-        if (name := _part_name(body))
+        if (name := part_name(body))
     }
 
 
-def _part_name(body: BodyInFile) -> str:
+def part_name(body: BodyInFile) -> str:
+    """Return the name of a body without characters that the name of a part may not have."""
     name = re.sub(r"[/\t\n]", "_", CONTROL_CHARACTERS.sub("_", body.name)).strip()
     return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 

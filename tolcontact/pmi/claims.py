@@ -30,7 +30,15 @@ class Claim:
 
     @property
     def result(self) -> DeclaredAnnotation:
-        return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(dict.fromkeys(self.reasons)))
+        """What became of the annotation on its part."""
+        missing = [missing_faces(self.stated - len(self.numbers), self.stated)] if self.numbers else []
+        reasons = dict.fromkeys(filter(None, [*missing, *self.reasons]))
+        return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(reasons))
+
+
+def missing_faces(missing: int, stated: int) -> str:
+    """Return the reason for faces that are stated and not on a part; "" if there are none."""
+    return f"{missing} of its {stated} faces are not on the part" if missing else ""
 
 
 def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
@@ -79,9 +87,7 @@ def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Plac
     """Return the places of a claim: those of earlier claims on the same faces, and new ones."""
     numbers = claim.numbers
     if not numbers:
-        raise Undeclared("none of its faces is on this part" if claim.stated else "the file states no face for it")
-    if len(numbers) < claim.stated and isinstance(claim.annotation, Tolerance | Dimension):
-        claim.reasons.append(f"{claim.stated - len(numbers)} of its {claim.stated} faces are not on this part")
+        raise Undeclared("none of its faces is on the part" if claim.stated else "the file states no face for it")
     groups = surfaces.surfaces(numbers)
     if surfaces.are_opposed(groups) and _has_middle(claim.annotation, tuple(groups), place_of):
         return [_pair(groups, place_of)]

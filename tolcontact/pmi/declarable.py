@@ -17,6 +17,7 @@ _MODIFIED = {
     "free state": "it is for the part in its free state, and parts are rigid here",
     "statistical tolerance": "it is a statistical tolerance, whose process the file does not state",
 }
+_DIGITS = 9  # of sizes [mm] after the point
 MAX_SIZE_DIFFERENCE = 1.0  # in widths of the limits: between them and the size of the shape
 
 
@@ -83,4 +84,5 @@ def size(stated: Dimension, nominal: float) -> Size:
         raise Undeclared(f"its limits {lower:g} and {upper:g} leave no width")
     if not lower - MAX_SIZE_DIFFERENCE * (upper - lower) <= nominal <= upper + MAX_SIZE_DIFFERENCE * (upper - lower):
         raise Undeclared(f"its limits are {lower:.6g} to {upper:.6g}, and the size of the shape is {nominal:.6g}")
-    return Size(nominal, upper - nominal, lower - nominal)
+    middle = round(nominal, _DIGITS)  # the kernel's numbers differ from those of the file in their last digits
+    return Size(middle, round(upper - middle, _DIGITS), round(lower - middle, _DIGITS))

@@ -13,9 +13,10 @@ from tolcontact.features import Features, datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, GeneralFeature, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.geometry.faces import Meshes, patch
+from tolcontact.geometry.files import Shape
 from tolcontact.geometry.shapes import shape
 from tolcontact.pmi import declarable
-from tolcontact.pmi.annotations import Datum, Dimension
+from tolcontact.pmi.annotations import Datum, Dimension, Pmi
 from tolcontact.pmi.claims import Claim, Place, claims_of
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.declared import DeclaredPmi
@@ -44,10 +45,15 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
         raise ModelError(part.name, [f'part "{part.name}": {error}']) from error
     if pmi.is_empty:
         raise ModelError(part.name, [f'part "{part.name}": its file states no tolerances, dimensions or datums as AP242 does'])
+    features, claims = declare_features(part, pmi, read)
+    return DeclaredPmi(features, tuple(claim.result for claim in claims))
+
+
+def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Feature, ...], list[Claim]]:
+    """Declare the features that PMI states of a part with a shape; return them, and what became of each annotation."""
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
-    features = _declare(part, {part: read.mesh}, claims, surfaces)
-    return DeclaredPmi(features, tuple(claim.result for claim in claims))
+    return _declare(part, {part: read.mesh}, claims, surfaces), claims
 
 
 @dataclass
