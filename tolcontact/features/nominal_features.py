@@ -10,7 +10,7 @@ from tolcontact.declaration import Face, Feature, Part, Pattern
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.pattern_geometry import SIZE_TOLERANCE, PatternGeometry, check_alike
+from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
 from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.surface import Surface
@@ -271,15 +271,13 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
 
 def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:
     """Return the names "feature.freedom" of the directions that layers add, of the feature or pattern that they move."""
-    names, mixed = list[str](), Counter[str]()
+    names, counts = list[str](), Counter[str]()
     for direction in (direction for layer in layers for direction in layer.added.T):
         number = geometry.owner(direction)
         owner = declared.name if number is None else declared.members[number].name
-        name = geometry.freedom_name(direction)
-        if name is None:
-            mixed[owner] += 1
-            name = f"mixed {mixed[owner]}"
-        names.append(f"{owner}.{name}")
+        name = f"{owner}.{geometry.freedom_name(direction)}"
+        counts[name] += 1
+        names.append(f"{name} {counts[name]}" if name.endswith((MIXED, RELATIVE)) else name)
     return names
 
 

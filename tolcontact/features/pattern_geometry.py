@@ -12,6 +12,8 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, PlaneFeature
 
 SIZE_TOLERANCE = 1e-6  # relative: largest difference between sizes that count as equal
+MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that a pattern notices
+MIXED, RELATIVE = "mixed", "relative"
 MOTIONS = ("common shift x", "common shift y", "common shift z", "common turn x", "common turn y", "common turn z")
 
 
@@ -78,15 +80,19 @@ class PatternGeometry:
         moved = [number for number, place in enumerate(self.slices) if direction[place].any()]
         return moved[0] if len(moved) == 1 else None
 
-    def freedom_name(self, direction: np.ndarray) -> str | None:
-        """Return the name of a direction (coordinate,) along a coordinate or a common motion; None for a mixed one."""
+    def freedom_name(self, direction: np.ndarray) -> str:
+        """Return the name of a direction (coordinate,): of its coordinate, of its motion of the pattern, "relative" or "mixed".
+
+        A relative direction moves members of a pattern to each other, and the pattern as a whole not at all.
+        """
         coordinate = int(np.abs(direction).argmax())
         if abs(direction[coordinate]) > 1 - 1e-6:
             return [name for member in self.members for name in member.names][coordinate]
-        motions = self.common_motions
-        lengths = np.linalg.norm(motions, axis=0)
-        along = np.abs(direction @ motions) > (1 - 1e-6) * np.maximum(lengths, 1e-300)
-        return MOTIONS[int(along.argmax())] if len(self.members) > 1 and along.any() else None
+        if self.owner(direction) is not None:
+            return MIXED
+        lengths = np.linalg.norm(self.common_motions, axis=0)
+        along = np.abs(direction @ self.common_motions) / np.where(lengths > MIN_LENGTH, lengths, np.inf)
+        return MOTIONS[int(along.argmax())] if along.max() > 1 - 1e-6 else RELATIVE if along.max() < 1e-6 else MIXED
 
 
 def check_alike(members: Sequence[FeatureGeometry]) -> None:

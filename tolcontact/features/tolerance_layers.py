@@ -12,7 +12,7 @@ from tolcontact.declaration.feature_tolerance import TRANSLATIONS
 from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
-from tolcontact.features.pattern_geometry import PatternGeometry
+from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
 from tolcontact.features.tolerance_kinds import zone_of
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
@@ -174,7 +174,7 @@ def tolerance_layers(
         is_outer = controlled_before.shape[1] > 0
         added = _named_basis(_difference(controlled, controlled_before), geometry, is_outer=is_outer)
         if tolerance.rule in TRANSLATIONS:
-            added = _translations(tolerance, geometry, added)
+            added = _translations(tolerance, geometry, added, is_outer=is_outer)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
                 f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
@@ -218,14 +218,14 @@ def _check_nesting(outer: Layer, layers: Sequence[Layer]) -> None:
             )
 
 
-def _translations(tolerance: GeometricTolerance, geometry: PatternGeometry, added: np.ndarray) -> np.ndarray:
+def _translations(tolerance: GeometricTolerance, geometry: PatternGeometry, added: np.ndarray, *, is_outer: bool) -> np.ndarray:
     """Return the part of the added directions (coordinate, n) that does not turn a feature."""
     turns = geometry.turns @ added
     _, S, Vt = np.linalg.svd(turns)
     translations = added @ Vt[int((S > RANK_TOLERANCE).sum()) :].T
     if not translations.shape[1]:
         raise GeometryFault(f'{tolerance.kind}: the rule "{tolerance.rule}" leaves nothing, as its datums lock tilts alone')
-    return _named_basis(translations, geometry, is_outer=False)
+    return _named_basis(translations, geometry, is_outer=is_outer)
 
 
 def _controlled(rows: Sequence[np.ndarray], geometry: PatternGeometry, frame: DatumFrame) -> np.ndarray:
@@ -261,7 +261,7 @@ def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer:
         return coordinates[:, spanned]
     motions = geometry.common_motions if is_outer and len(geometry.members) > 1 else np.zeros((geometry.count, 0))
     lengths = np.linalg.norm(motions, axis=0)
-    motions = motions[:, lengths > MIN_NOTICED] / lengths[lengths > MIN_NOTICED]
+    motions = motions[:, lengths > MIN_LENGTH] / lengths[lengths > MIN_LENGTH]
     within = np.linalg.norm(projector @ motions - motions, axis=0) < RANK_TOLERANCE
     candidates = np.hstack([motions[:, within], coordinates[:, spanned], projector])
     basis = np.zeros((geometry.count, 0))
