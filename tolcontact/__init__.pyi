@@ -32,6 +32,7 @@ from .declaration import (
     Near as Near,
     Parallelism as Parallelism,
     Part as Part,
+    Pattern as Pattern,
     Perpendicularity as Perpendicularity,
     Point as Point,
     Position as Position,

@@ -83,3 +83,28 @@ EVERY = {  # of the kinds that move features; all state 99.73 % inside
         "far", tc.Position(0.2, "B|A"), frame=frame, B=(tc.Perpendicularity(0.2, "A"),)
     ),
 }
+
+
+HOLES = ((-30.0, 0.0), (30.0, 0.0), (0.0, 20.0), (0.0, -20.0))
+
+
+def plate_with_holes(count: int, *, frame: Frame = STILL, turn: np.ndarray | None = None):
+    """A fixed plate of 100 x 60 x 10 about its middle, datums A (bottom), B (side) and C (end), and the faces of its holes.
+
+    With `turn` (3, 3) the shape itself is turned in its own frame.
+    """
+    a = tc.Assembly("plate")
+    tubes = [trimesh.creation.cylinder(4, 9, sections=48).apply_translation((x, y, 0)) for x, y in HOLES[:count]]
+    for tube in tubes:
+        tube.invert()
+    mesh = trimesh.util.concatenate([trimesh.creation.box(extents=(100, 60, 10)), *tubes])
+    centres, normals = mesh.triangles_center, mesh.face_normals
+    if turn is not None:
+        mesh.vertices = mesh.vertices @ turn.T
+    part = a.part("plate", tc.Mesh(mesh), **frame.place(5, -7, 3), fixed=True)
+    for letter, axis, height in (("A", 2, 5), ("B", 1, 30), ("C", 0, 50)):
+        is_face = (abs(centres[:, axis] + height) < 1e-9) & (normals[:, axis] < -0.5)
+        part.feature(letter, part.face(np.flatnonzero(is_face).tolist()), datum=letter)
+    beside = [np.hypot(centres[:, 0] - x, centres[:, 1] - y) < 4.5 for x, y in HOLES[:count]]
+    faces = [part.face(np.flatnonzero(near & (abs(normals[:, 2]) < 0.5)).tolist()) for near in beside]
+    return a, part, faces

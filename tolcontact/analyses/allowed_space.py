@@ -9,7 +9,8 @@ import numpy as np
 import scipy
 
 from tolcontact.declaration import Tolerance
-from tolcontact.variation.contributors import TAIL, ComponentZone, Contributor
+from tolcontact.variation.component_zones import ComponentZone
+from tolcontact.variation.contributors import TAIL, Contributor
 from tolcontact.variation.draws import Draws
 
 RANDOM_DIRECTIONS = 32  # in which the extreme points of a zone are searched, beside those along its components
@@ -107,8 +108,8 @@ class Region:
         slack = TOLERANCE * (self.upper - self.lower)
         inside = ((points >= self.lower - slack) & (points <= self.upper + slack)).all(axis=1)
         for zone in self.zones:
-            longest = np.linalg.norm(self._lengths(zone, points), axis=2).max(axis=1, initial=0.0)
-            inside &= longest <= self._half(zone, points) + TOLERANCE * zone.width
+            lengths = np.linalg.norm(self._lengths(zone, points), axis=2)
+            inside &= (lengths <= self._half(zone, points) + TOLERANCE * zone.width).all(axis=1)
         return np.asarray(inside)
 
     def planes(self, point: np.ndarray | None = None, slack: float = TOLERANCE) -> tuple[np.ndarray, np.ndarray]:
@@ -119,14 +120,14 @@ class Region:
         """
         rows, ends = [], []
         for zone in self.zones:
-            for row in zone.rows:
+            for number, row in enumerate(zone.rows):
                 for normal in _normals(row, None if point is None else row @ (point[zone.columns] - zone.middle)):
                     plane = np.zeros(len(self.lower))
                     plane[zone.columns] = normal @ row
                     end = zone.width / 2 + plane[zone.columns] @ zone.middle
-                    if zone.size is not None:
+                    if zone.sizes is not None:
                         # |row| <= (width + growth (size - limit)) / 2, of the size as it is driven
-                        plane -= zone.growth / 2 * self._drive[:, zone.size]
+                        plane -= zone.growth / 2 * self._drive[:, zone.sizes[number]]
                         end -= zone.growth / 2 * zone.limit
                     if point is None or plane @ point > end + slack * zone.width:
                         rows.append(plane)
@@ -134,10 +135,10 @@ class Region:
         return np.array(rows).reshape(-1, len(self.lower)), np.array(ends)
 
     def _half(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
-        """Return half the width (n,) of a zone, with its bonus."""
-        if zone.size is None:
-            return np.full(len(points), zone.width / 2)
-        return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.size] - zone.limit)) / 2)
+        """Return half the width (n, point) of a zone, with its bonus."""
+        if zone.sizes is None:
+            return np.full((len(points), len(zone.rows)), zone.width / 2)
+        return np.asarray((zone.width + zone.growth * (points @ self._drive[:, zone.sizes] - zone.limit)) / 2)
 
     def _lengths(self, zone: ComponentZone, points: np.ndarray) -> np.ndarray:
         """Return the rows of a zone (n, point, entry) at points of the region."""
@@ -146,8 +147,8 @@ class Region:
     def _enclose(self, zone: ComponentZone) -> None:
         """Bound each component by the extent of its zone."""
         widest = zone.width
-        if zone.size is not None:
-            ends = np.array(self._driven_bounds())[:, zone.size]
+        if zone.sizes is not None:
+            ends = np.array(self._driven_bounds())[:, zone.sizes]
             widest += float((zone.growth * (ends - zone.limit)).max())
         # From |rows c| <= half follows |c| <= |inverse| half, entry by entry.
         extent = np.abs(np.linalg.pinv(zone.rows.reshape(-1, zone.rows.shape[2]))).sum(axis=1) * widest / 2
@@ -165,8 +166,8 @@ class Region:
         sets: list[set[int]] = []
         for zone in self.zones:
             joined = {int(column) for column in zone.columns}
-            if zone.size is not None:
-                joined |= {int(column) for column in np.flatnonzero(self._drive[:, zone.size])}
+            if zone.sizes is not None:
+                joined |= {int(column) for column in np.flatnonzero(self._drive[:, zone.sizes].any(axis=1))}
             for overlapping in [columns for columns in sets if columns & joined]:
                 sets.remove(overlapping)
                 joined |= overlapping
@@ -230,11 +231,14 @@ def _normals(row: np.ndarray, position: np.ndarray | None) -> np.ndarray:
 
 
 def _first_crossing(start: np.ndarray, along: np.ndarray, half: np.ndarray, half_after: np.ndarray) -> np.ndarray:
-    """Return the least t (n,), at most 1, at which a |start + t along| (n, point, entry) is half + t (half_after - half)."""
-    grows = (half_after - half)[:, None]
+    """Return the least t (n,), at most 1, at which a |start + t along| (n, point, entry) is half + t (half_after - half).
+
+    half, half_after   (n, point)
+    """
+    grows = half_after - half
     a = (along**2).sum(axis=2) - grows**2
-    b = (start * along).sum(axis=2) - half[:, None] * grows
-    c = (start**2).sum(axis=2) - half[:, None] ** 2
+    b = (start * along).sum(axis=2) - half * grows
+    c = (start**2).sum(axis=2) - half**2
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(np.maximum(b**2 - a * c, 0.0))
         # The root at which it leaves, in the form that cancels nothing.

@@ -23,8 +23,9 @@ def owners(program: Program, by: str) -> list[str]:
         return labels
     # Locators belong to the part that they locate, even if `by` is "feature".
     owner_of = {label: part.name for part in nominal.parts for label in part.locators.labels}
-    for feature in nominal.features:
-        owner_of |= dict.fromkeys(feature.labels, feature.feature.part.name if by == "part" else feature.label)
+    for pattern in nominal.patterns:
+        part = pattern.declared.part.name
+        owner_of |= {label: part if by == "part" else label.rpartition(".")[0] for label in pattern.labels}
     return [owner_of.get(label, label) for label in labels]
 
 

@@ -219,7 +219,7 @@ from tolcontact.declaration.feature_tolerance import (
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import OUTSIDE, Face, Feature, Force, Part, Point
+from tolcontact.declaration.part import OUTSIDE, Face, Feature, Force, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 
@@ -250,6 +250,7 @@ __all__ = [
     "Near",
     "Parallelism",
     "Part",
+    "Pattern",
     "Perpendicularity",
     "Picked",
     "Point",

@@ -78,7 +78,7 @@ class Assembly(Pictured):
 
     @property
     def features(self) -> tuple[Feature, ...]:
-        """The features of all parts, part by part."""
+        """The features of all parts, part by part, among them the members of patterns."""
         return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
@@ -223,17 +223,20 @@ class Assembly(Pictured):
         yield from key_faults("variable", [variable.name for variable in self.variables])
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
-        letters = [feature.datum for feature in part.features if feature.datum]
-        yield from key_faults(f'part "{part.name}": feature', [feature.name for feature in part.features])
+        letters = [declared.datum for declared in part.toleranced if declared.datum]
+        names = [feature.name for feature in part.toleranced]
+        names += [member.name for pattern in part.patterns for member in pattern.members if member not in pattern.borrowed]
+        yield from key_faults(f'part "{part.name}": feature', names)
         yield from repetitions(f'part "{part.name}": datum', letters)
-        for feature in part.features:
-            yield from _located(f'part "{part.name}": feature', feature, feature.faults())
-            for tolerance in feature.geometric:
+        for declared in part.toleranced:
+            kind = f'part "{part.name}": {declared.noun}'
+            yield from _located(kind, declared, declared.faults())
+            for tolerance in declared.geometric:
                 for letter in [letter for compartment in tolerance.system for letter in compartment]:
                     if letter not in letters:
                         datums = ", ".join(sorted(set(letters))) or "none"
                         yield (
-                            f'part "{part.name}": feature "{feature.name}" ({feature.declared_at}): {tolerance.kind} refers to '
+                            f'{kind} "{declared.name}" ({declared.declared_at}): {tolerance.kind} refers to '
                             f"datum {letter}, which no feature of the part is; its datums are: {datums}; "
                             f'declare it with part.feature(..., datum="{letter}")'
                         )
@@ -268,7 +271,8 @@ class Assembly(Pictured):
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations
-        rows = *self.parts, *self.features, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
+        declared = (toleranced for part in self.parts for toleranced in part.toleranced)
+        rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 

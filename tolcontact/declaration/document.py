@@ -33,7 +33,7 @@ from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, 
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
-from tolcontact.declaration.part import ASSOCIATIONS, Face, Feature, Force, Part, Point
+from tolcontact.declaration.part import ASSOCIATIONS, Face, Feature, Force, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
@@ -142,6 +142,12 @@ FEATURE = Record(
     Feature, "faces tolerances name datum association? declared_at",
     tolerances=Items(CONTROL), association=Plain(text_type(ASSOCIATIONS)),
 )  # fmt: skip
+MEMBER = Choice("Member", "a list of faces, or the name of a feature", Items(CODECS[Face]), CODECS[Feature])
+PATTERN = Record(
+    Pattern, "members=constituents tolerances name datum declared_at", mark="members", members=Items(MEMBER),
+    tolerances=Items(CONTROL),
+)  # fmt: skip
+TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
     "a box, or a file",
@@ -172,8 +178,8 @@ METHOD = Record(
 )  # fmt: skip
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
-    {"features": Items(FEATURE).wire},
-    lambda part, writing: {"features": [FEATURE.encode(feature, writing) for feature in part.features]},
+    {"features": Items(TOLERANCED).wire},
+    lambda part, writing: {"features": [TOLERANCED.encode(declared, writing) for declared in part.toleranced]},
     lambda entries, place: UNSET,
 )
 RECORDS = {
@@ -237,7 +243,9 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         sources.parts[part.name] = part
     parts = list(sources.parts.values())
     for k, (part, entry) in enumerate(zip(parts, struct.parts, strict=True)):
-        part.add(*Items(FEATURE).decode(entry.get("features", []), place["parts"][k]["features"], part=part))
+        of_part = replace(place["parts"][k]["features"], part=part)
+        for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
+            part.add(TOLERANCED.decode(item, of_part[number], part=part))
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

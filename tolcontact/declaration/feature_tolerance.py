@@ -152,8 +152,6 @@ class GeometricTolerance(Readable):
         ):
             yield f'datums is {self.datums!r}; expected up to three datums, such as "A|B|C", "A|B(M)", "A-B" or "A><"'
             return
-        if self.needs_datums and not self.datums:
-            yield f'it needs datums; give them as in tc.{type(self).__name__}({self.width!r}, "A|B|C")'
         letters = [letter for compartment in self.system for letter in compartment]
         if len(set(letters)) < len(letters):
             yield f"datums {self.datums!r} names a datum twice"

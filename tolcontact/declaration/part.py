@@ -3,12 +3,14 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.values import Vector, is_finite, is_length, script_line, vector
+from tolcontact.declaration.toleranced import Toleranced
+from tolcontact.declaration.values import Vector, is_finite, script_line, vector
 from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
 
@@ -31,11 +33,21 @@ class Part(Readable):
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
     declared_at: str = field(default_factory=script_line)
-    _features: "list[Feature]" = field(default_factory=list, init=False)
+    _toleranced: "list[Feature | Pattern]" = field(default_factory=list, init=False)
+
+    @property
+    def toleranced(self) -> "tuple[Feature | Pattern, ...]":
+        """The features and patterns in the order of the script."""
+        return tuple(self._toleranced)
 
     @property
     def features(self) -> "tuple[Feature, ...]":
-        return tuple(self._features)
+        """The features, among them the members of patterns."""
+        return tuple(dict.fromkeys(member for declared in self._toleranced for member in declared.members))
+
+    @property
+    def patterns(self) -> "tuple[Pattern, ...]":
+        return tuple(declared for declared in self._toleranced if isinstance(declared, Pattern))
 
     def feature(
         self,
@@ -56,12 +68,42 @@ class Part(Readable):
                 )
         faces = tuple(constituent for constituent in constituents if isinstance(constituent, Face))
         tolerances = tuple(constituent for constituent in constituents if not isinstance(constituent, Face))
-        self.add(Feature(name, self, faces, tolerances, datum, script_line(), association))
-        return self._features[-1]
+        feature = Feature(name, self, faces, tolerances, datum, script_line(), association)
+        self.add(feature)
+        return feature
 
-    def add(self, *features: "Feature") -> None:
-        """Add declared features to this part."""
-        self._features.extend(features)
+    def pattern(
+        self,
+        name: str,
+        *constituents: "Face | Sequence[Face] | Feature | Size | GeometricTolerance",
+        datum: str | None = None,
+    ) -> "Pattern":
+        """Name several like faces with their common tolerances: `part.pattern("H", face, face, tc.Position(0.2, "A"))`.
+
+        A member is a face, or two that are opposed, as in (face, face). Members of a pattern that is a datum alone may also be
+        unlike, or features that have tolerances of their own (see Pattern).
+        """
+        members: list[tuple[Face, ...] | Feature] = []
+        for constituent in constituents:
+            if isinstance(constituent, Face):
+                members.append((constituent,))
+            elif isinstance(constituent, list | tuple) and all(isinstance(face, Face) for face in constituent):
+                members.append(tuple(constituent))
+            elif isinstance(constituent, Feature):
+                members.append(constituent)
+            elif not isinstance(constituent, Size | GeometricTolerance):
+                raise TypeError(
+                    f'pattern "{name}": {type(constituent).__name__} is neither a member nor a tolerance; expected '
+                    "part.face(...), two faces in parentheses, a feature, tc.Size(...), tc.Position(...) or another tolerance"
+                )
+        tolerances = tuple(tolerance for tolerance in constituents if isinstance(tolerance, Size | GeometricTolerance))
+        pattern = Pattern(name, self, tuple(members), tolerances, datum, script_line())
+        self.add(pattern)
+        return pattern
+
+    def add(self, declared: "Feature | Pattern") -> None:
+        """Add a declared feature or pattern to this part."""
+        self._toleranced.append(declared)
 
     def features_from_pmi(self) -> Any:
         """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
@@ -146,7 +188,7 @@ class Point(Readable):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Feature(Readable):
+class Feature(Toleranced, Readable):
     """A face of a part, or two that are opposed (a slot, a tab, a thickness), with a name and its tolerances.
 
     A feature may be used in place of a face. Contact, locators and measures on a feature share its deviation, which is positive
@@ -163,14 +205,9 @@ class Feature(Readable):
     association: str = OUTSIDE
 
     @property
-    def size(self) -> Size | None:
-        """The tolerance of the size; None without one."""
-        return next((tolerance for tolerance in self.tolerances if isinstance(tolerance, Size)), None)
-
-    @property
-    def geometric(self) -> tuple[GeometricTolerance, ...]:
-        """The geometric tolerances, without the size."""
-        return tuple(tolerance for tolerance in self.tolerances if isinstance(tolerance, GeometricTolerance))
+    def members(self) -> "tuple[Feature, ...]":
+        """The feature itself: it is a pattern of one member."""
+        return (self,)
 
     def point(self, x: float, y: float, z: float) -> Point:
         """Return the point (x, y, z) [mm] of its part, which moves with the feature when it deviates."""
@@ -184,53 +221,91 @@ class Feature(Readable):
         return Point(self.part, None, self, end)
 
     def faults(self) -> Iterator[str]:
+        yield from self.face_faults()
+        yield from letter_faults(self.datum)
+        if self.association not in ASSOCIATIONS:
+            yield f"its association is {self.association!r}; expected one of: {', '.join(ASSOCIATIONS)}"
+        yield from self.tolerance_faults(len(self.faces))
+
+    def face_faults(self) -> Iterator[str]:
+        """Yield the faults of the faces alone."""
         for face in self.faces:
             yield from face.faults()
             if face.part is not self.part:
                 yield f'its face {face} belongs to part "{face.part.name}"'
         if not 1 <= len(self.faces) <= 2:
             yield f"it has {len(self.faces)} faces; expected one, or two that are opposed"
-        if self.datum is not None and not (isinstance(self.datum, str) and LETTER.fullmatch(self.datum)):
-            yield f"its datum letter is {self.datum!r}; expected one or two capital letters"
-        if self.association not in ASSOCIATIONS:
-            yield f"its association is {self.association!r}; expected one of: {', '.join(ASSOCIATIONS)}"
-        for tolerance in self.tolerances:
-            yield from (f"{tolerance.kind}: {fault}" for fault in tolerance.faults())
-        yield from self._size_faults()
-        yield from self._form_faults()
-
-    def _size_faults(self) -> Iterator[str]:
-        if sum(isinstance(tolerance, Size) for tolerance in self.tolerances) > 1:
-            yield "its size is toleranced twice; leave one out"
-        for tolerance in self.geometric:
-            if tolerance.material and self.size is None:
-                yield (
-                    f"{tolerance.kind}: a bonus (material {tolerance.material!r}) needs the tolerance of a size; "
-                    "add tc.Size(...)"
-                )
-        if self.size and self.size.moves != "both" and len(self.faces) == 1:
-            yield f"size: moves is {self.size.moves!r}, but the feature has one face; leave it out"
-        elif self.size and self.size.moves != "both" and any(not tolerance.is_form for tolerance in self.geometric):
-            yield (
-                f"size: moves is {self.size.moves!r}, so the feature has no middle that could have a place; give its other "
-                'tolerances to a feature of the face alone, in place of the size, or let "both" move'
-            )
-
-    def _form_faults(self) -> Iterator[str]:
-        tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
-        for form in (tolerance for tolerance in tolerances if tolerance.is_form):
-            for tolerance in tolerances:
-                contains = not tolerance.is_form and (not form.around or tolerance.kind in form.around)
-                if contains and tolerance.width < form.width:
-                    yield (
-                        f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "
-                        "expected form within orientation within location"
-                    )
 
     def __str__(self) -> str:
         letter = f" (datum {self.datum})" if self.datum else ""
         constituents = "; ".join([", ".join(str(face) for face in self.faces), *map(str, self.tolerances)])
         return f"feature {self.name} of {self.part.name}{letter}: {constituents}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Pattern(Toleranced, Readable):
+    """Several features of a part that share their tolerances, and may be one datum together.
+
+    constituents   of each member: its face, or two that are opposed; or a feature that was declared before
+    datum          the letter of the common datum of all members
+
+    The members of faces are features "H 1", "H 2", ... of a pattern "H", in this order. They are of one kind and one nominal
+    size. Only a pattern without tolerances, which is a datum alone, may have unlike members and features declared before.
+    """
+
+    noun, has_common_zone = "pattern", True
+
+    name: str
+    part: Part
+    constituents: tuple[tuple[Face, ...] | Feature, ...]
+    tolerances: tuple[Size | GeometricTolerance, ...] = ()
+    datum: str | None = None
+    declared_at: str = ""
+
+    @cached_property
+    def members(self) -> tuple[Feature, ...]:
+        """The features of the pattern."""
+        return tuple(
+            constituent
+            if isinstance(constituent, Feature)
+            else Feature(f"{self.name} {number}", self.part, constituent, self.tolerances, None, self.declared_at)
+            for number, constituent in enumerate(self.constituents, start=1)
+        )
+
+    @property
+    def borrowed(self) -> tuple[Feature, ...]:
+        """The members that were declared before, as features."""
+        return tuple(constituent for constituent in self.constituents if isinstance(constituent, Feature))
+
+    def faults(self) -> Iterator[str]:
+        if len(self.members) < 2:
+            yield f"it has {len(self.members)} member(s); expected two or more; declare one with part.feature(...)"
+        for member in self.members:
+            if member not in self.borrowed:
+                yield from (f'member "{member.name}": {fault}' for fault in member.face_faults())
+        yield from letter_faults(self.datum)
+        for feature in self.borrowed:
+            if not any(feature is declared for declared in self.part.toleranced):
+                yield f'its member "{feature.name}" is no feature of part "{self.part.name}"; take one of that part'
+            elif self.tolerances:
+                yield (
+                    f'its member "{feature.name}" is a feature with tolerances of its own; give the faces of members to a '
+                    "pattern with tolerances, or leave its tolerances out"
+                )
+        if not self.tolerances and self.datum is None:
+            yield 'it has neither tolerances nor a datum letter; give one of them, as in datum="B"'
+        yield from self.tolerance_faults(max((len(member.faces) for member in self.members), default=1))
+
+    def __str__(self) -> str:
+        letter = f" (datum {self.datum})" if self.datum else ""
+        constituents = "; ".join([f"{len(self.members)} members", *map(str, self.tolerances)])
+        return f"pattern {self.name} of {self.part.name}{letter}: {constituents}"
+
+
+def letter_faults(datum: object) -> Iterator[str]:
+    """Yield the fault of a datum letter; None is no letter."""
+    if datum is not None and not (isinstance(datum, str) and LETTER.fullmatch(datum)):
+        yield f"its datum letter is {datum!r}; expected one or two capital letters"
 
 
 def face_of(face: Face | Feature) -> Face:

@@ -67,7 +67,7 @@ def discretize(assembly: Assembly) -> Nominal:
         labels += [*features.labels, *(variable.name for variable in assembly.variables)]
         faults.extend(_repeated_labels(labels))
         if not faults:
-            shifts = {labels[column] for feature in features.features for column in feature.leans}
+            shifts = {labels[column] for pattern in features.patterns for column in pattern.leans}
             faults.extend(_contributor_faults(assembly, labels, shifts))
     faults.extend(_reserved_names(assembly))
     if faults:
@@ -89,10 +89,10 @@ def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
 def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults: _Faults) -> None:
     for index, part in enumerate(assembly.parts):
         ordered, circular = datum_order(part)
-        for feature in ordered:
-            faults.attempt(f'part "{part.name}": {designation("feature", feature)}', features.add, feature, index, meshes)
+        for declared in ordered:
+            faults.attempt(f'part "{part.name}": {designation(declared.noun, declared)}', features.add, declared, index, meshes)
         if circular:
-            names = ", ".join(f'"{feature.name}"' for feature in circular)
+            names = ", ".join(f'"{declared.name}"' for declared in circular)
             faults.append(
                 f'part "{part.name}": features {names}: their datums refer to each other in a circle, or to a datum that could '
                 "not be made; leave one of the references out"

@@ -13,7 +13,7 @@ from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.features import FaceDeviation, Features, NominalFeature
+from tolcontact.features import FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import triangles
@@ -200,8 +200,13 @@ class Nominal:
 
     @property
     def features(self) -> tuple[NominalFeature, ...]:
-        """The features of all parts."""
+        """The features of all parts, among them the members of patterns."""
         return tuple(self._features.features)
+
+    @property
+    def patterns(self) -> tuple[NominalPattern, ...]:
+        """The features that are toleranced together, of all parts; a feature by itself is a pattern of one member."""
+        return tuple(self._features.patterns)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:

@@ -1,22 +1,23 @@
 """Features with numbers: their contributors, and how their faces deviate with everything that varies."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from tolcontact.declaration import Face, Feature, Part
+from tolcontact.declaration import Face, Feature, Part, Pattern
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.tolerance_layers import Datum, Layer, Lean, freedom_names, padded, tolerance_layers
+from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
+from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
 from tolcontact.geometry.surface import Surface
 
 Placement = tuple[np.ndarray, np.ndarray]  # R (3, 3) and t (3,) [mm] of a part in the nominal assembly
 MIN_SHARE = 1e-6  # of a face's area: a smaller common part of two faces does not count
 FACE_TOLERANCE = 1e-4  # of a face's size: the largest distance of a point on it
-SIZE_TOLERANCE = 1e-6  # relative: largest difference between the size of a shape and the size in its tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,12 +57,10 @@ class FaceDeviation:
 
 @dataclass(frozen=True, eq=False)
 class NominalFeature:
-    """A feature in its part. Its contributors are the directions that its layers add, shifts of datums that lean, its size.
+    """A feature in its part, by itself or as a member of a pattern.
 
-    first_column of its contributors
-    labels       "part.feature.freedom" of its contributors
-    coordinates  (coordinate, column): of the feature, for deviations of 1 of its own columns and all columns before
-    leans        by their columns: planes that lean against other datums of its tolerances
+    coordinates  (coordinate, column): of the feature, for deviations of 1 of the columns of its pattern and all columns before
+    size_column  the column of its size; None if its size is not toleranced
     surfaces     its faces, in the part's own frame
     areas        its faces on the part's mesh
     """
@@ -69,11 +68,8 @@ class NominalFeature:
     feature: Feature
     part: int
     geometry: FeatureGeometry
-    layers: tuple[Layer, ...]
-    first_column: int
-    labels: tuple[str, ...]
     coordinates: np.ndarray
-    leans: Mapping[int, Lean]
+    size_column: int | None
     surfaces: tuple[Surface, ...]
     areas: tuple[FaceArea, ...]
 
@@ -82,9 +78,9 @@ class NominalFeature:
         return f"{self.feature.part.name}.{self.feature.name}"
 
     @property
-    def size_column(self) -> int | None:
-        """The column of its size; None if its size is not toleranced."""
-        return self.first_column + len(self.labels) - 1 if self.feature.size else None
+    def varies(self) -> bool:
+        """Whether the feature deviates at all."""
+        return self.size_column is not None or bool(self.coordinates.any())
 
     def face_with(self, position: np.ndarray) -> int | None:
         """Return the number of the face that a point (3,) [mm] is on; None, for the middle, if it is on neither of two."""
@@ -108,6 +104,40 @@ class NominalFeature:
         return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns])
 
 
+@dataclass(frozen=True, eq=False)
+class NominalPattern:
+    """The features that a declaration tolerances together: the members of a pattern, or one feature by itself.
+
+    Its contributors are the directions that its layers add, shifts of datums that lean, and the sizes of its members.
+
+    geometry      of all members together
+    first_column  of its contributors
+    labels        "part.feature.freedom" of its contributors; "part.pattern.freedom" for what moves several members
+    leans         by their columns: planes that lean against other datums of its tolerances
+    """
+
+    declared: Feature | Pattern
+    members: tuple[NominalFeature, ...]
+    geometry: PatternGeometry
+    layers: tuple[Layer, ...]
+    first_column: int
+    labels: tuple[str, ...]
+    leans: Mapping[int, Lean]
+
+    @property
+    def part(self) -> int:
+        return self.members[0].part
+
+    @property
+    def label(self) -> str:
+        return f"{self.declared.part.name}.{self.declared.name}"
+
+    @property
+    def datums(self) -> tuple[Datum, ...]:
+        """The members as datums, all of which are one common datum."""
+        return tuple(Datum(member.feature, member.geometry, member.coordinates) for member in self.members)
+
+
 @dataclass(eq=False)
 class Features:
     """The features of a model while it is discretized, and the faces that deviate with them.
@@ -116,6 +146,7 @@ class Features:
     """
 
     first_column: int
+    patterns: list[NominalPattern] = field(default_factory=list)
     features: list[NominalFeature] = field(default_factory=list)
     _used_faces: dict[tuple[Feature, int | None], FaceDeviation] = field(default_factory=dict)
 
@@ -126,53 +157,61 @@ class Features:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        return tuple(label for feature in self.features for label in feature.labels)
+        return tuple(label for pattern in self.patterns for label in pattern.labels)
 
-    def add(self, feature: Feature, part: int, meshes: Meshes) -> None:
-        """Add a feature whose datums have been added before. Raises GeometryFault."""
-        surfaces = tuple(patch(face, meshes) for face in feature.faces)
-        areas = tuple(face_area(face, meshes) for face in feature.faces)
-        self._check_disjoint(feature, areas, meshes)
-        geometry = feature_geometry(surfaces)
+    def add(self, declared: Feature | Pattern, part: int, meshes: Meshes) -> None:
+        """Add a feature or a pattern whose datums have been added before. Raises GeometryFault."""
+        present = {nominal.feature: nominal for nominal in self.features}
+        new = [member for member in declared.members if member not in present]
+        if isinstance(declared, Pattern) and (lost := [member.name for member in declared.borrowed if member in new]):
+            raise GeometryFault(f'its member "{lost[0]}" could not be made; mend that feature first')
+        surfaces = {member: tuple(patch(face, meshes) for face in member.faces) for member in new}
+        areas = {member: tuple(face_area(face, meshes) for face in member.faces) for member in new}
+        for number, member in enumerate(new):
+            self._check_disjoint(member, areas, new[:number], meshes)
+        geometries = {member: feature_geometry(surfaces[member]) for member in new}
+        shapes = [geometries[member] if member in geometries else present[member].geometry for member in declared.members]
+        if declared.tolerances:
+            check_alike(shapes)
+        geometry = PatternGeometry(tuple(shapes))
         start = self.first_column + len(self.labels)
-        datums = {
-            datum.feature.datum: Datum(datum.feature, datum.geometry, padded(datum.coordinates, start))
-            for datum in self.features
-            if datum.part == part
-        }
-        layers = tolerance_layers(feature, geometry, datums, start)
-        names = [name for layer in layers for name in freedom_names(geometry, layer.added)]
-        column, leans = start, dict[int, Lean]()
-        for layer in layers:
-            first = start + len(names)
-            leans |= {first + k: lean.at_column(start, first) for k, lean in enumerate(layer.frame.leans)}
-            names += [f"datum {lean.datum} of {layer.tolerance.datums}" for lean in layer.frame.leans]
-        shift = min(leans, default=0)
-        if feature.size is not None:
-            _check_size(feature, geometry)
-            names.append("size")
-        coordinates = np.zeros((len(geometry.names), start + len(names)))
-        for layer in layers:
-            followed = layer.followed(geometry)
-            count, shifts = layer.added.shape[1], len(layer.frame.leans)
-            coordinates[:, column : column + count] = layer.added
-            coordinates[:, :start] += followed[:, :start]
-            coordinates[:, shift : shift + shifts] = followed[:, start:]
-            column, shift = column + count, shift + shifts
-        labels = tuple(f"{feature.part.name}.{feature.name}.{name}" for name in names)
-        self.features.append(
-            NominalFeature(feature, part, geometry, layers, start, labels, coordinates, leans, surfaces, areas)
-        )
+        datums = {pattern.declared.datum: pattern.datums for pattern in self.patterns if pattern.part == part}
+        layers = tolerance_layers(declared, geometry, datums, start)
+        names = _freedom_names(declared, geometry, layers)
+        leans, coordinates = _coordinates(geometry, layers, start)
+        names += [f"{declared.name}.datum {lean.datum} of {system}" for lean, system in leans.values()]
+        sizes = dict[Feature, int]()
+        if declared.size is not None:
+            for member in new:
+                _check_size(member, geometries[member])
+                sizes[member] = start + len(names)
+                names.append(f"{member.name}.size")
+        coordinates = padded(coordinates, start + len(names))
+        members = [
+            present.get(member)
+            or NominalFeature(
+                member, part, shapes[k], coordinates[geometry.slices[k]],
+                sizes.get(member), surfaces[member], areas[member],
+            )
+            for k, member in enumerate(declared.members)
+        ]  # fmt: skip
+        self.features += [member for member in members if member.feature in geometries]
+        labels = tuple(f"{declared.part.name}.{name}" for name in names)
+        shifts = {column: lean for column, (lean, _) in leans.items()}
+        self.patterns.append(NominalPattern(declared, tuple(members), geometry, layers, start, labels, shifts))
 
-    def _check_disjoint(self, feature: Feature, areas: Sequence[FaceArea], meshes: Meshes) -> None:
-        """Raise GeometryFault if a face that deviates with the feature also deviates with a feature added before."""
+    def _check_disjoint(
+        self, feature: Feature, areas: Mapping[Feature, Sequence[FaceArea]], members: Sequence[Feature], meshes: Meshes
+    ) -> None:
+        """Raise GeometryFault if a face that deviates with a feature also deviates with one before, or of its pattern."""
         mesh = meshes[feature.part]
-        for earlier in (earlier for earlier in self.features if earlier.feature.part is feature.part):
-            for face, moves in zip(areas, _moving_faces(feature), strict=True):
-                for earlier_face, earlier_moves in zip(earlier.areas, _moving_faces(earlier.feature), strict=True):
+        present = [(nominal.feature, nominal.areas) for nominal in self.features if nominal.feature.part is feature.part]
+        for earlier, earlier_areas in [*present, *((member, areas[member]) for member in members)]:
+            for face, moves in zip(areas[feature], _moving_faces(feature), strict=True):
+                for earlier_face, earlier_moves in zip(earlier_areas, _moving_faces(earlier), strict=True):
                     if moves and earlier_moves and face.share(earlier_face, mesh) > MIN_SHARE:
                         raise GeometryFault(
-                            f'it shares a face with feature "{earlier.feature.name}", so that would deviate twice; give all '
+                            f'it shares a face with feature "{earlier.name}", so that would deviate twice; give all '
                             "tolerances of a face to one feature"
                         )
 
@@ -181,7 +220,7 @@ class Features:
 
         Raises GeometryFault if a part of it belongs to a feature, and the rest does not.
         """
-        candidates = [feature for feature in self.features if feature.feature.part is face.part and feature.labels]
+        candidates = [feature for feature in self.features if feature.feature.part is face.part and feature.varies]
         area = face_area(face, meshes) if candidates else None
         for feature in candidates:
             for number, feature_area in enumerate(feature.areas):
@@ -230,18 +269,55 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
         )
 
 
-def datum_order(part: Part) -> tuple[list[Feature], list[Feature]]:
-    """Return the features of a part, each after its datums, and the features whose datums refer to each other in a circle."""
-    remaining, letters, ordered = list(part.features), set[str](), list[Feature]()
+def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:
+    """Return the names "feature.freedom" of the directions that layers add, of the feature or pattern that they move."""
+    names, counts = list[str](), Counter[str]()
+    for direction in (direction for layer in layers for direction in layer.added.T):
+        number = geometry.owner(direction)
+        owner = declared.name if number is None else declared.members[number].name
+        name = f"{owner}.{geometry.freedom_name(direction)}"
+        counts[name] += 1
+        names.append(f"{name} {counts[name]}" if name.endswith((MIXED, RELATIVE)) else name)
+    return names
+
+
+def _coordinates(
+    geometry: PatternGeometry, layers: Sequence[Layer], start: int
+) -> tuple[dict[int, tuple[Lean, str]], np.ndarray]:
+    """Return leans with the names of their datum systems by columns, and coordinates (coordinate, column).
+
+    The columns from `start` on are the directions that layers add, then the leans.
+    """
+    shift = start + sum(layer.added.shape[1] for layer in layers)
+    coordinates = np.zeros((geometry.count, shift + sum(len(layer.frame.leans) for layer in layers)))
+    column, leans = start, dict[int, tuple[Lean, str]]()
+    for layer in layers:
+        followed = layer.followed(geometry)
+        count, shifts = layer.added.shape[1], len(layer.frame.leans)
+        leans |= {shift + k: (lean.at_column(start, shift), layer.tolerance.datums) for k, lean in enumerate(layer.frame.leans)}
+        coordinates[:, column : column + count] = layer.added
+        coordinates[:, :start] += followed[:, :start]
+        coordinates[:, shift : shift + shifts] = followed[:, start:]
+        column, shift = column + count, shift + shifts
+    return leans, coordinates
+
+
+def datum_order(part: Part) -> tuple[list[Feature | Pattern], list[Feature | Pattern]]:
+    """Return the features and patterns of a part, each after its datums, and those whose datums refer to each other."""
+    remaining, letters, ordered = list(part.toleranced), set[str](), list[Feature | Pattern]()
     while remaining:
-        ready = [feature for feature in remaining if _letters(feature) <= letters]
+        ready = [declared for declared in remaining if _letters(declared) <= letters and _borrowed(declared) <= set(ordered)]
         if not ready:
             return ordered, remaining
         ordered += ready
-        letters |= {feature.datum for feature in ready if feature.datum}
-        remaining = [feature for feature in remaining if feature not in ready]
+        letters |= {declared.datum for declared in ready if declared.datum}
+        remaining = [declared for declared in remaining if declared not in ready]
     return ordered, []
 
 
-def _letters(feature: Feature) -> set[str]:
-    return {letter for tolerance in feature.geometric for compartment in tolerance.system for letter in compartment}
+def _letters(declared: Feature | Pattern) -> set[str]:
+    return {letter for tolerance in declared.geometric for compartment in tolerance.system for letter in compartment}
+
+
+def _borrowed(declared: Feature | Pattern) -> set[Feature | Pattern]:
+    return set(declared.borrowed) if isinstance(declared, Pattern) else set()

@@ -9,12 +9,15 @@ import scipy
 
 from tolcontact.declaration import OUTSIDE, Feature, GeometricTolerance
 from tolcontact.declaration.feature_tolerance import TRANSLATIONS
+from tolcontact.declaration.toleranced import Toleranced
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import FeatureGeometry, PlaneFeature
+from tolcontact.features.pattern_geometry import MIN_LENGTH, PatternGeometry
 from tolcontact.features.tolerance_kinds import zone_of
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a displacement that a datum notices
 MIN_LEAN = 1e-9  # mm of extremes of a plane, for deviations of 1
+MIN_PART = 1e-12  # of a unit vector: smaller entries are rounding
 RANK_TOLERANCE = 1e-4  # smallest singular value of an independent direction: shapes of single precision are no better
 
 
@@ -86,21 +89,21 @@ class DatumFrame(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Layer:
-    """The freedoms of a feature that one tolerance controls beyond the tolerances within it.
+    """The freedoms of a feature or pattern that one tolerance controls beyond the tolerances within it.
 
-    rows        (point, component, coordinate) of its zone (see tolerance_kinds.Zone)
+    rows        for each member (point, component, coordinate of the member) of its zone (see tolerance_kinds.Zone)
     controlled  (coordinate, n): orthonormal directions that its datums lock
     added       (coordinate, k): directions that no narrower tolerance controls and that its rule draws; each is a contributor
     frame       of its datum system
     """
 
     tolerance: GeometricTolerance
-    rows: np.ndarray
+    rows: tuple[np.ndarray, ...]
     controlled: np.ndarray
     added: np.ndarray
     frame: DatumFrame
 
-    def followed(self, geometry: FeatureGeometry) -> np.ndarray:
+    def followed(self, geometry: PatternGeometry) -> np.ndarray:
         """Return how the feature follows the frame (coordinate, column), in what this layer adds."""
         return np.asarray(self.added @ self.added.T @ geometry.values @ self.frame.motion)
 
@@ -160,22 +163,23 @@ def padded(coordinates: np.ndarray, columns: int) -> np.ndarray:
 
 
 def tolerance_layers(
-    feature: Feature, geometry: FeatureGeometry, datums: Mapping[str | None, Datum], columns: int
+    declared: Toleranced, geometry: PatternGeometry, datums: Mapping[str | None, Sequence[Datum]], columns: int
 ) -> tuple[Layer, ...]:
-    """Return a layer for each geometric tolerance of a feature, from the one that controls fewest freedoms on.
+    """Return a layer for each geometric tolerance of a feature or pattern, from the one that controls fewest freedoms on.
 
     `datums` are by their letters. Raises GeometryFault for tolerances that the feature cannot have, or that do not nest.
     """
-    candidates = [_layer(tolerance, geometry, datums, columns) for tolerance in feature.geometric]
+    candidates = [_layer(tolerance, geometry, datums, columns) for tolerance in declared.geometric]
     candidates.sort(key=lambda layer: (layer.controlled.shape[1], layer.tolerance.width))
     layers: list[Layer] = []
-    controlled_before = np.zeros((len(geometry.names), 0))
+    controlled_before = np.zeros((geometry.count, 0))
     for candidate in candidates:
         tolerance, controlled = candidate.tolerance, candidate.controlled
         _check_nesting(candidate, layers)
-        added = _along_coordinates(_difference(controlled, controlled_before), geometry)
+        is_outer = controlled_before.shape[1] > 0
+        added = _named_basis(_difference(controlled, controlled_before), geometry, is_outer=is_outer)
         if tolerance.rule in TRANSLATIONS:
-            added = _translations(tolerance, geometry, added)
+            added = _translations(tolerance, geometry, added, is_outer=is_outer)
         if controlled.shape[1] and not added.shape[1]:
             raise GeometryFault(
                 f"{tolerance.kind} {tolerance.width:g} controls nothing that others do not; leave one of them out"
@@ -186,21 +190,23 @@ def tolerance_layers(
     return tuple(layers)
 
 
-def _layer(tolerance: GeometricTolerance, geometry: FeatureGeometry, datums: Mapping[str | None, Datum], columns: int) -> Layer:
+def _layer(
+    tolerance: GeometricTolerance, geometry: PatternGeometry, datums: Mapping[str | None, Sequence[Datum]], columns: int
+) -> Layer:
     """Return the layer of a tolerance by itself, to which nothing is added yet."""
     absent = [letter for compartment in tolerance.system for letter in compartment if letter not in datums]
     if absent:
         raise GeometryFault(f"{tolerance.kind} refers to datum {absent[0]}, which could not be made; mend its feature first")
-    system = [[datums[letter] for letter in compartment] for compartment in tolerance.system]
-    rows = zone_of(tolerance, geometry, system[0][0].geometry if system else None).rows
+    system = [[datum for letter in compartment for datum in datums[letter]] for compartment in tolerance.system]
+    primary = system[0][0].geometry if system else None
+    rows = tuple(zone_of(tolerance, member, primary).rows for member in geometry.members)
     frame = datum_frame(system, geometry.centre, geometry.reach, columns, tolerance.orientation_only)
-    nothing = np.zeros((len(geometry.names), 0))
-    controlled = _controlled(rows, geometry, frame) if system else nothing
-    if len(rows) and system and not controlled.shape[1]:
-        raise GeometryFault(
-            f"{tolerance.kind}: the datum system {tolerance.datums} does not lock any of what is toleranced; "
-            "add the datum that does"
-        )
+    nothing = np.zeros((geometry.count, 0))
+    is_limited = system or len(geometry.members) > 1  # a common zone limits the members to each other
+    controlled = _controlled(rows, geometry, frame) if is_limited else nothing
+    if any(map(len, rows)) and is_limited and not controlled.shape[1]:
+        reason = f"the datum system {tolerance.datums} does not lock any" if system else "a common zone limits nothing"
+        raise GeometryFault(f"{tolerance.kind}: {reason} of what is toleranced; add the datum that does")
     return Layer(tolerance, rows, controlled, nothing, frame)
 
 
@@ -217,20 +223,21 @@ def _check_nesting(outer: Layer, layers: Sequence[Layer]) -> None:
             )
 
 
-def _translations(tolerance: GeometricTolerance, geometry: FeatureGeometry, added: np.ndarray) -> np.ndarray:
-    """Return the part of the added directions (coordinate, n) that does not turn the feature."""
-    turns = geometry.twists[3:] @ added * geometry.reach
+def _translations(tolerance: GeometricTolerance, geometry: PatternGeometry, added: np.ndarray, *, is_outer: bool) -> np.ndarray:
+    """Return the part of the added directions (coordinate, n) that does not turn a feature."""
+    turns = geometry.turns @ added
     _, S, Vt = np.linalg.svd(turns)
     translations = added @ Vt[int((S > RANK_TOLERANCE).sum()) :].T
     if not translations.shape[1]:
         raise GeometryFault(f'{tolerance.kind}: the rule "{tolerance.rule}" leaves nothing, as its datums lock tilts alone')
-    return _along_coordinates(translations, geometry)
+    return _named_basis(translations, geometry, is_outer=is_outer)
 
 
-def _controlled(rows: np.ndarray, geometry: FeatureGeometry, frame: DatumFrame) -> np.ndarray:
+def _controlled(rows: Sequence[np.ndarray], geometry: PatternGeometry, frame: DatumFrame) -> np.ndarray:
     """Return the directions (coordinate, n) that the zone limits and that no free motion of the datum frame changes."""
-    limited = _span(rows.reshape(-1, rows.shape[-1]).T)
-    return _difference(limited, _span(limited @ limited.T @ geometry.values @ frame.free))
+    limited = _span(np.asarray(scipy.linalg.block_diag(*(member.reshape(-1, member.shape[-1]).T for member in rows))))
+    controlled = _difference(limited, _span(limited @ limited.T @ geometry.values @ frame.free))
+    return _named_basis(controlled, geometry, is_outer=False)
 
 
 def _span(vectors: np.ndarray) -> np.ndarray:
@@ -246,18 +253,29 @@ def _difference(basis: np.ndarray, subtracted: np.ndarray) -> np.ndarray:
     return _span(basis - subtracted @ (subtracted.T @ basis))
 
 
-def _along_coordinates(directions: np.ndarray, geometry: FeatureGeometry) -> np.ndarray:
-    """Return unit vectors along coordinates if they have the same span as `directions`; else `directions`."""
-    projector = directions @ directions.T
+def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer: bool) -> np.ndarray:
+    """Return unit vectors with the same span as `directions` (coordinate, n), along coordinates as far as there are any.
+
+    Directions of the outer tolerance of a pattern are along its common motions first. What is along neither follows from
+    the projections of the coordinates, in their order, so that the vectors depend on the span alone.
+    """
+    projector, count = directions @ directions.T, directions.shape[1]
+    coordinates = np.eye(geometry.count)
     spanned = np.flatnonzero(np.diag(projector) > 1 - 1e-6)
-    return np.eye(len(geometry.names))[:, spanned] if len(spanned) == directions.shape[1] else directions
-
-
-def freedom_names(geometry: FeatureGeometry, added: np.ndarray) -> list[str]:
-    """Return the names of added directions (coordinate, k): of the coordinates that they are along, or "mixed 1", ..."""
-    coordinates = np.abs(added).argmax(axis=0)
-    is_along = np.abs(added).max(axis=0, initial=0) > 1 - 1e-6
-    return [
-        geometry.names[coordinate] if along else f"mixed {number + 1}"
-        for number, (coordinate, along) in enumerate(zip(coordinates, is_along, strict=True))
-    ]
+    if len(spanned) == count:
+        return coordinates[:, spanned]
+    motions = geometry.common_motions if is_outer and len(geometry.members) > 1 else np.zeros((geometry.count, 0))
+    lengths = np.linalg.norm(motions, axis=0)
+    motions = motions[:, lengths > MIN_LENGTH] / lengths[lengths > MIN_LENGTH]
+    within = np.linalg.norm(projector @ motions - motions, axis=0) < RANK_TOLERANCE
+    candidates = np.hstack([motions[:, within], coordinates[:, spanned], projector])
+    basis = np.zeros((geometry.count, 0))
+    for candidate in candidates.T:
+        rest = candidate
+        for _ in range(2):  # twice is enough to be orthogonal to rounding
+            rest = rest - basis @ (basis.T @ rest)
+        if (length := np.linalg.norm(rest)) > RANK_TOLERANCE and basis.shape[1] < count:
+            vector = rest / length
+            vector[np.abs(vector) < MIN_PART] = 0.0
+            basis = np.column_stack([basis, vector])
+    return basis

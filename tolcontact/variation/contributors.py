@@ -1,6 +1,6 @@
 """Contributors: everything that varies, and its distribution. Each is a column of the deviations."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, SupportsIndex
 
@@ -10,9 +10,19 @@ from scipy.special import ndtr, ndtri
 from tolcontact.declaration import GeometricTolerance, Tolerance
 from tolcontact.declaration.feature_tolerance import EXTREMES, INSIDE
 from tolcontact.discretization import Nominal
-from tolcontact.errors import ModelError
-from tolcontact.features import AxisFeature, FeatureOfSize, Layer, NominalFeature, PlaneFeature
+from tolcontact.errors import ModelError, designation
+from tolcontact.features import AxisFeature, Layer, NominalPattern
 from tolcontact.variation import zones
+from tolcontact.variation.component_zones import (
+    ComponentZone,
+    MemberGroup,
+    bonus,
+    component_zone,
+    member_groups,
+    member_zones,
+    uneven_shifts,
+)
+from tolcontact.variation.zones import MemberZone
 
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
 JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
@@ -114,36 +124,15 @@ class JointDraw:
 
 
 @dataclass(frozen=True, eq=False)
-class ComponentZone:
-    """A zone of the components of a feature.
-
-    No row of `rows` @ (components - middle) is longer than half of the width, enlarged by the bonus.
-
-    columns     of the deviations: the components
-    rows        (point, entry, component)
-    middle      (component,): not 0 for a zone that is disposed unevenly
-    size        column of the feature's size, if the zone grows as that departs from `limit` in the direction `growth` (1, -1)
-    """
-
-    columns: np.ndarray
-    rows: np.ndarray
-    middle: np.ndarray
-    width: float
-    size: int | None = None
-    limit: float = 0.0
-    growth: float = 0.0
-
-
-@dataclass(frozen=True, eq=False)
 class Bonus:
     """Components that fill the zone enlarged by the size of their feature: those of the nominal zone times its growth.
 
-    columns, size   of the deviations: the components, and the size of their feature
-    factor          (n,) for size deviations (n,)
+    columns, sizes  of the deviations: the components, and the sizes of the features that they move
+    factor          (n,) for size deviations (n, size)
     """
 
     columns: np.ndarray
-    size: int
+    sizes: np.ndarray
     factor: Callable[[np.ndarray], np.ndarray]
 
 
@@ -160,8 +149,8 @@ class Contributors:
         locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
         self._contributors = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
         self._assembly = nominal.assembly
-        for feature in nominal.features:
-            self._contributors += self._feature_contributors(feature)
+        for pattern in nominal.patterns:
+            self._contributors += self._pattern_contributors(pattern)
         variables = nominal.assembly.variables
         self._contributors += [Contributor(cause.name, VARIABLE, cause.units, cause.tolerance) for cause in variables]
 
@@ -174,120 +163,96 @@ class Contributors:
     def __iter__(self) -> Iterator[Contributor]:
         return iter(self._contributors)
 
-    def _feature_contributors(self, feature: NominalFeature) -> Iterator[Contributor]:
-        """Yield the freedoms of a feature's layers, from the innermost on, then its leans and its size."""
-        labels, column = iter(feature.labels), feature.first_column
-        basis, spreads = np.zeros((len(feature.geometry.names), 0)), np.zeros(0)
-        for layer in feature.layers:
+    def _pattern_contributors(self, pattern: NominalPattern) -> Iterator[Contributor]:
+        """Yield the freedoms of a pattern's layers, from the innermost on, then its leans and the sizes of its members."""
+        labels, column = iter(pattern.labels), pattern.first_column
+        basis, spreads = np.zeros((pattern.geometry.count, 0)), np.zeros(0)
+        for layer in pattern.layers:
             count = layer.added.shape[1]
             if not count:
                 continue
-            tolerance, columns = layer.tolerance, np.arange(column, column + count)
+            tolerance = layer.tolerance
             basis = np.hstack([basis, layer.added])
-            rows = layer.rows @ (layer.controlled @ layer.controlled.T @ basis)
-            self._check_rule(feature, layer, is_innermost=not len(spreads))
-            width = float(tolerance.width) or self._unit_width(feature, tolerance, is_innermost=not len(spreads))
+            members = member_zones(pattern, layer, basis)
+            width = float(tolerance.width) or self._unit_width(pattern, tolerance, is_innermost=not len(spreads))
             spread_rule = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
-            spread = spread_rule(rows, spreads, count, width)
-            self._check_inner_share(feature, layer, rows[..., : len(spreads)], spreads, width)
+            spread = spread_rule(members, spreads, count, width)
+            self._check_inner_share(pattern, layer, [member.take(len(spreads)) for member in members], spreads, width)
+            is_innermost = not len(spreads)
             spreads = np.concatenate([spreads, np.full(count, spread / tolerance.cp)])
-            mean = _mean(feature, layer, spread)
-            self.zones.append(_component_zone(feature, layer, rows, feature.first_column + np.arange(rows.shape[-1])))
-            if tolerance.rule in JOINT_RULES:
-                self.joint_draws.append(JointDraw(tolerance.rule, columns, _joint_draw(tolerance.rule, rows, spread, width)))
-            if tolerance.material and tolerance.bonus == "fills" and feature.size_column is not None:
-                self.bonuses.append(Bonus(columns, feature.size_column, _bonus_factor(feature, tolerance, width)))
+            mean = uneven_shifts(pattern, layer)
+            for group in member_groups(pattern, layer, members):
+                self._check_rule(pattern, layer, group, is_innermost=is_innermost)
+                self.zones.append(component_zone(pattern, layer, group))
+                self._add_joint_draws(layer, group, column + group.added, spread, width)
+                if tolerance.cpk is not None:
+                    mean[group.added[:1]] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
             for k in range(count):
                 yield Contributor(next(labels), FEATURE, "mm", None, layer, spread / tolerance.cp, float(mean[k]))
             column += count
-        for _ in feature.leans:
+        for _ in pattern.leans:
             yield Contributor(next(labels), DATUM, "mm")
-        if feature.feature.size is not None:
-            yield Contributor(next(labels), FEATURE, "mm", feature.feature.size.tolerance)
+        if pattern.declared.size is not None:
+            for _ in pattern.members:
+                yield Contributor(next(labels), FEATURE, "mm", pattern.declared.size.tolerance)
 
-    def _check_rule(self, feature: NominalFeature, layer: Layer, *, is_innermost: bool) -> None:
-        rule, layers = layer.tolerance.rule, sum(layer.added.shape[1] > 0 for layer in feature.layers)
+    def _add_joint_draws(self, layer: Layer, group: MemberGroup, columns: np.ndarray, spread: float, width: float) -> None:
+        """Add how the components of a group that a layer adds, `columns` of the deviations, are drawn together."""
+        tolerance, member = layer.tolerance, group.members[0]
+        if tolerance.rule in JOINT_RULES:
+            draw = _joint_draw(tolerance.rule, np.concatenate(group.rows), spread, width)
+            self.joint_draws.append(JointDraw(tolerance.rule, columns, draw))
+        if tolerance.material and tolerance.bonus == "fills" and len(group.sizes):
+
+            def factor(sizes: np.ndarray) -> np.ndarray:
+                return np.asarray((tolerance.width + bonus(member, tolerance, sizes).min(axis=1)) / width)
+
+            self.bonuses.append(Bonus(columns, group.sizes, factor))
+
+    def _check_rule(self, pattern: NominalPattern, layer: Layer, group: MemberGroup, *, is_innermost: bool) -> None:
+        rule, layers = layer.tolerance.rule, sum(layer.added.shape[1] > 0 for layer in pattern.layers)
         if rule in JOINT_RULES and (not is_innermost or layers > 1):
             raise self._error(
-                feature,
+                pattern,
                 f'{layer.tolerance.kind}: the rule "{rule}" is for features with one tolerance of place or orientation; choose '
                 f'"{INSIDE}" or "{EXTREMES}"',
             )
-        is_axis = isinstance(feature.geometry, AxisFeature)
-        if rule == "polar" and not (is_axis and layer.rows.shape[1] == layer.added.shape[1] == 2):
+        if rule in JOINT_RULES and len(group.members) > 1:
+            raise self._error(
+                pattern,
+                f'{layer.tolerance.kind}: the rule "{rule}" is for members that deviate by themselves, and the datums leave '
+                f'members to deviate together; choose "{INSIDE}" or "{EXTREMES}", or add the datum that locks them',
+            )
+        is_axis = isinstance(group.members[0].geometry, AxisFeature)
+        if rule == "polar" and not (is_axis and group.rows[0].shape[1] == len(group.added) == 2):
             fault = f'{layer.tolerance.kind}: the rule "polar" is for axes in round zones; choose "{INSIDE}"'
-            raise self._error(feature, fault)
+            raise self._error(pattern, fault)
 
     def _check_inner_share(
-        self, feature: NominalFeature, layer: Layer, rows: np.ndarray, spreads: np.ndarray, width: float
+        self, pattern: NominalPattern, layer: Layer, members: Sequence[MemberZone], spreads: np.ndarray, width: float
     ) -> None:
         """Raise ModelError if narrower tolerances, with spreads (component,), leave too many features outside of the zone."""
-        share = zones.share_inside(rows, spreads, width)
+        share = zones.share_inside(members, spreads, width)
         if share < zones.SHARE - INNER_SHARE_TOLERANCE:
             raise self._error(
-                feature,
+                pattern,
                 f"{layer.tolerance.kind} {layer.tolerance.width:g}: the narrower tolerances within it leave "
                 f"{100 * (1 - share):.2g} % of the features outside already; make these narrower, or it wider",
             )
 
-    def _unit_width(self, feature: NominalFeature, tolerance: GeometricTolerance, *, is_innermost: bool) -> float:
+    def _unit_width(self, pattern: NominalPattern, tolerance: GeometricTolerance, *, is_innermost: bool) -> float:
         """Return the width [mm] for which spreads are computed if a zone has width 0: its bonus scales them."""
         if tolerance.bonus != "fills" or not is_innermost:
             raise self._error(
-                feature,
+                pattern,
                 f'{tolerance.kind}: a zone of width 0 is its bonus alone; it needs bonus="fills", and no tolerance within',
             )
         return 1.0
 
-    def _error(self, feature: NominalFeature, fault: str) -> ModelError:
-        declared = feature.feature
-        place = f'part "{declared.part.name}": feature "{declared.name}" ({declared.declared_at})'
+    def _error(self, pattern: NominalPattern, fault: str) -> ModelError:
+        declared = pattern.declared
+        place = f'part "{declared.part.name}": {designation(declared.noun, declared)}'
         return ModelError(self._assembly.name, [f"{place}: {fault}"])
-
-
-def _mean(feature: NominalFeature, layer: Layer, spread: float) -> np.ndarray:
-    """Return the means (component,) of the added components: of an uneven profile, and what `cpk` requires of the first."""
-    tolerance, mean = layer.tolerance, np.zeros(layer.added.shape[1])
-    if isinstance(feature.geometry, PlaneFeature):
-        mean += _uneven_shift(tolerance) * layer.added[0]
-    if tolerance.cpk is not None and mean.size:
-        mean[0] += 3 * spread * (1 - tolerance.cpk / tolerance.cp)
-    return mean
-
-
-def _uneven_shift(tolerance: GeometricTolerance) -> float:
-    """Return how far [mm] the middle of a zone lies outside of the nominal feature."""
-    return 0.0 if tolerance.outside is None else tolerance.outside - tolerance.width / 2
-
-
-def _component_zone(feature: NominalFeature, layer: Layer, rows: np.ndarray, columns: np.ndarray) -> ComponentZone:
-    """Return the zone that a layer's tolerance is for the components of this layer and the narrower ones."""
-    tolerance, size, middle = layer.tolerance, feature.feature.size, np.zeros(len(columns))
-    if isinstance(feature.geometry, PlaneFeature):
-        middle[-layer.added.shape[1] :] = _uneven_shift(tolerance) * layer.added[0]
-    if size is None or not tolerance.material or tolerance.bonus == "none":
-        return ComponentZone(columns, rows, middle, tolerance.width)
-    limit, growth = (size.lower, 1.0) if _counts_from_lower(feature, tolerance) else (size.upper, -1.0)
-    return ComponentZone(columns, rows, middle, tolerance.width, feature.size_column, limit, growth)
-
-
-def _bonus_factor(feature: NominalFeature, tolerance: GeometricTolerance, width: float) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the growth of a zone as a function of size deviations, relative to the `width` that its spread is computed for."""
-    return lambda size: (tolerance.width + bonus(feature, tolerance, size)) / width
-
-
-def bonus(feature: NominalFeature, tolerance: GeometricTolerance, size: np.ndarray) -> np.ndarray:
-    """Return the growth (n,) [mm] of a zone for size deviations (n,): their departure from the material limit."""
-    limits = feature.feature.size
-    if limits is None or not tolerance.material:
-        return np.zeros_like(size)
-    return np.maximum(size - limits.lower if _counts_from_lower(feature, tolerance) else limits.upper - size, 0.0)
-
-
-def _counts_from_lower(feature: NominalFeature, tolerance: GeometricTolerance) -> bool:
-    """Return whether a zone grows as the size exceeds its lower limit; else it grows as the size falls below the upper one."""
-    is_inner = isinstance(feature.geometry, FeatureOfSize) and feature.geometry.is_inner
-    return is_inner == (tolerance.material == "M")
 
 
 def _joint_draw(rule: str, rows: np.ndarray, spread: float, width: float) -> Callable[[Uniforms], np.ndarray]:

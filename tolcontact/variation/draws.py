@@ -27,7 +27,7 @@ class Draws:
     def __init__(self, nominal: Nominal) -> None:
         self.contributors = Contributors(nominal)
         self._assembly = nominal.assembly
-        self.leans = {column: lean for feature in nominal.features for column, lean in feature.leans.items()}
+        self.leans = {column: lean for pattern in nominal.patterns for column, lean in pattern.leans.items()}
         self._column = {contributor.label: k for k, contributor in enumerate(self.contributors)}
         self._check_correlations()
         self._plan = Plan(MONTE_CARLO, [])
@@ -129,11 +129,11 @@ class Draws:
     def _add_causes_and_bonuses(self, deviations: np.ndarray) -> None:
         """Add shared causes to sizes, scale components by the bonus of their sizes, and add shared causes to the rest."""
         measured = [column for columns, _ in self.populations for column in columns]
-        sizes = {bonus.size for bonus in self.contributors.bonuses}
+        sizes = {int(size) for bonus in self.contributors.bonuses for size in bonus.sizes}
         self._add_causes(deviations, lambda column: column in sizes)
         for bonus in self.contributors.bonuses:
             columns = np.setdiff1d(bonus.columns, measured)  # measured parts have used their bonus
-            deviations[:, columns] *= bonus.factor(deviations[:, bonus.size])[:, None]
+            deviations[:, columns] *= bonus.factor(deviations[:, bonus.sizes])[:, None]
         self._add_causes(deviations, lambda column: column not in sizes)
 
     @property
@@ -149,7 +149,7 @@ class Draws:
         sets += [[self._column[label] for label in population.columns] for population in assembly.populations]
         sets += [[int(column) for column in joint.columns] for joint in self.contributors.joint_draws]
         together = [[column, *map(int, np.flatnonzero(lean.extremes.any(axis=0)))] for column, lean in self.leans.items()]
-        together += [[bonus.size, *(int(column) for column in bonus.columns)] for bonus in self.contributors.bonuses]
+        together += [list(map(int, [*bonus.sizes, *bonus.columns])) for bonus in self.contributors.bonuses]
         # What follows from others by more than a sum also follows from the causes that drive them.
         followed = {column for columns in together for column in columns}
         driven = [[self._column[cause.name], *(self._column[label] for label in cause.drives)] for cause in assembly.variables]

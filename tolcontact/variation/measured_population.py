@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from tolcontact.declaration import OUTSIDE, GeometricTolerance
+from tolcontact.declaration import OUTSIDE
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
-from tolcontact.features import NominalFeature, PlaneFeature, zone_of
-from tolcontact.variation.contributors import bonus
+from tolcontact.features import Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
+from tolcontact.variation.component_zones import bonus
 from tolcontact.variation.draws import Draws
 
 MIN_NOTICED = 1e-4  # smallest singular value, relative to the largest, of a motion that datums notice
@@ -26,8 +26,9 @@ class MeasuredZone(NamedTuple):
     """The result of measuring one tolerance of a feature.
 
     stated    the share inside that its rule states; NaN if it states none
-    inside    number of features inside
-    drawn     number of drawn features
+    feature   as part.feature, or as part.pattern
+    inside    number of features inside; of a pattern, of one member in turn
+    drawn     number of drawn features or patterns
     needed    [mm]: width of the zone that 99.73 % of them need
     """
 
@@ -47,53 +48,77 @@ class _Measurement(NamedTuple):
 
 
 def measured_population(nominal: Nominal, draws: Draws, *, seed: int, count: int) -> Iterator[MeasuredZone]:
-    """Measure every tolerance of every feature on `count` drawn features."""
+    """Measure every tolerance of every feature or pattern on `count` drawn ones.
+
+    Of each drawn pattern one member is judged, in turn: the results are then independent of each other.
+    """
     deviations = draws(seed=seed, start=0, stop=count)
-    for feature in nominal.features:
-        size = feature.feature.size
-        if size is not None and feature.size_column is not None:
-            from_middle = deviations[:, feature.size_column] - (size.upper + size.lower) / 2
+    for pattern in nominal.patterns:
+        size, columns = pattern.declared.size, [member.size_column for member in pattern.members]
+        if size is not None:
+            sizes = _in_turn([deviations[:, column] for column in columns if column is not None])
             stated = STATED_SHARE if size.distribution == "normal" and size.cp is None else np.nan
-            yield _measured_zone(feature, str(size), stated, 2 * np.abs(from_middle), size.upper - size.lower)
-        datums = {datum.feature.datum: datum for datum in nominal.features if datum.part == feature.part}
-        for layer in feature.layers:
+            needed = 2 * np.abs(sizes - (size.upper + size.lower) / 2)
+            yield _measured_zone(pattern, str(size), stated, needed, size.upper - size.lower)
+        datums = {datum.declared.datum: datum for datum in nominal.patterns if datum.part == pattern.part}
+        for layer in pattern.layers:
             if layer.controlled.shape[1]:
-                system = [[datums[letter] for letter in compartment] for compartment in layer.tolerance.system]
-                yield _measured_tolerance(feature, layer.tolerance, system, deviations)
+                system = [
+                    [member for letter in compartment for member in datums[letter].members]
+                    for compartment in layer.tolerance.system
+                ]
+                yield _measured_tolerance(pattern, layer, system, deviations)
+
+
+def _in_turn(values: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the values (n,) of one member of each of n patterns, in turn, from those of all members, each (n,)."""
+    rows = np.arange(len(values[0]))
+    return np.asarray(np.array(values)[rows % len(values), rows])
 
 
 def _measured_zone(
-    feature: NominalFeature, tolerance: str, stated: float, needed: np.ndarray, allowed: np.ndarray | float
+    pattern: NominalPattern, tolerance: str, stated: float, needed: np.ndarray, allowed: np.ndarray | float
 ) -> MeasuredZone:
     inside = needed <= np.asarray(allowed) * (1 + ROUNDING)
     width = float(np.quantile(needed, STATED_SHARE))
-    return MeasuredZone(feature.label, tolerance, stated, int(inside.sum()), len(needed), width)
+    return MeasuredZone(pattern.label, tolerance, stated, int(inside.sum()), len(needed), width)
 
 
 def _measured_tolerance(
-    feature: NominalFeature, tolerance: GeometricTolerance, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
+    pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
 ) -> MeasuredZone:
-    """Measure one tolerance of a feature in the system of its datum features."""
-    zone = zone_of(tolerance, feature.geometry, system[0][0].geometry)
-    places, directions = zone.probes
-    measurement = _measurement(feature, places, directions, deviations, feature.geometry.centre)
-    motion, free = _fitted_frame(feature, system, deviations, tolerance.orientation_only)
-    residuals = measurement.values - motion @ measurement.rows.T
-    # The zone follows the feature in the motions that the datums leave free.
-    U, S, _ = np.linalg.svd(measurement.rows @ free, full_matrices=False)
+    """Measure one tolerance of a feature or pattern in the system of its datum features."""
+    tolerance, centre = layer.tolerance, pattern.geometry.centre
+    primary = system[0][0].geometry if system else None
+    zones = [zone_of(tolerance, member.geometry, primary) for member in pattern.members]
+    measurements = [
+        _measurement(member, *zone.probes, deviations, centre) for member, zone in zip(pattern.members, zones, strict=True)
+    ]
+    rows = np.vstack([measurement.rows for measurement in measurements])
+    motion, free = _fitted_frame(pattern, system, deviations, tolerance.orientation_only)
+    residuals = np.hstack([measurement.values for measurement in measurements]) - motion @ rows.T
+    # The zones follow the members together in the motions that the datums leave free.
+    U, S, _ = np.linalg.svd(rows @ free, full_matrices=False)
     following = U[:, MIN_NOTICED < S]
     residuals = residuals - residuals @ following @ following.T
-    needed = zone.needed_width(residuals.reshape(len(residuals), *directions.shape[:2]))
-    allowed = np.full(len(residuals), float(tolerance.width))
-    if tolerance.bonus != "none" and feature.size_column is not None:
-        allowed += bonus(feature, tolerance, deviations[:, feature.size_column])
-    return _measured_zone(feature, f"{tolerance}; {tolerance.rule}", _stated_share(feature, tolerance), needed, allowed)
+    needed, allowed, start = [], [], 0
+    for member, zone, measurement in zip(pattern.members, zones, measurements, strict=True):
+        end = start + len(measurement.rows)
+        of_member = residuals[:, start:end].reshape(len(residuals), *zone.probes[1].shape[:2])
+        needed.append(zone.needed_width(of_member))
+        allowed.append(np.full(len(residuals), float(tolerance.width)))
+        if tolerance.bonus != "none" and member.size_column is not None:
+            allowed[-1] += bonus(member, tolerance, deviations[:, member.size_column])
+        start = end
+    stated = _stated_share(pattern, layer)
+    return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(needed), _in_turn(allowed))
 
 
-def _stated_share(feature: NominalFeature, tolerance: GeometricTolerance) -> float:
+def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
     """Return the share of features inside that the rules state; NaN if they state none."""
-    has_bonus_beside = tolerance.material and (tolerance.bonus == "accepts" or len(feature.layers) > 1)
-    tolerances = feature.feature.geometric
+    tolerance, tolerances = layer.tolerance, pattern.declared.geometric
+    is_shared = any(pattern.geometry.owner(direction) is None for direction in layer.added.T)
+    has_bonus_beside = tolerance.material and (tolerance.bonus == "accepts" or len(pattern.layers) > 1 or is_shared)
     if all(nested.rule == INSIDE and nested.cp == 1 and nested.cpk is None for nested in tolerances) and not has_bonus_beside:
         return STATED_SHARE
     return 1.0 if tolerance.rule in ("truncated", "uniform") else np.nan
@@ -116,18 +141,18 @@ def _touches_outside(datum: NominalFeature) -> bool:
 
 
 def _fitted_frame(
-    feature: NominalFeature,
+    pattern: NominalPattern,
     system: Sequence[Sequence[NominalFeature]],
     deviations: np.ndarray,
     orientation_only: Sequence[bool],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the motions (n, 6) of the datum frame about the feature's centre, and a basis (6, freedom) of its free motions.
+    """Return the motions (n, 6) of the datum frame about the pattern's centre, and a basis (6, freedom) of its free motions.
 
     The datum features of each compartment are fitted by least squares, with the motions that the compartments before it leave
     free. A plane by itself is then moved out of the material until no probe of it stands outside of its datum.
     """
-    centre = feature.geometry.centre
-    free = np.diag([1.0] * 3 + [1 / feature.geometry.reach] * 3)
+    centre = pattern.geometry.centre
+    free = np.diag([1.0] * 3 + [1 / pattern.geometry.reach] * 3)
     motion = np.zeros((len(deviations), 6))
     for compartment, is_turned in zip(system, orientation_only, strict=True):
         measurements = [_measurement(datum, *datum.geometry.extremes, deviations, centre) for datum in compartment]

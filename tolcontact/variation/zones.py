@@ -7,6 +7,10 @@ quasi-random sequence of directions gives it to some 1e-5, without draws of feat
 """
 
 import functools
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy
@@ -18,26 +22,71 @@ CHUNK = 1024  # components that are evaluated at once
 MIN_SPREAD = 1e-9  # of the width: a smaller spread counts as 0
 
 
-def share_inside(rows: np.ndarray, spreads: np.ndarray, width: float) -> float:
-    """Return the share of features, with standard deviations (component,), inside a zone of rows (point, entry, component)."""
-    varying = np.flatnonzero(spreads > 0)
-    if not varying.size or not rows.size:
-        return 1.0
-    longest = _longest(rows[..., varying], _directions(len(varying)) * spreads[varying])
-    return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varying)).mean())
+@dataclass(frozen=True, eq=False)
+class MemberZone:
+    """The zone of a feature, or of a member of a pattern, whose coordinates are linear in components.
+
+    rows         (point, entry, coordinate)
+    coordinates  (coordinate, component) for components of 1
+    """
+
+    rows: np.ndarray
+    coordinates: np.ndarray
+
+    @cached_property
+    def component_rows(self) -> np.ndarray:
+        """The rows (point, entry, component) of the components."""
+        return np.asarray(self.rows @ self.coordinates)
+
+    def take(self, count: int) -> "MemberZone":
+        """Return the same zone of the first components alone."""
+        return MemberZone(self.rows, self.coordinates[:, :count])
+
+    def share_inside(self, spreads: np.ndarray, width: float) -> float:
+        """Return the share of members, with standard deviations (component,), inside a zone of a width."""
+        rows = self.component_rows
+        if not rows.size:
+            return 1.0
+        varying = np.flatnonzero((spreads > 0) & (rows != 0).any(axis=(0, 1)))
+        rows, varied = rows[..., varying], spreads[varying]
+        if len(varying) > self.rows.shape[2]:
+            # The member has fewer coordinates than components, and the same share with the root of their covariance.
+            scaled = self.coordinates[:, varying] * varied
+            rows, varied = self.rows @ _root(scaled @ scaled.T), np.ones(self.rows.shape[2])
+        if not len(varied):
+            return 1.0
+        longest = _longest(rows, _directions(len(varied)) * varied)
+        return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
-def equal_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width: float) -> float:
-    """Return the standard deviation of `count` more components with which 99.73 % of features lie inside.
+def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> float:
+    """Return the share of members, with standard deviations (component,), inside their zones of a width: of all, the mean."""
+    counts, zones = Counter[tuple[bytes, bytes]](), dict[tuple[bytes, bytes], MemberZone]()
+    for member in members:
+        rows = member.component_rows
+        key = rows[..., (rows != 0).any(axis=(0, 1))].tobytes(), spreads[(rows != 0).any(axis=(0, 1))].tobytes()
+        counts[key] += 1
+        zones[key] = member
+    shares = [zones[key].share_inside(spreads, width) for key in counts]
+    return shares[0] if len(shares) == 1 else float(np.average(shares, weights=list(counts.values())))
 
-    rows            (point, entry, component) of all components, those with `inner_spreads` first
-    inner_spreads   (component,) standard deviations
+
+def _root(covariance: np.ndarray) -> np.ndarray:
+    """Return the symmetric root of a matrix without negative eigenvalues."""
+    variances, directions = np.linalg.eigh(covariance)
+    return np.asarray((directions * np.sqrt(np.maximum(variances, 0.0))) @ directions.T)
+
+
+def equal_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
+    """Return the standard deviation of `count` more components with which 99.73 % of the members lie inside their zones.
+
+    The components of `members` are those with `inner_spreads` (component,), which are standard deviations, and then these.
     """
 
     def excess(spread: float) -> float:
-        return share_inside(rows, np.concatenate([inner_spreads, np.full(count, spread)]), width) - SHARE
+        return share_inside(members, np.concatenate([inner_spreads, np.full(count, spread)]), width) - SHARE
 
-    if not rows.size or excess(MIN_SPREAD * width) <= 0:
+    if not any(member.rows.size for member in members) or excess(MIN_SPREAD * width) <= 0:
         return 0.0
     upper = width
     while excess(upper) > 0:  # rows may be short
@@ -45,9 +94,9 @@ def equal_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width:
     return float(scipy.optimize.brentq(excess, MIN_SPREAD * width, upper, xtol=1e-9 * width))
 
 
-def extreme_spread(rows: np.ndarray, inner_spreads: np.ndarray, count: int, width: float) -> float:
+def extreme_spread(members: Sequence[MemberZone], inner_spreads: np.ndarray, count: int, width: float) -> float:
     """Return the standard deviation of `count` more components with which 6 sigma of the worst extreme equal the width."""
-    inner_count = len(inner_spreads)
+    inner_count, rows = len(inner_spreads), np.concatenate([member.component_rows for member in members])
     inner_variance = ((rows[..., :inner_count] * inner_spreads) ** 2).sum(axis=-1)
     factors = (rows[..., inner_count : inner_count + count] ** 2).sum(axis=-1)
     variance = (width / 6) ** 2 - inner_variance

@@ -1,0 +1,73 @@
+"""What features and patterns have in common: tolerances, and whether these go together."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position, Size
+from tolcontact.declaration.values import is_length
+
+
+class Toleranced:
+    """A feature or a pattern, with its tolerances.
+
+    noun              its name in messages
+    has_common_zone   True if the zones of a position without datums keep to each other
+    """
+
+    noun: ClassVar[str] = "feature"
+    has_common_zone: ClassVar[bool] = False
+
+    tolerances: tuple[Size | GeometricTolerance, ...]
+
+    @property
+    def size(self) -> Size | None:
+        """The tolerance of the size; None without one."""
+        return next((tolerance for tolerance in self.tolerances if isinstance(tolerance, Size)), None)
+
+    @property
+    def geometric(self) -> tuple[GeometricTolerance, ...]:
+        """The geometric tolerances, without the size."""
+        return tuple(tolerance for tolerance in self.tolerances if isinstance(tolerance, GeometricTolerance))
+
+    def tolerance_faults(self, faces: int) -> Iterator[str]:
+        """Yield the faults of the tolerances, each and together, for a number of faces."""
+        for tolerance in self.tolerances:
+            yield from (f"{tolerance.kind}: {fault}" for fault in tolerance.faults())
+        yield from self._datum_faults()
+        yield from self._size_faults(faces)
+        yield from self._form_faults()
+
+    def _datum_faults(self) -> Iterator[str]:
+        for tolerance in self.geometric:
+            is_common = self.has_common_zone and isinstance(tolerance, Position)
+            if tolerance.needs_datums and not tolerance.datums and not is_common:
+                example = f'tc.{type(tolerance).__name__}({tolerance.width!r}, "A|B|C")'
+                yield f"{tolerance.kind}: it needs datums; give them as in {example}"
+
+    def _size_faults(self, faces: int) -> Iterator[str]:
+        if sum(isinstance(tolerance, Size) for tolerance in self.tolerances) > 1:
+            yield "its size is toleranced twice; leave one out"
+        for tolerance in self.geometric:
+            if tolerance.material and self.size is None:
+                yield (
+                    f"{tolerance.kind}: a bonus (material {tolerance.material!r}) needs the tolerance of a size; "
+                    "add tc.Size(...)"
+                )
+        if self.size and self.size.moves != "both" and faces == 1:
+            yield f"size: moves is {self.size.moves!r}, but the feature has one face; leave it out"
+        elif self.size and self.size.moves != "both" and any(not tolerance.is_form for tolerance in self.geometric):
+            yield (
+                f"size: moves is {self.size.moves!r}, so the feature has no middle that could have a place; give its other "
+                'tolerances to a feature of the face alone, in place of the size, or let "both" move'
+            )
+
+    def _form_faults(self) -> Iterator[str]:
+        tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
+        for form in (tolerance for tolerance in tolerances if tolerance.is_form):
+            for tolerance in tolerances:
+                contains = not tolerance.is_form and (not form.around or tolerance.kind in form.around)
+                if contains and tolerance.width < form.width:
+                    yield (
+                        f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "
+                        "expected form within orientation within location"
+                    )

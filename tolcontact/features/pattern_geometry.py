@@ -1,0 +1,115 @@
+"""The coordinates of all members of a pattern together, and motions of the pattern as a whole. Part's own frame."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from tolcontact.errors import GeometryFault
+from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, PlaneFeature
+
+SIZE_TOLERANCE = 1e-6  # relative: largest difference between sizes that count as equal
+MIN_LENGTH = 1e-4  # of the coordinates of a motion of 1 mm that a pattern notices
+MIXED, RELATIVE = "mixed", "relative"
+MOTIONS = ("common shift x", "common shift y", "common shift z", "common turn x", "common turn y", "common turn z")
+
+
+@dataclass(frozen=True, eq=False)
+class PatternGeometry:
+    """The members of a pattern. Its coordinates are those of the members, one member after the other.
+
+    A feature by itself is a pattern of one member.
+    """
+
+    members: tuple[FeatureGeometry, ...]
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """The coordinates of each member."""
+        ends = np.cumsum([0, *(len(member.names) for member in self.members)])
+        return tuple(slice(int(start), int(end)) for start, end in pairwise(ends))
+
+    @property
+    def count(self) -> int:
+        """The number of coordinates."""
+        return self.slices[-1].stop
+
+    @cached_property
+    def centre(self) -> np.ndarray:
+        """The middle (3,) [mm] of the centres of the members."""
+        centres = [member.centre for member in self.members]
+        return centres[0] if len(centres) == 1 else np.mean(centres, axis=0)
+
+    @cached_property
+    def reach(self) -> float:
+        """The largest distance [mm] of an extreme of a member from the centre."""
+        if len(self.members) == 1:
+            return self.members[0].reach
+        return max(float(np.linalg.norm(member.extremes[0] - self.centre, axis=1).max()) for member in self.members)
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """The coordinates (coordinate, 6) of a displacement (tau, rho) of all members about the centre."""
+        if len(self.members) == 1:
+            return self.members[0].values
+        return np.vstack([member.about(self.centre) for member in self.members])
+
+    @property
+    def turns(self) -> np.ndarray:
+        """The turn of each member (3 * member, coordinate) for coordinates of 1 mm, times its reach."""
+        return np.asarray(block_diag(*(member.twists[3:] * member.reach for member in self.members)))
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """The coordinates (coordinate,) if all members that are planes are 1 mm out of the material; 0 for other features."""
+        offsets = np.zeros(self.count)
+        for member, place in zip(self.members, self.slices, strict=True):
+            offsets[place.start] = isinstance(member, PlaneFeature)
+        return offsets
+
+    @property
+    def common_motions(self) -> np.ndarray:
+        """Columns (coordinate, 6): the coordinates as the pattern moves as a whole, in the order of MOTIONS."""
+        return self.values @ np.diag([1.0] * 3 + [1 / self.reach] * 3)
+
+    def owner(self, direction: np.ndarray) -> int | None:
+        """Return the number of the one member that a direction (coordinate,) moves; None if it moves several."""
+        moved = [number for number, place in enumerate(self.slices) if direction[place].any()]
+        return moved[0] if len(moved) == 1 else None
+
+    def freedom_name(self, direction: np.ndarray) -> str:
+        """Return the name of a direction (coordinate,): of its coordinate, of its motion of the pattern, "relative" or "mixed".
+
+        A relative direction moves members of a pattern to each other, and the pattern as a whole not at all.
+        """
+        coordinate = int(np.abs(direction).argmax())
+        if abs(direction[coordinate]) > 1 - 1e-6:
+            return [name for member in self.members for name in member.names][coordinate]
+        if self.owner(direction) is not None:
+            return MIXED
+        lengths = np.linalg.norm(self.common_motions, axis=0)
+        along = np.abs(direction @ self.common_motions) / np.where(lengths > MIN_LENGTH, lengths, np.inf)
+        return MOTIONS[int(along.argmax())] if along.max() > 1 - 1e-6 else RELATIVE if along.max() < 1e-6 else MIXED
+
+
+def check_alike(members: Sequence[FeatureGeometry]) -> None:
+    """Raise GeometryFault if members of a pattern are not of one kind and size."""
+    first = members[0]
+    for number, member in enumerate(members[1:], start=2):
+        is_alike = type(member) is type(first)
+        if is_alike and isinstance(member, FeatureOfSize) and isinstance(first, FeatureOfSize):
+            is_alike = member.is_inner == first.is_inner and abs(member.size - first.size) <= SIZE_TOLERANCE * first.size
+        if not is_alike:
+            raise GeometryFault(
+                f"its member 1 is {_described(first)}, and member {number} is {_described(member)}; the members of a pattern "
+                "with tolerances are of one kind and size, so declare unlike ones as patterns or features of their own"
+            )
+
+
+def _described(geometry: FeatureGeometry) -> str:
+    if not isinstance(geometry, FeatureOfSize):
+        return geometry.in_words
+    return f"{geometry.in_words} of {geometry.size:.9g} mm, {'inner' if geometry.is_inner else 'outer'}"
