@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tolcontact.declaration import Feature
+from tolcontact.declaration import Feature, Pattern
 from tolcontact.pmi.annotations import Datum, Dimension, Tolerance
 from tolcontact.readable import Readable
 
@@ -27,9 +27,9 @@ class DeclaredAnnotation(Readable):
 
 @dataclass(frozen=True, repr=False)
 class DeclaredPmi(Readable):
-    """The features that were declared from the PMI of a file, and what became of each annotation."""
+    """The features and patterns that were declared from the PMI of a file, and what became of each annotation."""
 
-    features: tuple[Feature, ...]
+    features: tuple[Feature | Pattern, ...]
     annotations: tuple[DeclaredAnnotation, ...]
 
     @property
@@ -43,5 +43,5 @@ class DeclaredPmi(Readable):
             for kind, plural in ((Tolerance, "tolerances"), (Dimension, "dimensions"), (Datum, "datums"))
             if (own := [one for one in self.annotations if isinstance(one.annotation, kind)])
         ]
-        title = f"{len(self.features)} features, which state {', '.join(counts)}"
+        title = f"{len(self.features)} features and patterns, which state {', '.join(counts)}"
         return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])

@@ -24,7 +24,7 @@ class DeclaredFile(Readable):
     annotations: tuple[DeclaredAnnotation, ...]
 
     def __str__(self) -> str:
-        return str(DeclaredPmi(tuple(feature for part in self.parts for feature in part.features), self.annotations))
+        return str(DeclaredPmi(tuple(feature for part in self.parts for feature in part.toleranced), self.annotations))
 
 
 def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:

@@ -1,12 +1,13 @@
 """A model script with the features that the PMI of a file states, to go on from."""
 
 import json
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from tolcontact.declaration import Brep, Feature, Mesh, Part
+from tolcontact.declaration import Brep, Face, Feature, Mesh, Part, Pattern
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
@@ -45,20 +46,44 @@ def _part_lines(part: Part) -> Iterator[str]:
     body = "" if part.geometry.body is None else f", body={_text(part.geometry.body)}"
     place = "".join(f", {name}={vector!r}" for name in ("at", "rotation") if any(vector := getattr(part, name)))
     yield f"    part = model.part({_text(part.name)}, tc.Mesh({_text(str(part.geometry.source))}{body}){place})"
-    for feature in part.features:
-        yield from _feature_lines(feature)
+    borrowed = {feature for pattern in part.toleranced if isinstance(pattern, Pattern) for feature in pattern.borrowed}
+    for declared in part.toleranced:
+        name = f"{_identifier(declared.name)} = " if declared in borrowed else ""
+        yield from _lines(f"    {name}part.{declared.noun}(", _arguments(declared))
 
 
-def _feature_lines(feature: Feature) -> Iterator[str]:
-    """Yield the lines that declare a feature: one, or one for each of its arguments if that would be too long."""
-    arguments = [_text(feature.name), *(f"part.face({_brep(face.selections[0])})" for face in feature.faces)]
-    arguments += [_source(tolerance) for tolerance in feature.tolerances]
-    arguments += [] if feature.datum is None else [f"datum={_text(feature.datum)}"]
-    line = f"    part.feature({', '.join(arguments)})"
+def _arguments(declared: Feature | Pattern) -> list[str]:
+    """Return the arguments with which a feature or pattern is declared."""
+    arguments = [_text(declared.name)]
+    if isinstance(declared, Feature):
+        arguments += map(_face, declared.faces)
+    else:
+        for member in declared.constituents:
+            arguments.append(_identifier(member.name) if isinstance(member, Feature) else _member(member))
+    arguments += map(_source, declared.tolerances)
+    return arguments + ([] if declared.datum is None else [f"datum={_text(declared.datum)}"])
+
+
+def _lines(beginning: str, arguments: Sequence[str]) -> Iterator[str]:
+    """Yield the lines of a call: one, or one for each of its arguments if that would be too long."""
+    line = f"{beginning}{', '.join(arguments)})"
     if len(line) <= MAX_WIDTH:
         yield line
     else:
-        yield from ("    part.feature(", *(f"        {argument}," for argument in arguments), "    )")
+        yield from (beginning, *(f"        {argument}," for argument in arguments), "    )")
+
+
+def _identifier(name: str) -> str:
+    return re.sub(r"\W", "_", f"feature_{name}" if len(name) < 3 else name)
+
+
+def _member(faces: Sequence[Face]) -> str:
+    """Return a member of a pattern: a face, or two in parentheses."""
+    return _face(faces[0]) if len(faces) == 1 else f"({', '.join(map(_face, faces))})"
+
+
+def _face(face: Face) -> str:
+    return f"part.face({_brep(face.selections[0])})"
 
 
 def _brep(selection: Any) -> str:
