@@ -63,14 +63,14 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
 
 
 def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
-    """Return the claim of a datum: of its features, else of its targets, which may be areas of faces or points on them."""
+    """Return the claim of a datum: of its features on the part, else of its targets, which may be areas or points of faces."""
     if numbers := surfaces.numbers(datum.face_records):
-        return Claim(datum, len(datum.face_records), numbers)
+        return Claim(datum, len(numbers), numbers)
     records = [record for target in datum.targets for record in target.face_records]
     bare = [target for target in datum.targets if not surfaces.numbers(target.face_records)]
     points = [target.point for target in bare if target.point is not None]
     numbers = list(dict.fromkeys([*surfaces.numbers(records), *surfaces.numbers_at(points)]))
-    return Claim(datum, len(datum.face_records) + len(records) + len(points), numbers)
+    return Claim(datum, len(numbers) or len(datum.face_records) + len(records) + len(points), numbers)
 
 
 def _check(annotation: Annotation) -> None:
