@@ -12,6 +12,7 @@ from tests.test_cad import COVER
 from tests.test_pmi import AP242, step
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.kernel_annotations import KernelItems, kernel_annotations
+from tolcontact.geometry.step_listing import faces_of_records
 from tolcontact.pmi.second_reading import compare, second_reading
 
 ASPECT = "SHAPE_ASPECT('','',#4,.T.)"
@@ -178,6 +179,21 @@ def test_a_lower_limit_above_the_nominal_value_agrees(path, kernel):
     size, *others = tc.read_pmi(path).dimensions
     pmi = replace(tc.read_pmi(path), dimensions=(replace(size, lower=10.2), *others))
     assert [str(difference) for difference in compare(pmi, kernel, {}).differences] == [LOST_LIMIT]
+
+
+def test_words_that_the_kernel_has_not_are_no_difference(path, kernel):
+    flatness, position, unread = tc.read_pmi(path).tolerances
+    datums = (replace(position.datums[0], modifiers=("distance 5",)), position.datums[1])
+    pmi = replace(tc.read_pmi(path), tolerances=(flatness, replace(position, datums=datums, zone="within a sphere"), unread))
+    spherical = replace(kernel.tolerances[1], zone="spherical diameter")
+    kernel = replace(kernel, tolerances=(kernel.tolerances[0], spherical))
+    assert [str(difference) for difference in compare(pmi, kernel, {}).differences] == [LOST_LIMIT]
+
+
+def test_faces_that_differ_have_the_numbers_of_the_listing(path, kernel):
+    tolerances = (replace(kernel.tolerances[0], items=KernelItems(frozenset(), 0)), kernel.tolerances[1])
+    first, *_ = compare(tc.read_pmi(path), replace(kernel, tolerances=tolerances), faces_of_records(path)).differences
+    assert str(first) == "tolerance 1: faces 1, kernel none"
 
 
 def test_annotations_that_only_one_reading_has_are_told(path, kernel):

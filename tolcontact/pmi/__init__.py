@@ -49,12 +49,12 @@ have no faces, because the file states none. `tolcontact pmi FILE.stp --faces` r
 
 ## Second reading
 
-With `--faces`, the CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from the
-listed one: in kind, value, form of the zone, projected length, modifiers, datums and faces of a tolerance, and in value, limits,
-fit and faces of a dimension. The kernel reads less, so that its reading changes nothing: it does not know composite frames,
-unequally disposed zones, areas per unit and equidistant surfaces, and has no signs of lower deviations. Values agree within
-1e-9. Annotations that it does not read are named by their numbers. The kernel runs in a process of its own; if it crashes at a
-file, a sentence says so.
+With `--faces`, the CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from
+the listed one: in kind, value, form of the zone, projected length, modifiers, datums and faces of a tolerance, and in value,
+limits, fit and faces of a dimension. Values agree if they differ by less than 1e-9 of their size. The kernel reads less, so
+that its reading changes nothing: it does not know composite frames, unequally disposed zones, areas per unit and equidistant
+surfaces, and has no signs of lower deviations. Annotations that it does not read are named by their numbers. The kernel runs in
+a process of its own; if it crashes at a file, a sentence says so.
 
 ## Limits
 
