@@ -146,14 +146,17 @@ def test_sizes_in_inch_have_limits_in_mm(read):
         item(52, 1), values(53, 50, 52),
         "#55=PLUS_MINUS_TOLERANCE(#56,#50); #56=TOLERANCE_VALUE(#57,#58);", mm(57, -0.1), mm(58, 0.2),
         "#60=DIMENSIONAL_SIZE(#20,'diameter'); #61=PLUS_MINUS_TOLERANCE(#62,#60); #62=LIMITS_AND_FITS('H7','hole','','');",
+        "#63=DIMENSIONAL_SIZE(#20,'diameter'); #64=PLUS_MINUS_TOLERANCE(#65,#63); #65=LIMITS_AND_FITS('H','hole','7','');",
+        "#66=DIMENSIONAL_SIZE(#20,'diameter'); #67=PLUS_MINUS_TOLERANCE(#68,#66); #68=LIMITS_AND_FITS('g','','6','');",
     )  # fmt: skip
-    size, radius, datum, fit = pmi.dimensions
+    size, radius, datum, fit, *fits = pmi.dimensions
     assert (size.kind, size.name, size.unit, size.face_records) == ("size", "diameter", "mm", (11,))
     assert (size.nominal, size.lower, size.upper) == pytest.approx((12.7, 12.446, 13.208))
     assert radius.nominal == pytest.approx(2.54) and radius.modifiers == ("maximum", "controlled radius")
     assert (datum.name, datum.face_records) == ("diameter", (12,))
     assert (datum.lower, datum.upper) == pytest.approx((25.3, 25.6))
     assert (fit.nominal, fit.lower, fit.fit, fit.unit) == (None, None, "H7 hole", "")
+    assert [dimension.fit for dimension in fits] == ["H7 hole", "g6"]
 
 
 def test_locations_have_two_ends_and_angles_are_in_rad(read):

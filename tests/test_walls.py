@@ -28,7 +28,7 @@ ROOMS = {
     "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/"),
     "igl": ("geometry/", "report/html/decimation.py"),
-    "OCP": ("geometry/files/step_kernel.py",),
+    "OCP": ("geometry/files/step_kernel.py", "geometry/files/step_annotations.py"),
 }
 NOT_IN = {
     "xarray": (

@@ -19,6 +19,7 @@ from tolcontact.cli.output import console
 from tolcontact.errors import clipped, shown
 from tolcontact.geometry.step_listing import RecordedFace, faces_of_records
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
+from tolcontact.pmi.second_reading import SecondReading, second_reading
 
 WIDTH = 80  # of files and pipes
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has a hundred
@@ -34,7 +35,9 @@ MAX_FACES = 12  # in a cell
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the tolerances and dimensions as CSV.")]
 WithFaces = Annotated[
     bool,
-    typer.Option("--faces", help="Give the numbers of faces as tolcontact faces does; the shapes are read, too."),
+    typer.Option(
+        "--faces", help="Give the numbers of faces as tolcontact faces does, and compare with the CAD kernel's own reading."
+    ),
 ]
 FacesOfRecords = Mapping[int, RecordedFace]
 
@@ -47,15 +50,17 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, with_fac
     faces = faces_of_records(file) if with_faces else {}
     if with_faces and not faces and not information.is_empty:
         typer.echo("warning: the faces have no numbers here: their records cannot be told, or the file has none", err=True)
+    reading = second_reading(information, file, faces) if with_faces and not (as_csv or information.is_empty) else None
     if as_json:
         listed = {"faces": {record: asdict(face) for record, face in faces.items()}} if with_faces else {}
-        typer.echo(json.dumps(asdict(information) | listed, allow_nan=False))
+        compared = {"second_reading": asdict(reading)} if reading else {}
+        typer.echo(json.dumps(asdict(information) | listed | compared, allow_nan=False))
     elif as_csv:
         typer.echo(_csv(information, faces), nl=False)
     elif information.is_empty:
         typer.echo(_reason(information, shown(str(file))))
     else:
-        _print_tables(information, faces)
+        _print_tables(information, faces, reading)
 
 
 def _reason(information: Pmi, name: str) -> str:
@@ -71,11 +76,11 @@ def _reason(information: Pmi, name: str) -> str:
     return f'"{name}" states no tolerances, dimensions or datums{details}'
 
 
-def _print_tables(information: Pmi, faces: FacesOfRecords) -> None:
+def _print_tables(information: Pmi, faces: FacesOfRecords, reading: SecondReading | None) -> None:
     output = console()
     width = output.width if sys.stdout.isatty() else WIDTH
     output.print(Text(str(information), style="bold"))
-    for part in _sections(information, faces):
+    for part in (*_sections(information, faces), *([] if reading is None else _reading_lines(reading))):
         output.print(part, width=width)
 
 
@@ -104,6 +109,15 @@ def _sections(information: Pmi, faces: FacesOfRecords) -> Iterator[RenderableTyp
         yield Text(f"tolerances for which the file states no face: {bare}")
     if information.is_tessellated:
         yield Text("the shapes of the file are triangles, without faces")
+
+
+def _reading_lines(reading: SecondReading) -> Iterator[RenderableType]:
+    """Yield the sentences on the kernel's reading, and the differences."""
+    yield Text("\nsecond reading, by the CAD kernel", style="bold")
+    yield Text(str(reading))
+    yield from map(Text, map(str, reading.differences[:MAX_ROWS]))
+    if len(reading.differences) > MAX_ROWS:
+        yield Text(f"and {len(reading.differences) - MAX_ROWS} more differences, which --json lists")
 
 
 def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:

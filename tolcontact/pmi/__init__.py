@@ -47,6 +47,15 @@ resolved into their faces. A tolerance of the whole product (`extent` "all over"
 have no faces, because the file states none. `tolcontact pmi FILE.stp --faces` reads the shapes, too, and gives the numbers that
 `tolcontact faces` lists.
 
+## Second reading
+
+With `--faces`, the CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from
+the listed one: in kind, value, form of the zone, projected length, modifiers, datums and faces of a tolerance, and in value,
+limits, fit and faces of a dimension. Values agree if they differ by less than 1e-9 of their size. The kernel reads less, so
+that its reading changes nothing: it does not know composite frames, unequally disposed zones, areas per unit and equidistant
+surfaces, and has no signs of lower deviations. Annotations that it does not read are named by their numbers. The kernel runs in
+a process of its own; if it crashes at a file, a sentence says so.
+
 ## Limits
 
 Editions 1 to 3 of AP242 are read; edition 4, AP242 XML and QIF are refused by name. A file of AP203 or AP214 is read, but

@@ -146,5 +146,6 @@ def _bounds(records: Records) -> dict[int, _Bounds]:
         deviations = records.parameters(source, "TOLERANCE_VALUE")
         fit = records.parameters(source, "LIMITS_AND_FITS")
         lower, upper = (quantity(records, deviations.reference(index)) for index in (0, 1))
-        bounds[dimension] = _Bounds(lower, upper, " ".join(filter(None, (fit.text(0), fit.text(1)))))
+        # Some systems write the grade with the form variance ("H7"), and leave its own place empty.
+        bounds[dimension] = _Bounds(lower, upper, " ".join(filter(None, (fit.text(0) + fit.text(2), fit.text(1)))))
     return bounds
