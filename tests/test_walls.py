@@ -28,7 +28,7 @@ ROOMS = {
     "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/"),
     "igl": ("geometry/", "report/html/decimation.py"),
-    "OCP": ("geometry/files/step_kernel.py",),
+    "OCP": ("kernel/",),
 }
 NOT_IN = {
     "xarray": (
@@ -43,6 +43,7 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
+    "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
 }
 # Slow to import: "import scipy" is enough, and imports them when they are first used.
@@ -57,10 +58,10 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "interrupts", "readable", "child", "vocabulary", "checksums", "realizations", "arrays", "method",
-    "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "pmi", "features", "discretization",
-    "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report", "plot", "workflow",
-    "analyses", "testing", "cli", "__init__", "__main__",
+    "version", "errors", "interrupts", "readable", "child", "kernel", "vocabulary", "checksums", "realizations", "arrays",
+    "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "pmi", "features",
+    "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report",
+    "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 
