@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
@@ -28,7 +27,7 @@ from OCP.TopoDS import TopoDS_Iterator
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
-from tolcontact.kernel.brep_faces import explore, matrix
+from tolcontact.kernel.brep_faces import explore
 
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
@@ -49,11 +48,11 @@ class BodyShape:
 
 @dataclass(frozen=True)
 class PlacedShape:
-    """A shape at a place: `names` from the root on, its `product`, its motion (4, 4) to there, and the label that holds it."""
+    """A shape at a place: `names` from the root on, its `product`, its location there, and the label that holds it."""
 
     names: list[str]
     product: str
-    transform: np.ndarray
+    location: Any
     label: Any
 
 
@@ -94,7 +93,7 @@ class Document:
                 yield from self._places_within(component, names, location)
         else:
             product = label_name(referred)
-            yield PlacedShape(names, "" if is_nameless(product) else product, matrix(location), referred)
+            yield PlacedShape(names, "" if is_nameless(product) else product, location, referred)
 
     def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
         """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.
