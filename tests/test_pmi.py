@@ -365,3 +365,22 @@ def test_faces_of_tolerances_have_the_numbers_of_the_listing(tmp_path):
     data = json.loads(call(tmp_path, "pmi", path.name, "--json", "--faces").stdout)
     assert data["faces"][str(records[4])] == {"number": 5, "name": "", "bodies": [1]}
     assert not faces_of_records(COVER)
+
+
+def test_a_face_that_stands_twice_has_one_number_for_both_of_its_records(tmp_path):
+    path = tmp_path / "cover.stp"
+    records = cover_with_pmi(path)
+    text = path.read_text()
+    face = re.search(rf"#{records[1]} = ADVANCED_FACE", text)[0]
+    body = text[text.index(face) + len(face) : text.index(";", text.index(face))]
+    shell = re.search(r"CLOSED_SHELL\('',\((#\d+,#\d+)", text)
+    copies = text[: shell.start(1)] + shell[1] + ",#90100,#90101" + text[shell.end(1) :]
+    end = copies.rindex("ENDSEC;")
+    path.write_text(copies[:end] + "".join(f"#{n} = ADVANCED_FACE{body};\n" for n in (90100, 90101)) + copies[end:])
+    listing = tc.faces_in(path)  # the kernel mends the solid, and the face that stands thrice is its last one
+    (face,) = [face for face in listing if face.copies]
+    assert face.copies == 2 and "stands 3 times in the file" in str(face)
+    assert face.direction == (0, 0, 1) and face.point[2] == 8 and "times" not in str(listing[0])
+    found = {record: face.number for record, face in faces_of_records(path).items()}
+    assert {found.pop(record) for record in (records[1], 90100, 90101)} == {face.number}
+    assert len(found) == len(set(found.values())) == 14 and face.number not in found.values()

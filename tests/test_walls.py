@@ -28,7 +28,7 @@ ROOMS = {
     "msgspec": ("declaration/",),
     "trimesh": ("geometry/", "discretization/"),
     "igl": ("geometry/", "report/html/decimation.py"),
-    "OCP": ("geometry/files/step_kernel.py", "geometry/files/step_annotations.py"),
+    "OCP": ("kernel/",),
 }
 NOT_IN = {
     "xarray": (
@@ -43,6 +43,7 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
+    "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
     "tolcontact.pmi": ("__init__.py",),  # when a script asks
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
 }
@@ -58,8 +59,8 @@ APART = {
 }
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
-    "version", "errors", "interrupts", "later", "readable", "child", "vocabulary", "checksums", "realizations", "arrays",
-    "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features", "pmi",
+    "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "realizations",
+    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features", "pmi",
     "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report",
     "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip

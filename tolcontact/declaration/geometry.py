@@ -51,15 +51,15 @@ class Mesh(Readable):
     def faults(self) -> Iterator[str]:
         if self.chord is not None and not (is_length(self.chord) and self.chord > 0):
             yield f"mesh chord is {self.chord!r}; expected a length in mm above 0"
-        elif self.chord is not None and not self._is_step:
+        elif self.chord is not None and not self.is_step:
             yield "mesh chord is given, but only STEP files are triangulated; leave it out"
-        if self.body is not None and not self._is_step:
+        if self.body is not None and not self.is_step:
             yield f"mesh body is {self.body!r}; only STEP files hold bodies that have names and numbers; leave it out"
         if isinstance(self.body, bool) or not isinstance(self.body, str | int | None):
             yield f"mesh body is {self.body!r}; expected the name of a body, or its number from 1"
         if self.units is not None and self.units not in UNITS:
             yield f"mesh units is {self.units!r}; expected one of {', '.join(UNITS)}"
-        if self.units is not None and self._is_step:
+        if self.units is not None and self.is_step:
             yield f'"{self.source}" is a STEP file, which states its own units; leave units out'
         if isinstance(self.source, str | Path):
             path = Path(self.source)
@@ -71,7 +71,8 @@ class Mesh(Readable):
             yield f"mesh source is a {type(self.source).__name__}; expected a file's path or a trimesh.Trimesh"
 
     @property
-    def _is_step(self) -> bool:
+    def is_step(self) -> bool:
+        """Whether the source is a STEP file, by its name."""
         return isinstance(self.source, str | Path) and Path(self.source).suffix.lower() in STEP
 
     def __str__(self) -> str:

@@ -10,7 +10,8 @@ from tolcontact.declaration.values import Vector
 from tolcontact.errors import shown
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere
 from tolcontact.geometry.edges import smooth_pieces
-from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
+from tolcontact.geometry.files import BREP, FACE_NAMES, STATED_FACES, SURFACES
+from tolcontact.geometry.files.stated_face import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.readable import Readable
 
@@ -19,6 +20,8 @@ RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
+GENERAL = "general"  # kind of a face without an analytic surface
+UNKNOWN = StatedFace("", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
@@ -33,10 +36,11 @@ class FaceInFile(Readable):
     direction   outward normal of a plane; axis of a cylinder, cone or torus; otherwise None
     radius      [mm] of a cylinder or sphere, or of the circle inside a torus; otherwise None
     is_inner    whether a round face is hollow: its outside is towards its axis or centre
-    area        [mm2] of its triangles
+    area        [mm2]; of its triangles, if the file states it by triangles
     residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
     name        its name in the file, which other faces may have too; empty if it has none
     whole       numbers of the faces of its surface that touch it, and it; empty if it has the surface for itself
+    copies      number of other faces in the same place, which have no numbers of their own
     """
 
     number: int
@@ -49,6 +53,7 @@ class FaceInFile(Readable):
     residual: float = 0.0
     name: str = ""
     whole: tuple[int, ...] = ()
+    copies: int = 0
 
     def __str__(self) -> str:
         name = f'"{shown(self.name)}", ' if self.name else ""
@@ -62,6 +67,8 @@ class FaceInFile(Readable):
         if self.whole:
             neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
             entries.append(f"one surface with {neighbours}")
+        if self.copies:
+            entries.append(f"stands {self.copies + 1} times in the file")
         return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
@@ -80,10 +87,14 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
     """Return the faces of a part. Its mesh keeps them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
         on_surfaces = faces_on_surfaces(mesh)
-        faces = [_description(mesh, number, own, surface) for number, (surface, own) in enumerate(on_surfaces, start=1)]
+        known = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(on_surfaces)
+        faces = [
+            _description(number, surface, stated.measure or _measure(mesh, own, surface))
+            for number, (stated, (surface, own)) in enumerate(zip(known, on_surfaces, strict=True), start=1)
+        ]
         if BREP in mesh.face_attributes:
             names = mesh.metadata.get(FACE_NAMES) or [""] * len(faces)
-            faces = [replace(face, name=name) for face, name in zip(faces, names, strict=True)]
+            faces = [replace(face, name=name, copies=own.copies) for face, name, own in zip(faces, names, known, strict=True)]
             wholes = _wholes(mesh, number_faces(mesh)[0], on_surfaces)
             faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
         mesh.metadata[DESCRIPTIONS] = tuple(faces)
@@ -147,21 +158,26 @@ def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.n
     return bool((slope * np.asarray(mesh.face_normals)[triangles]).sum() > 0)
 
 
-def _description(mesh: trimesh.Trimesh, number: int, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceInFile:
-    """Return the description of a face with some `triangles` (face,) on a `surface`, None if none is known."""
-    areas, normals = np.asarray(mesh.area_faces)[triangles], np.asarray(mesh.face_normals)[triangles]
-    largest = int(areas.argmax())
-    point, area = np.asarray(mesh.triangles_center)[triangles[largest]], float(areas.sum())
+def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceMeasure:
+    """Return the measure of a face from its `triangles` (face,): its point lies amid the largest one, on its surface."""
+    areas = np.asarray(mesh.area_faces)[triangles]
+    largest = triangles[areas.argmax()]
+    point = np.asarray(mesh.triangles_center)[largest]
+    point = point if surface is None else surface.project(point[None])[0]
+    return FaceMeasure(float(areas.sum()), point, np.asarray(mesh.face_normals)[largest])
+
+
+def _description(number: int, surface: AnalyticSurface | None, measure: FaceMeasure) -> FaceInFile:
+    """Return the description of a face on a `surface`, None if none is known."""
+    point, area = plain_vector(measure.point), measure.area
     if surface is None:
-        return FaceInFile(number, "general", plain_vector(point), None, None, False, area)
-    point = surface.project(point[None])[0]
-    _, outward = surface.distance(point[None] + 1e-6 * normals[largest])
-    is_inward = float(outward[0] @ normals[largest]) < 0
+        return FaceInFile(number, GENERAL, point, None, None, False, area)
+    _, outward = surface.distance(measure.point[None] + 1e-6 * measure.normal)
+    is_inward = float(outward[0] @ measure.normal) < 0
     is_plane = isinstance(surface, Plane)
     direction = None if isinstance(surface, Sphere) else plain_vector(-surface.axis if is_plane and is_inward else surface.axis)
     radius = surface.radius if "radius" in surface.sizes else None
-    is_inner = is_inward and not is_plane
-    return FaceInFile(number, surface.kind, plain_vector(point), direction, radius, is_inner, area, surface.residual)
+    return FaceInFile(number, surface.kind, point, direction, radius, is_inward and not is_plane, area, surface.residual)
 
 
 def plain_vector(numbers: np.ndarray) -> Vector:

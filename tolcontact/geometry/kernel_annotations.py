@@ -15,7 +15,7 @@ from tolcontact.geometry.files import screening
 from tolcontact.geometry.files.reader import DEFAULT_LIMITS
 from tolcontact.geometry.files.step_text import record_numbers
 
-PROGRAM = Path(__file__).with_name("files") / "step_annotations.py"
+PROGRAM = Path(__file__).parents[1] / "kernel" / "step_annotations.py"
 
 
 @dataclass(frozen=True)

@@ -1,23 +1,26 @@
 """The content of a STEP file before anything is declared, and all of its bodies as parts. Lengths in mm."""
 
+import logging
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
+import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
-from tolcontact.geometry.brep_face import FaceInFile, describe_faces, plain_vector
-from tolcontact.geometry.files import key_of, read_files
+from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, plain_vector
+from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
 from tolcontact.readable import Readable
 
-LISTING_CHORD = 0.5  # [mm] of triangles that are only counted by their faces
+LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, repr=False)
@@ -52,7 +55,10 @@ class BodyInFile(Readable):
 
 def bodies_in(path: str | Path) -> tuple[BodyInFile, ...]:
     """Return the bodies of a STEP file, in its order. Raises OptionError if it cannot be read."""
-    product = _product(path)
+    return _bodies(_listed_product(path))
+
+
+def _bodies(product: Product) -> tuple[BodyInFile, ...]:
     return tuple(_body(product, number) for number in range(1, len(product.bodies) + 1))
 
 
@@ -61,12 +67,13 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
 
     Raises OptionError if the file cannot be read, or has no such body.
     """
-    product = _product(path)
-    try:
-        mesh = product.part(body)
-    except GeometryFault as fault:
-        raise OptionError(str(fault)) from fault
-    return describe_faces(mesh)
+    mesh = _part(_listed_product(path), body)
+    faces = describe_faces(mesh)
+    is_fitted = any(
+        surface is None and face.kind != GENERAL for surface, face in zip(mesh.metadata[SURFACES], faces, strict=True)
+    )
+    # A surface that does not fit to a few vertices does not fit to many; one that does may not.
+    return describe_faces(_part(_product(path), body)) if is_fitted else faces
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,14 +94,11 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
     Raises OptionError if the file cannot be read.
     """
     found: dict[int, RecordedFace] = {}
-    product = _product(path, LISTING_CHORD)
-    if not product.has_all_faces:  # faces without triangles have no number, and finer triangles may leave fewer of them
-        product = _product(path)
-    for number, body in enumerate(product.bodies, start=1):
-        for face, (record, name) in enumerate(zip(body.face_records, body.face_names, strict=True), start=1):
-            if record:
+    for number, body in enumerate(_listed_product(path).bodies, start=1):
+        for face_number, face in enumerate(body.faces, start=1):
+            for record in face.records:
                 bodies = (*(found[record].bodies if record in found else ()), number)
-                found[record] = RecordedFace(face, name, bodies)
+                found[record] = RecordedFace(face_number, face.name, bodies)
     return found
 
 
@@ -116,7 +120,7 @@ def parts_from(
     if isinstance(names, str):
         raise TypeError(f"names is {names!r}; expected a list of the names of bodies")
     try:
-        bodies = bodies_in(path)
+        bodies = _bodies(_product(path, chord))  # with the triangles that the parts will have
     except OptionError as error:
         raise ModelError(model.name, [str(error)]) from error
     by_name = {body.name: body for body in bodies}
@@ -137,6 +141,23 @@ def part_name(body: BodyInFile) -> str:
     return name if re.match(r"\w", name) else f"body {body.number} {name}".strip()
 
 
+def _listed_product(path: str | Path) -> Product:
+    """Return a product for its bodies and faces, with few triangles if these are enough to give each face its number."""
+    product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
+    if product.missing_faces:
+        product = _product(path)
+    if product.missing_faces:
+        log.warning('"%s": %d faces are left out, since the CAD kernel makes no triangles of them', path, product.missing_faces)
+    return product
+
+
+def _part(product: Product, body: str | int | None) -> trimesh.Trimesh:
+    try:
+        return product.part(body)
+    except GeometryFault as fault:
+        raise OptionError(str(fault)) from fault
+
+
 def _product(path: str | Path, chord: float | None = None) -> Product:
     geometry = Mesh(path, chord=chord)
     for fault in geometry.faults():
@@ -153,6 +174,7 @@ def _body(product: Product, number: int) -> BodyInFile:
     body = product.bodies[number - 1]
     lower, upper = plain_vector(body.lower), plain_vector(body.upper)
     rotation = Rotation.from_matrix(body.place[:3, :3]).as_rotvec()
-    faces = len(np.unique(product.brep[body.triangles]))
     place = plain_vector(body.place[:3, 3]), plain_vector(rotation)
-    return BodyInFile(number, body.name, body.path, lower, upper, *place, faces, body.is_open, shown(product.text.units))
+    return BodyInFile(
+        number, body.name, body.path, lower, upper, *place, len(body.faces), body.is_open, shown(product.text.units)
+    )

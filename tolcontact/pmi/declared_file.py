@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
-from tolcontact.geometry.files import FACE_RECORDS
+from tolcontact.geometry.files import STATED_FACES
 from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.step_listing import LISTING_CHORD, bodies_in, part_name
 from tolcontact.pmi.annotations import Pmi
@@ -40,7 +40,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
     for body in bodies:
         geometry = Mesh(path, body=body.number if len(bodies) > 1 else None, chord=LISTING_CHORD)
         read = shape(geometry)
-        records = frozenset(read.mesh.metadata[FACE_RECORDS]) & stated
+        records = frozenset(record for face in read.mesh.metadata[STATED_FACES] for record in face.records) & stated
         if records and records not in known:
             known.add(records)
             part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)

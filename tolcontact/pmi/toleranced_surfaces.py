@@ -13,7 +13,7 @@ from tolcontact.geometry.brep_face import (
     faces_at,
     faces_on_surfaces,
 )
-from tolcontact.geometry.files import FACE_RECORDS, Shape
+from tolcontact.geometry.files import STATED_FACES, Shape
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_DISTANCE = 1e-3  # of a part's size: of a point from the face on which it is
@@ -28,7 +28,9 @@ class TolerancedSurfaces:
 
     def __init__(self, shape: Shape) -> None:
         self._mesh = mesh = shape.mesh
-        self._numbers = {record: number for number, record in enumerate(mesh.metadata[FACE_RECORDS], start=1) if record}
+        self._numbers = {
+            record: number for number, face in enumerate(mesh.metadata[STATED_FACES], start=1) for record in face.records
+        }
         self._surfaces: Sequence[FaceOnSurface] = faces_on_surfaces(mesh)
         self.faces: Sequence[FaceInFile] = describe_faces(mesh)
 

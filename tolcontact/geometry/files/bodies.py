@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tolcontact.errors import clipped
+from tolcontact.geometry.files.stated_face import StatedFace
 
 MAX_LISTED = 12  # bodies that a message lists
 
@@ -20,9 +21,8 @@ class Body:
     triangles     (face,) its triangles among those of the file
     lower, upper  (3,) corners of the box around the body in its place
     is_open       whether its triangles do not close
-    face_names    of its B-rep faces, "" for a face without a name
-    face_records  of its B-rep faces: their numbers in the file's text, 0 if it states no PMI
-    stated_faces  number of B-rep faces that the file states for a solid; 0 if it is no solid
+    faces         its B-rep faces that have triangles, in the file's order
+    face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
     name: str
@@ -32,9 +32,8 @@ class Body:
     lower: np.ndarray
     upper: np.ndarray
     is_open: bool
-    face_names: tuple[str, ...]
-    face_records: tuple[int, ...]
-    stated_faces: int
+    faces: tuple[StatedFace, ...]
+    face_count: int
 
     def __str__(self) -> str:
         title = ("open, " if self.is_open else "") + (f'"{clipped(self.name, 60)}"' if self.name else "without a name")
@@ -47,27 +46,24 @@ class StepShape:
     """The shape of a body in the frame of its product.
 
     triangles     (face,) its triangles among those of the file
-    corners       (face, 3, 3) of these triangles
     is_open       whether the triangles do not close
-    face_names    of its B-rep faces, "" for a face without a name
-    face_records  of its B-rep faces: their numbers in the file's text, 0 if it states no PMI
-    stated_faces  number of B-rep faces that the file states for a solid; 0 if it is no solid
+    faces         its B-rep faces that have triangles, in the file's order
+    face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
     triangles: np.ndarray
-    corners: np.ndarray
     is_open: bool
-    face_names: tuple[str, ...]
-    face_records: tuple[int, ...]
-    stated_faces: int
+    faces: tuple[StatedFace, ...]
+    face_count: int
 
 
 @dataclass(frozen=True)
 class ShapePlace:
-    """A `shape` at a `place` (4, 4) [mm]; `path` has the names of the products that contain it, `name` is the body's."""
+    """A `shape` at a `place` (4, 4) [mm] within a `box` (2, 3); `path` are names of its products, `name` is the body's."""
 
     shape: int
     place: np.ndarray
+    box: np.ndarray
     path: tuple[str, ...]
     name: str
 
@@ -98,9 +94,8 @@ def listed(bodies: Sequence[Body]) -> str:
 
 def _body(shape: StepShape, place: ShapePlace, *, is_alone: bool) -> Body:
     """Return the body of a shape at a place. A solid that is alone in its file is no sheet, though faces may be missing."""
-    corners = shape.corners.reshape(-1, 3) @ place.place[:3, :3].T + place.place[:3, 3]
-    is_open = shape.is_open and not (is_alone and shape.stated_faces)
+    is_open = shape.is_open and not (is_alone and shape.face_count)
+    lower, upper = place.box
     return Body(
-        place.name, place.path, place.place, shape.triangles, corners.min(axis=0), corners.max(axis=0), is_open,
-        shape.face_names, shape.face_records, shape.stated_faces,
+        place.name, place.path, place.place, shape.triangles, lower, upper, is_open, shape.faces, shape.face_count
     )  # fmt: skip

@@ -17,6 +17,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
+from tolcontact.geometry.files.stated_face import first_faces, stated_faces
 from tolcontact.geometry.files.step_surfaces import credible, onto, stated_surfaces
 from tolcontact.geometry.files.step_text import StepText, record_numbers
 
@@ -30,7 +31,7 @@ MAX_OFFSET = 3.0  # in chords: vertices at a larger distance from the surface of
 BREP = "brep_index"  # face attribute of a mesh: the B-rep face of each triangle
 SURFACES = "surfaces"  # in its metadata: the surface of each B-rep face, None if the file states none
 FACE_NAMES = "face_names"  # in its metadata: the name of each B-rep face; empty if the file names none
-FACE_RECORDS = "face_records"  # in its metadata: the number of the record of each B-rep face; 0 if the file states no PMI
+STATED_FACES = "stated_faces"  # in its metadata: each B-rep face as the file states it
 
 log = logging.getLogger(__name__)
 
@@ -74,15 +75,16 @@ class Product:
         return self.bodies[number]
 
     @property
-    def has_all_faces(self) -> bool:
-        """Whether each B-rep face has triangles."""
-        pairs = np.unique(np.column_stack([self.shape, self.brep]), axis=0)
-        return len(pairs) == sum(map(len, self.surfaces))
+    def missing_faces(self) -> int:
+        """The number of B-rep faces without triangles that are no copies of others."""
+        faces_of_shapes = {int(self.shape[body.triangles[0]]): body.faces for body in self.bodies}
+        numbered = sum(1 + face.copies for faces in faces_of_shapes.values() for face in faces)
+        return sum(map(len, self.surfaces)) - numbered
 
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
 
-        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and FACE_RECORDS.
+        The mesh carries BREP, whose numbers start from 0 in the file's order, SURFACES, FACE_NAMES and STATED_FACES.
         """
         body = self.body(selector)
         triangles = body.triangles
@@ -90,27 +92,29 @@ class Product:
         vertices = np.asarray(self.mesh.vertices)[corners]
         numbers, brep = np.unique(self.brep[triangles], return_inverse=True)
         stated = self.surfaces[int(self.shape[triangles[0]])]
-        surfaces = [stated[number] for number in numbers]
+        surfaces, stated_faces = [stated[number] for number in numbers], body.faces
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
             surfaces = [
                 None if surface is None else surface.placed(body.place[:3, :3], body.place[:3, 3]) for surface in surfaces
             ]
+            stated_faces = tuple(face.placed(body.place[:3, :3], body.place[:3, 3]) for face in stated_faces)
         mesh = trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
         mesh.units = "mm"
         mesh.face_attributes[BREP] = brep.ravel()
         mesh.metadata[SURFACES] = surfaces
-        mesh.metadata[FACE_NAMES] = body.face_names if any(body.face_names) else ()
-        mesh.metadata[FACE_RECORDS] = body.face_records
+        names = tuple(face.name for face in stated_faces)
+        mesh.metadata[FACE_NAMES] = names if any(names) else ()
+        mesh.metadata[STATED_FACES] = stated_faces
         self._check_closed(body, mesh)
         return mesh
 
     def _check_closed(self, body: Body, mesh: trimesh.Trimesh) -> None:
-        gaps = len(rim(mesh.faces)) if body.stated_faces and len(self.bodies) == 1 else 0
+        gaps = len(rim(mesh.faces)) if body.face_count and len(self.bodies) == 1 else 0
         if gaps:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-                f"{len(mesh.metadata[SURFACES])} of {body.stated_faces} faces could be read); repair it in CAD, or "
+                f"{len(mesh.metadata[SURFACES])} of {body.face_count} faces could be read); repair it in CAD, or "
                 "export it again"
             )
 
@@ -124,9 +128,10 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     shape_of_vertex = np.zeros(len(arrays["vertices"]), dtype=np.int64)
     shape_of_vertex[arrays["faces"].ravel()] = np.repeat(arrays["piece"], 3)
     vertices, faces = _merge_vertices(arrays["vertices"], arrays["faces"], shape_of_vertex)
-    proper = _proper_triangles(path, faces)
-    faces, shape, brep = faces[proper], arrays["piece"][proper], arrays["brep"][proper]
-    max_distance = MAX_OFFSET * float(arrays["chord"])
+    proper, repeated = _proper_triangles(path, faces)
+    owner = np.column_stack([arrays["piece"], arrays["brep"]])
+    (shape, brep), faces = owner[proper].T, faces[proper]
+    max_distance = MAX_OFFSET * min(float(arrays["chord"]), usual_chord(text))  # vertices are on the true faces at any chord
     if not len(faces):
         raise GeometryFault(f'"{path}" holds no surfaces that could be read; export the part itself as a solid')
     surfaces: list[list[AnalyticSurface | None]] = []
@@ -139,23 +144,25 @@ def product(path: Path, arrays: Mapping[str, np.ndarray], text: StepText) -> Pro
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     has_triangles = np.isin(arrays["shape"], shape)
     places = [
-        ShapePlace(int(number), rigid_motion(path, transform), tuple(json.loads(str(names))), str(name))
-        for number, transform, names, name in zip(
-            *(arrays[name][has_triangles] for name in ("shape", "transforms", "paths", "names")), strict=True
+        ShapePlace(int(number), rigid_motion(path, transform), box, tuple(json.loads(str(names))), str(name))
+        for number, transform, box, names, name in zip(
+            *(arrays[name][has_triangles] for name in ("shape", "transforms", "boxes", "paths", "names")), strict=True
         )
     ]
     shapes = []
     numbers_of_records = _record_numbers(path, int(arrays["record_count"]))
-    described = zip(*(arrays[name] for name in ("face_names", "face_records", "face_count")), strict=True)
-    for k, (names, records, stated_faces) in enumerate(described):
+    for k, face_count in enumerate(arrays["face_count"]):
         triangles = np.flatnonzero(shape == k)
-        numbers = np.unique(brep[triangles])
-        face_names = tuple(map(str, np.array(json.loads(str(names)), dtype=str)[numbers]))
-        places_of_records = np.array(json.loads(str(records)) or [0] * len(json.loads(str(names))), dtype=np.int64)[numbers]
-        is_open = len(rim(faces[triangles])) > 0
-        described_faces = face_names, tuple(map(int, numbers_of_records[places_of_records]))
-        shapes.append(StepShape(triangles, vertices[faces[triangles]], is_open, *described_faces, int(stated_faces)))
+        pairs = repeated[owner[repeated[:, 0], 0] == k]
+        first_of = first_faces(brep[triangles], owner[pairs, 1], len(surfaces[k]))
+        described = stated_faces(arrays, k, numbers_of_records, first_of)
+        shapes.append(StepShape(triangles, len(rim(faces[triangles])) > 0, described, int(face_count)))
     return Product(path, mesh, shape, brep, tuple(surfaces), tuple(bodies(shapes, places)), text)
+
+
+def usual_chord(text: StepText) -> float:
+    """Return the largest distance [mm] between triangles and true faces of a STEP file for which no chord is required."""
+    return max(STEP_CHORD, STEP_SHARE * text.extent * text.unit)
 
 
 def _record_numbers(path: Path, count: int) -> np.ndarray:
@@ -164,20 +171,21 @@ def _record_numbers(path: Path, count: int) -> np.ndarray:
     return np.array([0, *numbers] if len(numbers) == count else np.zeros(count + 1), dtype=np.int64)
 
 
-def _proper_triangles(path: Path, faces: np.ndarray) -> np.ndarray:
+def _proper_triangles(path: Path, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return indices of triangles (face, 3), without repeated ones and without those that have two corners in one place.
 
-    Repeated triangles come from a face that stands twice in its shell. Corners fall together at the ends of an edge that is
-    shorter than coordinates resolve.
+    The second array (repeated, 2) has the indices of each repeated triangle and of that which it repeats: they come from a face
+    that stands twice in its shell. Corners fall together at the ends of an edge that is shorter than coordinates resolve.
     """
     proper = np.flatnonzero((faces != np.roll(faces, 1, axis=1)).all(axis=1))
     lowest = np.argmin(faces[proper], axis=1)
     turned = np.take_along_axis(faces[proper], (lowest[:, None] + np.arange(3)) % 3, axis=1)
-    unique, _ = trimesh.grouping.unique_rows(turned)
+    unique, group = trimesh.grouping.unique_rows(turned)
     for count, kind in ((len(faces) - len(proper), "on edges of no length"), (len(proper) - len(unique), "that stand twice")):
         if count:
             log.info('"%s": %d triangles %s are left out', path, count, kind)
-    return proper[np.sort(unique)]
+    pairs = np.column_stack([proper, proper[unique][group]])
+    return proper[np.sort(unique)], pairs[pairs[:, 0] != pairs[:, 1]]
 
 
 def check_numbers(vertices: np.ndarray, subject: str) -> None:

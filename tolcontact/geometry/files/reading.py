@@ -19,11 +19,11 @@ from tolcontact.geometry.files.product import (
     FACE_NAMES,
     STEP_ANGLE,
     STEP_CHORD,
-    STEP_SHARE,
     SURFACES,
     Product,
     check_numbers,
     product,
+    usual_chord,
 )
 from tolcontact.geometry.files.step_text import StepText
 
@@ -132,11 +132,6 @@ def _job(key: Key, text: StepText | None, coarsening: float) -> reader.Job:
     else:
         coarsening = chord / STEP_CHORD
     return reader.Job(path, screening.kind(path), chord, min(math.sqrt(coarsening) * STEP_ANGLE, MAX_ANGLE))
-
-
-def usual_chord(text: StepText) -> float:
-    """Return the largest distance [mm] between triangles and true faces of a STEP file for which no chord is required."""
-    return max(STEP_CHORD, STEP_SHARE * text.extent * text.unit)
 
 
 def _is_too_fine(result: dict[str, np.ndarray] | GeometryFault) -> bool:

@@ -13,7 +13,7 @@ PARALLEL = 0.05  # smallest relative singular value of the normals in a vertex w
 
 
 def stated_surfaces(text: str) -> list[AnalyticSurface | None]:
-    """Return the surface of each B-rep face, from the JSON of `step_kernel`; None for a face of another kind."""
+    """Return the surface of each B-rep face, from the JSON of `kernel.step_bodies`; None for a face of another kind."""
     return [None if entry is None else _surface(entry) for entry in json.loads(text)]
 
 

@@ -2,15 +2,15 @@
 
 `python -P worker.py FOLDER` writes FOLDER/ready once it has started, and works through the list in FOLDER/jobs.json. For job
 k it writes FOLDER/k.npz with the arrays it read, or FOLDER/k.txt with the fault of the file. Of tolcontact it imports only
-`child`, and loads `step_kernel` when a STEP file comes, so that it starts quickly.
+`child`, and `kernel` when a STEP file comes, so that it starts quickly.
 """
 
-import importlib.util
 import io
 import json
 import os
 import sys
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -95,29 +95,23 @@ def in_utf8(content: bytes) -> bytes:
 
 
 def read_step(path: Path, chord: float, angle: float) -> Arrays:
-    """Return the shapes of a STEP file [mm] with the arrays that `step_kernel.read` describes, and their chord [mm].
+    """Return the shapes of a STEP file [mm] with the arrays that `step_bodies.read` describes, and their chord [mm].
 
     vertices, faces, piece  as from `join`; a piece is a shape
     """
-    pieces, arrays = step_kernel().read(path, chord, angle)
+    pieces, arrays = step_bodies().read(path, chord, angle)
     return {**join(pieces), **arrays, "chord": np.array(chord)}
 
 
 @cache
-def step_kernel() -> Any:
+def step_bodies() -> Any:
     """Return the module that reads STEP files. The CAD kernel takes 230 MB and 1 s: only STEP files load it."""
-    spec = importlib.util.spec_from_file_location("step_kernel", Path(__file__).with_name("step_kernel.py"))
-    if spec is None or spec.loader is None:
-        raise Refusal("cannot be read: a file of tolcontact, step_kernel.py, is missing; install it again")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
     try:
-        spec.loader.exec_module(module)
+        return import_module("tolcontact.kernel.step_bodies")
     except ModuleNotFoundError as error:
         raise Refusal(
             'is a STEP file, which needs the package cadquery-ocp-novtk; install it with: pip install "tolcontact[step]"'
         ) from error
-    return module
 
 
 def join(pieces: list[tuple[np.ndarray, np.ndarray]]) -> Arrays:

@@ -1,48 +1,38 @@
-"""STEP files read by the CAD kernel, Open CASCADE Technology through the package OCP. Lengths in mm.
-
-`worker` loads this program by its path when the first STEP file comes. Of tolcontact it imports only `child`.
+"""A STEP file in the document of the CAD kernel: bodies of products, their places and names. Lengths in mm.
 
 A product has a shape, which stands at one or several places. Each solid of a shape is a body, and so is each closed shell that
 is no part of a solid. All other faces of a shape are one body together: surfaces of a part need not be sewn.
 """
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from OCP.BRep import BRep_Tool
-from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
-from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Sphere
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
-from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.StepShape import StepShape_ClosedShell
 from OCP.TCollection import TCollection_AsciiString, TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
 from OCP.TDF import TDF_AttributeIterator, TDF_Label, TDF_Tool
 from OCP.TDocStd import TDocStd_Document
-from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
-from OCP.TopExp import TopExp_Explorer
+from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Iterator
+from OCP.TopoDS import TopoDS_Iterator
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
+from tolcontact.kernel.brep_faces import explore
 
-RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
 PMI_FACE = re.compile(rb"\b(?:GEOMETRIC_ITEM_SPECIFIC_USAGE|ITEM_IDENTIFIED_REPRESENTATION_USAGE)\s*\(")
 NAMELESS, LABEL = ("NONE", ""), "=>["  # some systems' names of nameless faces; begins the kernel's label of a nameless shape
-
-Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (face, 3)
 
 
 @dataclass(frozen=True)
@@ -58,68 +48,12 @@ class BodyShape:
 
 @dataclass(frozen=True)
 class PlacedShape:
-    """A shape at a place: `names` from the root on, its `product`, its motion (4, 4) to there, and the label that holds it."""
+    """A shape at a place: `names` from the root on, its `product`, its location there, and the label that holds it."""
 
     names: list[str]
     product: str
-    transform: np.ndarray
+    location: Any
     label: Any
-
-
-def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str, np.ndarray]]:
-    """Return the triangles of the bodies in a STEP file, each in the frame of its product, and arrays that describe them.
-
-    brep                (face,) the B-rep face of each triangle, from 0 in the file's order within its body
-    surfaces            (shape,) JSON with the surfaces of the B-rep faces, null for one that is not simple
-    face_names          (shape,) JSON with the names of the B-rep faces
-    face_records        (shape,) JSON with the places of the records of B-rep faces among all, `record_count`, if it has PMI
-    face_count          (shape,) number of B-rep faces that the file states for a solid; 0 if it is unknown
-    shape, transforms   (body,), (body, 4, 4) the shape of each body in the file's order, and its motion to its place
-    paths, names        (body,) JSON with the names of the products that contain the body, and its own name
-    """
-    document = Document(path)
-    shape_numbers: dict[str, list[int]] = {}  # of a label
-    shapes: list[BodyShape] = []
-    pieces: list[Piece] = []
-    breps = [np.zeros(0, dtype=np.int64)]
-    placed: list[tuple[int, PlacedShape]] = []
-    places = list(document.places())
-    for place in places:
-        key = entry(place.label)
-        if key not in shape_numbers:
-            shape_numbers[key] = []
-            for body in document.body_shapes(place.label, chord, angle, is_alone=len(places) == 1):
-                piece, brep = triangulation(body.faces)
-                if len(brep):
-                    shape_numbers[key].append(len(shapes))
-                    shapes.append(body)
-                    pieces.append(piece)
-                    breps.append(brep)
-        placed.extend((number, place) for number in shape_numbers[key])
-    names = body_names([(shapes[number], place) for number, place in placed])
-    return pieces, {
-        "brep": np.concatenate(breps),
-        "surfaces": np.array([json.dumps([surface(face) for face in body.faces]) for body in shapes], dtype=str),
-        "face_names": np.array([json.dumps(body.face_names) for body in shapes], dtype=str),
-        "face_records": np.array([json.dumps(document.face_records(body.faces)) for body in shapes], dtype=str),
-        "record_count": np.array(len(document.entities)),
-        "face_count": np.array([body.face_count for body in shapes], dtype=np.int64),
-        "shape": np.array([number for number, _ in placed], dtype=np.int64),
-        "transforms": np.array([place.transform for _, place in placed]).reshape(-1, 4, 4),
-        "paths": np.array([json.dumps(place.names) for _, place in placed], dtype=str),
-        "names": np.array(names, dtype=str),
-    }
-
-
-def body_names(placed: Sequence[tuple[BodyShape, PlacedShape]]) -> list[str]:
-    """Return the name of each body: its place's or its product's; its own if the file consists of solids at one place."""
-    is_one_place = len({id(place) for _, place in placed}) == 1 and all(body.is_solid for body, _ in placed)
-    if is_one_place and len(placed) > 1:
-        return [body.name for body, _ in placed]
-    own = [body.name if is_one_place else "" for body, _ in placed]
-    return [
-        name or (place.names[-1] if place.names else "") or place.product for name, (_, place) in zip(own, placed, strict=True)
-    ]
 
 
 class Document:
@@ -159,7 +93,7 @@ class Document:
                 yield from self._places_within(component, names, location)
         else:
             product = label_name(referred)
-            yield PlacedShape(names, "" if is_nameless(product) else product, matrix(location), referred)
+            yield PlacedShape(names, "" if is_nameless(product) else product, location, referred)
 
     def body_shapes(self, label: Any, chord: float, angle: float, *, is_alone: bool) -> Iterator[BodyShape]:
         """Yield the bodies of a product's shape, in its own frame, with triangles on their faces.
@@ -270,81 +204,3 @@ def entry(label: Any) -> str:
     text = TCollection_AsciiString()
     TDF_Tool.Entry_s(label, text)
     return str(text.ToCString())
-
-
-def explore(shape: Any, kind: Any) -> Iterator[Any]:
-    """Yield the pieces of a kind in a shape, each once, in their order."""
-    explorer = TopExp_Explorer(shape, kind)
-    visited: set[int] = set()
-    while explorer.More():
-        piece = explorer.Current()
-        if hash(piece) not in visited:
-            visited.add(hash(piece))
-            yield piece
-        explorer.Next()
-
-
-def matrix(location: Any) -> np.ndarray:
-    """Return the transform (4, 4) of a location."""
-    transform = location.Transformation()
-    rows = [[transform.Value(row, column) for column in range(1, 5)] for row in range(1, 4)]
-    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
-
-
-def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray]:
-    """Return the vertices and triangles of faces, seen from outside, and the number (face,) of the face of each triangle."""
-    corners, triangles, brep = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
-    count = 0
-    for number, face in enumerate(faces):
-        location = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(TopoDS.Face(face), location)
-        if mesh is None:
-            continue
-        nodes = np.array([mesh.Node(k).Coord() for k in range(1, mesh.NbNodes() + 1)]).reshape(-1, 3)
-        if not location.IsIdentity():
-            transform = matrix(location)
-            nodes = nodes @ transform[:3, :3].T + transform[:3, 3]
-        indices = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)], dtype=np.int64).reshape(-1, 3)
-        corners.append(nodes)
-        triangles.append((indices[:, ::-1] if face.Orientation() == TopAbs_REVERSED else indices) - 1 + count)
-        brep.append(np.full(len(indices), number))
-        count += len(nodes)
-    return (np.concatenate(corners), np.concatenate(triangles)), np.concatenate(brep)
-
-
-def surface(face: Any) -> dict[str, Any] | None:
-    """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
-    adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
-    kind = adaptor.GetType().name.removeprefix("GeomAbs_")
-    if kind in ("BSplineSurface", "BezierSurface"):
-        return recognized_surface(face)
-    if kind not in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
-        return None
-    return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
-
-
-def recognized_surface(face: Any) -> dict[str, Any] | None:
-    """Return the simple surface that a B-spline surface represents; None if there is none."""
-    recognition = ShapeAnalysis_CanonicalRecognition(face)
-    for kind, geometry in (("Plane", gp_Pln()), ("Cylinder", gp_Cylinder()), ("Cone", gp_Cone()), ("Sphere", gp_Sphere())):
-        if getattr(recognition, f"Is{kind}")(RECOGNITION_TOLERANCE, geometry):
-            return described(kind.lower(), geometry, False)
-    return None
-
-
-def described(kind: str, geometry: Any, is_reversed: bool) -> dict[str, Any]:
-    """Return the kind and the numbers of a simple surface. A cone's axis points from its apex into it."""
-    position = geometry.Position()
-    origin, axis = position.Location().Coord(), np.array(position.Direction().Coord())
-    sizes: dict[str, float] = {}
-    match kind:
-        case "plane":
-            axis = -axis if is_reversed != (not position.Direct()) else axis
-        case "cone":  # the kernel's cones may open against their axis
-            sizes["angle"] = abs(geometry.SemiAngle())
-            origin, axis = geometry.Apex().Coord(), np.sign(geometry.SemiAngle()) * axis
-        case "cylinder" | "sphere":
-            sizes["radius"] = geometry.Radius()
-        case "torus":
-            sizes |= {"radius": geometry.MajorRadius(), "minor": geometry.MinorRadius()}
-    return {"kind": kind, "origin": list(origin), "axis": axis.tolist(), **sizes}

@@ -1,0 +1,136 @@
+"""B-rep faces as the CAD kernel has them: their surfaces, triangles, areas and boxes. Lengths in mm."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from OCP.Bnd import Bnd_Box
+from OCP.BRep import BRep_Tool
+from OCP.BRepAdaptor import BRepAdaptor_Surface
+from OCP.BRepBndLib import BRepBndLib
+from OCP.BRepGProp import BRepGProp
+from OCP.gp import gp_Cone, gp_Cylinder, gp_Pln, gp_Pnt, gp_Sphere, gp_Vec
+from OCP.GProp import GProp_GProps
+from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
+from OCP.TopAbs import TopAbs_REVERSED
+from OCP.TopExp import TopExp_Explorer
+from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS
+
+RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
+
+AREA_TOLERANCE = 1e-9  # relative, of the areas of planes, and 1e-7 of B-spline surfaces
+
+Piece = tuple[np.ndarray, np.ndarray]  # vertices (vertex, 3) and triangles (face, 3)
+Measure = tuple[float, tuple[float, ...], list[float]]  # area of a face [mm2], a point on it, and its outward normal there
+
+
+def explore(shape: Any, kind: Any) -> Iterator[Any]:
+    """Yield the pieces of a kind in a shape, each once, in their order."""
+    explorer = TopExp_Explorer(shape, kind)
+    visited: set[int] = set()
+    while explorer.More():
+        piece = explorer.Current()
+        if hash(piece) not in visited:
+            visited.add(hash(piece))
+            yield piece
+        explorer.Next()
+
+
+def matrix(location: Any) -> np.ndarray:
+    """Return the transform (4, 4) of a location."""
+    transform = location.Transformation()
+    rows = [[transform.Value(row, column) for column in range(1, 5)] for row in range(1, 4)]
+    return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
+
+
+def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure | None]]:
+    """Return the vertices and triangles of faces, seen from outside, the number (face,) of each triangle's face, and measures.
+
+    A face without triangles, or without a surface, has no measure.
+    """
+    corners, triangles, brep = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    measures: list[Measure | None] = []
+    count = 0
+    for number, face in enumerate(faces):
+        location = TopLoc_Location()
+        mesh = BRep_Tool.Triangulation_s(TopoDS.Face(face), location)
+        if mesh is None:
+            measures.append(None)
+            continue
+        nodes = np.array([mesh.Node(k).Coord() for k in range(1, mesh.NbNodes() + 1)]).reshape(-1, 3)
+        if not location.IsIdentity():
+            transform = matrix(location)
+            nodes = nodes @ transform[:3, :3].T + transform[:3, 3]
+        indices = np.array([mesh.Triangle(k).Get() for k in range(1, mesh.NbTriangles() + 1)], dtype=np.int64).reshape(-1, 3)
+        edges = nodes[indices[:, 1:] - 1] - nodes[indices[:, :1] - 1]
+        sizes = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
+        has_parameters = mesh.HasUVNodes() and len(indices) > 0
+        measures.append(
+            measure(face, [mesh.UVNode(int(k)).Coord() for k in indices[sizes.argmax()]]) if has_parameters else None
+        )
+        corners.append(nodes)
+        triangles.append((indices[:, ::-1] if face.Orientation() == TopAbs_REVERSED else indices) - 1 + count)
+        brep.append(np.full(len(indices), number))
+        count += len(nodes)
+    return (np.concatenate(corners), np.concatenate(triangles)), np.concatenate(brep), measures
+
+
+def measure(face: Any, parameters: Sequence[tuple[float, float]]) -> Measure | None:
+    """Return the area of a face [mm2], the point amid the `parameters` of three of its points, and the outward normal there.
+
+    The result is None where the surface has no normal.
+    """
+    properties, point, along, across = GProp_GProps(), gp_Pnt(), gp_Vec(), gp_Vec()
+    BRepGProp.SurfaceProperties_s(TopoDS.Face(face), properties, AREA_TOLERANCE)
+    BRepAdaptor_Surface(TopoDS.Face(face)).D1(*np.mean(parameters, axis=0), point, along, across)
+    normal = np.cross(along.Coord(), across.Coord())
+    length = float(np.linalg.norm(normal)) * (-1 if face.Orientation() == TopAbs_REVERSED else 1)
+    return (properties.Mass(), point.Coord(), (normal / length).tolist()) if length else None
+
+
+def box(faces: Sequence[Any], location: Any) -> np.ndarray:
+    """Return the lower and the upper corner (2, 3) of the box around faces that are moved to a location."""
+    bounds = Bnd_Box()
+    for face in faces:
+        is_tessellated = BRep_Tool.Surface_s(TopoDS.Face(face)) is None
+        BRepBndLib.AddOptimal_s(face.Moved(location), bounds, is_tessellated, False)
+    return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
+
+
+def surface(face: Any) -> dict[str, Any] | None:
+    """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
+    adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
+    kind = adaptor.GetType().name.removeprefix("GeomAbs_")
+    if kind in ("BSplineSurface", "BezierSurface"):
+        return recognized_surface(face)
+    if kind not in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
+        return None
+    return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
+
+
+def recognized_surface(face: Any) -> dict[str, Any] | None:
+    """Return the simple surface that a B-spline surface represents; None if there is none."""
+    recognition = ShapeAnalysis_CanonicalRecognition(face)
+    for kind, geometry in (("Plane", gp_Pln()), ("Cylinder", gp_Cylinder()), ("Cone", gp_Cone()), ("Sphere", gp_Sphere())):
+        if getattr(recognition, f"Is{kind}")(RECOGNITION_TOLERANCE, geometry):
+            return described(kind.lower(), geometry, False)
+    return None
+
+
+def described(kind: str, geometry: Any, is_reversed: bool) -> dict[str, Any]:
+    """Return the kind and the numbers of a simple surface. A cone's axis points from its apex into it."""
+    position = geometry.Position()
+    origin, axis = position.Location().Coord(), np.array(position.Direction().Coord())
+    sizes: dict[str, float] = {}
+    match kind:
+        case "plane":
+            axis = -axis if is_reversed != (not position.Direct()) else axis
+        case "cone":  # the kernel's cones may open against their axis
+            sizes["angle"] = abs(geometry.SemiAngle())
+            origin, axis = geometry.Apex().Coord(), np.sign(geometry.SemiAngle()) * axis
+        case "cylinder" | "sphere":
+            sizes["radius"] = geometry.Radius()
+        case "torus":
+            sizes |= {"radius": geometry.MajorRadius(), "minor": geometry.MinorRadius()}
+    return {"kind": kind, "origin": list(origin), "axis": axis.tolist(), **sizes}
