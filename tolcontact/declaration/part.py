@@ -1,6 +1,5 @@
 """Parts, their points and faces, and what is toleranced of them: features, patterns and datums."""
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -9,12 +8,11 @@ from typing import ClassVar
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.toleranced import Toleranced
+from tolcontact.declaration.toleranced import Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
 from tolcontact.readable import Readable
 
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
-LETTER = re.compile(r"[A-Z]{1,2}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -333,12 +331,6 @@ class DatumTargets(Readable):
 
     def __str__(self) -> str:
         return f"datum {self.letter}: targets {', '.join(map(str, self.points))}"
-
-
-def letter_faults(datum: object) -> Iterator[str]:
-    """Yield the fault of a datum letter; None is no letter."""
-    if datum is not None and not (isinstance(datum, str) and LETTER.fullmatch(datum)):
-        yield f"its datum letter is {datum!r}; expected one or two capital letters"
 
 
 def face_of(face: Face | Feature) -> Face:
