@@ -106,6 +106,21 @@ CASES = {
         lambda p: p.feature("f", p.face(BORE), tc.Position(0.2, "A|B", projected=40), tc.Perpendicularity(0.1, "A")),
         "leave 17 % of the features outside already",
     ),
+    "flatness per nothing": (
+        lambda p: p.feature("f", p.face("+z"), tc.Flatness(0.1, per=(25, 0))), "per is (25, 0); expected a length in mm above 0"
+    ),
+    "roundness per length": (
+        lambda p: p.feature("f", p.face(BORE), tc.Roundness(0.1, per=10)), "per is given, which roundness does not have"
+    ),
+    "tangent plane of an axis": (
+        lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B", tangent=True)), "position: tangent is for planes"
+    ),
+    "tangent and no truth value": (
+        lambda p: p.feature("f", p.face("+z"), tc.Parallelism(0.1, "A", tangent="yes")), "tangent is 'yes'; expected True"
+    ),
+    "form beside a tangent plane": (
+        lambda p: p.feature("f", p.face("+z"), tc.Parallelism(0.1, "A", tangent=True), tc.Flatness(0.2)), None
+    ),
     "outside of a cylinder": (
         lambda p: p.feature("f", p.face(BORE), tc.Profile(0.2, "A|B", outside=0.1)), "how much of it is outside"
     ),

@@ -2,11 +2,14 @@
 
 import numpy as np
 import pytest
+import trimesh
 from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests import cases
 from tolcontact.declaration.script import load_model
+from tolcontact.discretization import discretize
+from tolcontact.testing import assert_same_run
 from tolcontact.variation import draw
 
 CORNERS = np.array([(x, y, z) for x in (0.0, 60.0) for y in (0.0, 40.0) for z in (0.0, 20.0)])
@@ -145,3 +148,78 @@ def test_a_datum_that_locks_directions_alone_is_not_followed_to_its_place(system
     assert tilt.std() > 0.01
     assert coordinates["tilt x"] == pytest.approx(0 * tilt, abs=1e-5)  # the hole is square to A first
     assert (coordinates["shift y"].std() > 0.01) == follows
+
+
+def with_pads(targets=((10, 10), (50, 10), (30, 30))):
+    """A plate on two pads of its foot, x below and above 30, that deviate by themselves; a top to targets on both of them."""
+    a = tc.Assembly("padded")
+    part = a.part("plate", tc.Mesh(trimesh.creation.box(bounds=((0, 0, 0), (60, 40, 20))).subdivide().subdivide()))
+    part.feature("lid", part.face("+z", lambda c, n: c[:, 1] > 20), datum="L")
+    top = part.feature("top", part.face("+z", lambda c, n: c[:, 1] < 20), tc.Profile(1e-9, "A|B|C"))
+    sides = [part.feature(letter, part.face(way), datum=letter) for letter, way in (("B", "-y"), ("C", "-x"))]
+    pads = [
+        part.feature(name, part.face("-z", lambda c, n, s=s: s * (c[:, 0] - 30) > 0), tc.Profile(0.03, "L|B|C"))
+        for name, s in (("first", -1), ("second", 1))
+    ]
+    on = [pads[int(x > 30)] for x, _ in targets]
+    part.datum_targets("A", *(pad.point(x, y, 0) for pad, (x, y) in zip(on, targets, strict=True)))
+    held = [tc.Locator(f"A{k}", (x, y, 0), "z", 0, on=pad) for k, (pad, (x, y)) in enumerate(zip(on, targets, strict=True))]
+    held += [tc.Locator(f"B{k}", (x, 0, 10), "y", 0, on=sides[0]) for k, x in enumerate((10, 50))]
+    a.locate(part, [*held, tc.Locator("C", (0, 20, 10), "x", 0, on=sides[1])])
+    for name, (x, y) in {"near": (0, 0), "far": (60, 20)}.items():
+        a.measure(name, top.point(x, y, 20), along="z")
+        a.measure(f"{name}, pad", pads[int(x > 30)].point(x, y, 0), along="z")
+    return a
+
+
+def test_what_refers_to_datum_targets_stands_still_if_the_targets_are_the_locators():
+    """The pads move by up to 0.02 mm; the top is where the fixture is, whatever the pads are."""
+    results = tc.run(with_pads(), samples=300)
+    measured = results.measured.sel(state="raw")
+    assert np.abs(measured.sel(measure=["near", "far"])).max() < 1e-5  # turns, to second order
+    assert np.abs(measured.sel(measure=["near, pad", "far, pad"])).max() > 0.005
+    assert tc.model_of(results).parts[0].targets[0].points[0].position == (10, 10, 0)
+    assert_same_run(results, tc.run(tc.model_of(results), samples=300))
+
+
+def test_targets_give_the_plane_through_them():
+    nominal = discretize(with_pads())
+    top = next(feature for feature in nominal.features if feature.feature.name == "top")
+    deviations = draw(nominal, seed=3, start=0, stop=50)
+    heights = np.array([[10.0, 10, 1], [50, 10, 1], [30, 30, 1]])
+    values = []
+    for feature, (x, y, _) in zip(("first", "second", "first"), heights, strict=True):
+        pad = next(nominal for nominal in nominal.features if nominal.feature.name == feature)
+        motions = deviations[:, : pad.coordinates.shape[1]] @ (pad.geometry.twists @ pad.coordinates).T
+        values.append(motions[:, 2] + np.cross(motions[:, 3:], np.array([x, y, 0]) - pad.geometry.centre)[:, 2])
+    plane = np.linalg.solve(heights, np.array(values))  # z = a x + b y + c of each realization
+    motions = deviations[:, : top.coordinates.shape[1]] @ (top.geometry.twists @ top.coordinates).T
+    for x, y in ((0, 0), (60, 20)):
+        z = motions[:, 2] + np.cross(motions[:, 3:], np.array([x, y, 20]) - top.geometry.centre)[:, 2]
+        assert z == pytest.approx(plane[0] * x + plane[1] * y + plane[2], abs=1e-7)
+    shares = tc.check_population(with_pads(), samples=1000)
+    assert float(shares.share_inside.sel(interval="upper").min()) > 0.9973
+
+
+@pytest.mark.parametrize(
+    "declare, text",
+    [
+        (lambda p, f: p.datum_targets("A"), 'datum "A"'),
+        (lambda p, f: p.datum_targets("A", p.point(0, 0, 0)), "is not on a face of a feature"),
+        (
+            lambda p, f: p.datum_targets("A", f.point(1, 1, 3)),
+            'its target at (1, 1, 3) is not on feature "foot"; move it there',
+        ),
+        (lambda p, f: p.datum_targets("F", f.point(1, 1, 0)), 'datum "F" is declared 2 times'),
+        (lambda p, f: p.datum_targets("first", f.point(1, 1, 0)), "its datum letter is 'first'"),
+    ],
+)
+def test_targets_that_cannot_be_have_one_message(declare, text):
+    a = tc.Assembly("block")
+    part = a.part("block", tc.Box(10, 10, 10), fixed=True)
+    declare(part, part.feature("foot", part.face("-z"), datum="F"))
+    a.measure("z", part.point(0, 0, 0), along="z")
+    (fault,) = tc.check(a)
+    assert text in fault and 'part "block"' in fault
+    with pytest.raises(TypeError, match='datum "A": float is no point'):
+        part.datum_targets("A", 1.0)

@@ -165,3 +165,15 @@ def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
 
     assert shares() == pytest.approx([0.9973, 0.9973], abs=1e-4)
     assert np.isnan(shares(cp=1.5)).all()
+
+
+def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_does():
+    rigid = toleranced.block_with("top", tc.Profile(0.3, "A"), tc.Parallelism(0.1, "A"))
+    flatness = tc.Flatness(0.02, per=(25, 25)), tc.Straightness(0.01, per=10)
+    tangent = toleranced.block_with("top", tc.Profile(0.3, "A"), tc.Parallelism(0.1, "A", tangent=True), *flatness)
+    spreads = [[each.spread for each in Draws(discretize(model)).contributors] for model in (rigid, tangent)]
+    assert spreads[0] == spreads[1] and len(spreads[0]) == 3
+    top = next(feature for feature in tangent.features if feature.name == "top")
+    assert list(map(str, top.tolerances))[1:] == [
+        "parallelism 0.1 mm of the tangent plane to A", "flatness 0.02 mm per 25 x 25 mm", "straightness 0.01 mm per 10 mm",
+    ]  # fmt: skip

@@ -49,7 +49,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
-| | `Feature`, `Variable` |
+| | `Feature`, `Pattern`, `DatumTargets`, `Variable` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |

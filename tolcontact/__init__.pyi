@@ -18,6 +18,7 @@ from .declaration import (
     ContactPair as ContactPair,
     Cylinder as Cylinder,
     Cylindricity as Cylindricity,
+    DatumTargets as DatumTargets,
     Face as Face,
     Facing as Facing,
     Feature as Feature,

@@ -52,6 +52,54 @@ def ball_with(*tolerances, frame: Frame = STILL, letter: str | None = None) -> t
     return a
 
 
+HOLES = ((-30.0, 0.0), (30.0, 0.0), (0.0, 20.0), (0.0, -20.0))
+
+
+def plate_with_holes(count: int, *, frame: Frame = STILL, turn: np.ndarray | None = None):
+    """A fixed plate of 100 x 60 x 10 about its middle, datums A (bottom), B (side) and C (end), and the faces of its holes.
+
+    With `turn` (3, 3) the shape itself is turned in its own frame.
+    """
+    a = tc.Assembly("plate")
+    tubes = [trimesh.creation.cylinder(4, 9, sections=48).apply_translation((x, y, 0)) for x, y in HOLES[:count]]
+    for tube in tubes:
+        tube.invert()
+    mesh = trimesh.util.concatenate([trimesh.creation.box(extents=(100, 60, 10)), *tubes])
+    centres, normals = mesh.triangles_center, mesh.face_normals
+    if turn is not None:
+        mesh.vertices = mesh.vertices @ turn.T
+    part = a.part("plate", tc.Mesh(mesh), **frame.place(5, -7, 3), fixed=True)
+    for letter, axis, height in (("A", 2, 5), ("B", 1, 30), ("C", 0, 50)):
+        is_face = (abs(centres[:, axis] + height) < 1e-9) & (normals[:, axis] < -0.5)
+        part.feature(letter, part.face(np.flatnonzero(is_face).tolist()), datum=letter)
+    beside = [np.hypot(centres[:, 0] - x, centres[:, 1] - y) < 4.5 for x, y in HOLES[:count]]
+    faces = [part.face(np.flatnonzero(near & (abs(normals[:, 2]) < 0.5)).tolist()) for near in beside]
+    return a, part, faces
+
+
+def pattern_with(*tolerances, count: int = 4, follower: tc.Position | None = None, frame: Frame = STILL) -> tc.Assembly:
+    """A plate with a pattern of holes, datum H; the last one is toleranced to the others if there is a `follower`."""
+    a, part, faces = plate_with_holes(count, frame=frame)
+    pattern = part.pattern("H", *(faces[:-1] if follower else faces), *tolerances, datum="H")
+    if follower:
+        part.feature("last", faces[-1], follower)
+    a.measure("x", pattern.members[0].axis(1), along=frame.along(1, 0, 0))
+    return a
+
+
+def rails_with(*tolerances, frame: Frame = STILL) -> tc.Assembly:
+    """A base with two rails, the tops of which are a pattern."""
+    a = tc.Assembly("rails")
+    boxes = [trimesh.creation.box(extents=(80, 10, 20)).apply_translation((0, y, 10)) for y in (-25, 25)]
+    base = trimesh.creation.box(extents=(80, 80, 10)).apply_translation((0, 0, -10))
+    part = a.part("base", tc.Mesh(trimesh.util.concatenate([base, *boxes])), **frame.place(5, -7, 3), fixed=True)
+    part.feature("foot", part.face("-z", lambda c, n: c[:, 2] < -14), datum="A")
+    tops = [part.face("+z", lambda c, n, s=s: (c[:, 2] > 19) & (s * c[:, 1] > 0)) for s in (-1, 1)]
+    pattern = part.pattern("tops", *tops, *tolerances)
+    a.measure("z", pattern.members[0].point(40, -20, 20), along=frame.along(0, 0, 1))
+    return a
+
+
 EVERY = {  # of the kinds that move features; all state 99.73 % inside
     "size of planes": lambda frame: block_with("width", tc.Size(50, 0.1, -0.05), frame=frame),
     "size of a bore": lambda frame: ring_with("bore", tc.Size(10, 0.05, 0.01), frame=frame),
@@ -82,29 +130,16 @@ EVERY = {  # of the kinds that move features; all state 99.73 % inside
     "datums that deviate": lambda frame: block_with(
         "far", tc.Position(0.2, "B|A"), frame=frame, B=(tc.Perpendicularity(0.2, "A"),)
     ),
+    "pattern": lambda frame: pattern_with(tc.Size(8, 0.1), tc.Position(0.5, "A|B|C"), frame=frame),
+    "composite pattern": lambda frame: pattern_with(tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"), frame=frame),
+    "pattern of three frames": lambda frame: pattern_with(
+        tc.Position(0.5, "A|B|C"), tc.Position(0.2, "A|B"), tc.Position(0.05), frame=frame
+    ),
+    "common zone of axes": lambda frame: pattern_with(tc.Position(0.1), frame=frame),
+    "pattern with a bonus": lambda frame: pattern_with(tc.Size(8, 0.1, 0), tc.Position(0, "A|B|C", material="M"), frame=frame),
+    "common zone of planes": lambda frame: rails_with(tc.Profile(0.1), frame=frame),
+    "uneven profile of a pattern": lambda frame: rails_with(tc.Profile(0.3, "A", outside=0.2), frame=frame),
+    "datum of a pattern": lambda frame: pattern_with(
+        tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"), count=3, follower=tc.Position(0.05, "A|H"), frame=frame
+    ),
 }
-
-
-HOLES = ((-30.0, 0.0), (30.0, 0.0), (0.0, 20.0), (0.0, -20.0))
-
-
-def plate_with_holes(count: int, *, frame: Frame = STILL, turn: np.ndarray | None = None):
-    """A fixed plate of 100 x 60 x 10 about its middle, datums A (bottom), B (side) and C (end), and the faces of its holes.
-
-    With `turn` (3, 3) the shape itself is turned in its own frame.
-    """
-    a = tc.Assembly("plate")
-    tubes = [trimesh.creation.cylinder(4, 9, sections=48).apply_translation((x, y, 0)) for x, y in HOLES[:count]]
-    for tube in tubes:
-        tube.invert()
-    mesh = trimesh.util.concatenate([trimesh.creation.box(extents=(100, 60, 10)), *tubes])
-    centres, normals = mesh.triangles_center, mesh.face_normals
-    if turn is not None:
-        mesh.vertices = mesh.vertices @ turn.T
-    part = a.part("plate", tc.Mesh(mesh), **frame.place(5, -7, 3), fixed=True)
-    for letter, axis, height in (("A", 2, 5), ("B", 1, 30), ("C", 0, 50)):
-        is_face = (abs(centres[:, axis] + height) < 1e-9) & (normals[:, axis] < -0.5)
-        part.feature(letter, part.face(np.flatnonzero(is_face).tolist()), datum=letter)
-    beside = [np.hypot(centres[:, 0] - x, centres[:, 1] - y) < 4.5 for x, y in HOLES[:count]]
-    faces = [part.face(np.flatnonzero(near & (abs(normals[:, 2]) < 0.5)).tolist()) for near in beside]
-    return a, part, faces

@@ -216,10 +216,11 @@ from tolcontact.declaration.feature_tolerance import (
     Symmetry,
     TotalRunout,
 )
+from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import OUTSIDE, Face, Feature, Force, Part, Pattern, Point
+from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance
 
@@ -235,6 +236,7 @@ __all__ = [
     "Correlation",
     "Cylinder",
     "Cylindricity",
+    "DatumTargets",
     "Face",
     "Facing",
     "Feature",

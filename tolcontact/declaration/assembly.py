@@ -13,10 +13,11 @@ from tolcontact.declaration.contributor import (
     population as _population,
 )
 from tolcontact.declaration.feature_tolerance import Size
+from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
-from tolcontact.declaration.part import Face, Feature, Force, Part, Point, face_of
+from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
 from tolcontact.method import Method
@@ -223,11 +224,18 @@ class Assembly(Pictured):
         yield from key_faults("variable", [variable.name for variable in self.variables])
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
-        letters = [declared.datum for declared in part.toleranced if declared.datum]
-        names = [feature.name for feature in part.toleranced]
-        names += [member.name for pattern in part.patterns for member in pattern.members if member not in pattern.borrowed]
+        letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]
+        names = [declared.name for declared in dict.fromkeys((*part.toleranced, *part.features))]
         yield from key_faults(f'part "{part.name}": feature', names)
         yield from repetitions(f'part "{part.name}": datum', letters)
+        for datum in part.targets:
+            yield from _located(f'part "{part.name}": datum', datum, datum.faults())
+            for feature in datum.features:
+                if feature not in part.features:
+                    yield (
+                        f'part "{part.name}": datum "{datum.letter}" ({datum.declared_at}): its target is on feature '
+                        f'"{feature.name}", which is no feature of the part; take one of the part'
+                    )
         for declared in part.toleranced:
             kind = f'part "{part.name}": {declared.noun}'
             yield from _located(kind, declared, declared.faults())
@@ -271,7 +279,7 @@ class Assembly(Pictured):
 
     def __str__(self) -> str:
         causes = *self.variables, *self.correlations, *self.populations
-        declared = (toleranced for part in self.parts for toleranced in part.toleranced)
+        declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
         rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 

@@ -30,10 +30,11 @@ from tolcontact.declaration.face_entry import (
     text_type,
 )
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
+from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
-from tolcontact.declaration.part import ASSOCIATIONS, Face, Feature, Force, Part, Pattern, Point
+from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
@@ -147,6 +148,7 @@ PATTERN = Record(
     Pattern, "members=constituents tolerances name datum declared_at", mark="members", members=Items(MEMBER),
     tolerances=Items(CONTROL),
 )  # fmt: skip
+TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="DatumTargets")
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
@@ -178,8 +180,11 @@ METHOD = Record(
 )  # fmt: skip
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
-    {"features": Items(TOLERANCED).wire},
-    lambda part, writing: {"features": [TOLERANCED.encode(declared, writing) for declared in part.toleranced]},
+    {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
+    lambda part, writing: (
+        {"features": [TOLERANCED.encode(declared, writing) for declared in part.toleranced]}
+        | ({"datum_targets": Items(TARGETS).encode(part.targets, writing)} if part.targets else {})
+    ),
     lambda entries, place: UNSET,
 )
 RECORDS = {
@@ -246,6 +251,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
         of_part = replace(place["parts"][k]["features"], part=part)
         for number, item in enumerate(of_part.converted(entry.get("features", []), list[Any])):
             part.add(TOLERANCED.decode(item, of_part[number], part=part))
+        for targets in Items(TARGETS).decode(entry.get("datum_targets", []), place["parts"][k]["datum_targets"]):
+            part.add(targets)
 
     things: dict[str, Any] = {"parts": parts}
     for name in [name for name in RECORDS if name not in ("parts", "measures")]:

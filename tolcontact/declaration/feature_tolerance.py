@@ -82,6 +82,8 @@ class GeometricTolerance(Readable):
     bonus       "fills": the process fills the larger zone; "accepts": only a check of parts uses it; or "none"
     projected   [mm] the zone lies beyond the material, from the face of the primary datum up to this height
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
+    per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
+    tangent     True for a zone of the plane that touches a plane from outside the material; its form may then be outside
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
                 at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
@@ -90,8 +92,8 @@ class GeometricTolerance(Readable):
     cp, cpk     process capability: the spread is divided by `cp`, and the mean is shifted until `cpk` results
 
     A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
-    zone, along, material, projected and outside that it accepts. `is_form` is True for a kind that limits form alone; the zones
-    of the kinds `around` it contain it, or those of all others if there are none.
+    zone, along, material, projected, outside, per and tangent that it accepts. `is_form` is True for a kind that limits form
+    alone; the zones of the kinds `around` it contain it, or those of all others if there are none.
     `features/tolerance_kinds.py` defines the zones.
     """
 
@@ -110,6 +112,8 @@ class GeometricTolerance(Readable):
     bonus: str = "fills"
     projected: float | None = None
     outside: float | None = None
+    per: float | tuple[float, float] | None = None
+    tangent: bool = False
     rule: str = INSIDE
     cp: float = 1.0
     cpk: float | None = None
@@ -136,6 +140,11 @@ class GeometricTolerance(Readable):
         """The unit vector across a flat zone."""
         return None if self.along is None else _direction(self.along)
 
+    @property
+    def _unit_lengths(self) -> tuple[float, ...]:
+        """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
+        return () if self.per is None else tuple(self.per) if isinstance(self.per, list | tuple) else (self.per,)
+
     def faults(self) -> Iterator[str]:
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
             bound = "0 or above" if self.material else "above 0"
@@ -157,8 +166,9 @@ class GeometricTolerance(Readable):
             yield f"datums {self.datums!r} names a datum twice"
 
     def _zone_faults(self) -> Iterator[str]:
-        for option in ("zone", "along", "material", "projected", "outside"):
-            is_given = bool(self.material) if option == "material" else getattr(self, option) is not None
+        for option in ("zone", "along", "material", "projected", "outside", "per", "tangent"):
+            value = getattr(self, option)
+            is_given = value not in ("", False) if isinstance(value, str | bool) else value is not None
             if is_given and option not in self.options:
                 yield f"{option} is given, which {self.kind} does not have; leave it out"
         if self.zone not in (None, *ZONES):
@@ -173,6 +183,11 @@ class GeometricTolerance(Readable):
             is_length(self.outside) and is_length(self.width) and 0 <= self.outside <= self.width
         ):
             yield f"outside is {self.outside!r}; expected a length in mm from 0 to the width"
+        lengths = self._unit_lengths
+        if self.per is not None and not (len(lengths) in (1, 2) and all(is_length(unit) and unit > 0 for unit in lengths)):
+            yield f"per is {self.per!r}; expected a length in mm above 0, or two of them, as in per=(25, 25)"
+        if not isinstance(self.tangent, bool):
+            yield f"tangent is {self.tangent!r}; expected True or False"
 
     def _process_faults(self) -> Iterator[str]:
         for option, choices in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):
@@ -187,13 +202,15 @@ class GeometricTolerance(Readable):
 
     def __str__(self) -> str:
         round_ = "diameter " if self.zone == "round" else ""
-        return f"{self.kind} {round_}{self.width:g}{self.material} mm" + (f" to {self.datums}" if self.datums else "")
+        unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
+        tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""
+        return f"{self.kind} {round_}{self.width:g}{self.material} mm{unit}{tangent}{datums}"
 
 
 class Position(GeometricTolerance):
     """Position of an axis, a centre, or a plane (ISO 1101, 17.12)."""
 
-    kind, options = "position", ("zone", "along", "material", "projected")
+    kind, options = "position", ("zone", "along", "material", "projected", "tangent")
 
 
 class Coaxiality(GeometricTolerance):
@@ -211,7 +228,7 @@ class Symmetry(GeometricTolerance):
 class Profile(GeometricTolerance):
     """Profile of a surface (ISO 1101, 17.8): its location, as far as its datums lock it. Without datums it is form alone."""
 
-    kind, options, needs_datums = "profile", ("outside",), False
+    kind, options, needs_datums = "profile", ("outside", "tangent"), False
 
 
 class LineProfile(GeometricTolerance):
@@ -226,19 +243,19 @@ class LineProfile(GeometricTolerance):
 class Parallelism(GeometricTolerance):
     """Parallelism of a plane or an axis to its datums (ISO 1101, 17.9)."""
 
-    kind, options = "parallelism", ("zone", "along", "material")
+    kind, options = "parallelism", ("zone", "along", "material", "tangent")
 
 
 class Perpendicularity(GeometricTolerance):
     """Perpendicularity of a plane or an axis to its datums (ISO 1101, 17.10)."""
 
-    kind, options = "perpendicularity", ("zone", "along", "material", "projected")
+    kind, options = "perpendicularity", ("zone", "along", "material", "projected", "tangent")
 
 
 class Angularity(GeometricTolerance):
     """Angularity of a plane or an axis: its angle to its datums (ISO 1101, 17.11)."""
 
-    kind, options = "angularity", ("zone", "along", "material")
+    kind, options = "angularity", ("zone", "along", "material", "tangent")
 
 
 class CircularRunout(GeometricTolerance):
@@ -259,13 +276,13 @@ class TotalRunout(GeometricTolerance):
 class Straightness(GeometricTolerance):
     """Straightness of an axis, or of any line of a plane (ISO 1101, 17.3). It limits form, and does not move the feature."""
 
-    kind, needs_datums, is_form = "straightness", False, True
+    kind, options, needs_datums, is_form = "straightness", ("per",), False, True
 
 
 class Flatness(GeometricTolerance):
-    """Flatness of a plane (ISO 1101, 17.4). It limits form, and does not move the plane as a whole."""
+    """Flatness of a plane (ISO 1101, 17.4), or of any part of it. It limits form, and does not move the plane as a whole."""
 
-    kind, needs_datums, is_form = "flatness", False, True
+    kind, options, needs_datums, is_form = "flatness", ("per",), False, True
 
 
 class Roundness(GeometricTolerance):

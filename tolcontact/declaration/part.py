@@ -1,21 +1,19 @@
-"""Parts, their points and faces, and the forces that press them onto their supports: gravity, clamps and others."""
+"""Parts, their points and faces, and what is toleranced of them: features, patterns and datums."""
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.toleranced import Toleranced
+from tolcontact.declaration.toleranced import Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
 from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
 
 OUTSIDE, LEAST_SQUARES = ASSOCIATIONS = ("outside", "least squares")  # from a plane to a datum, ISO 5459
-LETTER = re.compile(r"[A-Z]{1,2}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,21 +31,21 @@ class Part(Readable):
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
     declared_at: str = field(default_factory=script_line)
-    _toleranced: "list[Feature | Pattern]" = field(default_factory=list, init=False)
+    _declared: "list[Feature | Pattern | DatumTargets]" = field(default_factory=list, init=False)
 
     @property
     def toleranced(self) -> "tuple[Feature | Pattern, ...]":
         """The features and patterns in the order of the script."""
-        return tuple(self._toleranced)
+        return tuple(declared for declared in self._declared if not isinstance(declared, DatumTargets))
 
     @property
     def features(self) -> "tuple[Feature, ...]":
         """The features, among them the members of patterns."""
-        return tuple(dict.fromkeys(member for declared in self._toleranced for member in declared.members))
+        return tuple(dict.fromkeys(member for declared in self.toleranced for member in declared.members))
 
     @property
-    def patterns(self) -> "tuple[Pattern, ...]":
-        return tuple(declared for declared in self._toleranced if isinstance(declared, Pattern))
+    def targets(self) -> "tuple[DatumTargets, ...]":
+        return tuple(declared for declared in self._declared if isinstance(declared, DatumTargets))
 
     def feature(
         self,
@@ -101,17 +99,24 @@ class Part(Readable):
         self.add(pattern)
         return pattern
 
-    def add(self, declared: "Feature | Pattern") -> None:
-        """Add a declared feature or pattern to this part."""
-        self._toleranced.append(declared)
+    def add(self, declared: "Feature | Pattern | DatumTargets") -> None:
+        """Add what is declared of this part."""
+        self._declared.append(declared)
+
+    def datum_targets(self, letter: str, *points: "Point") -> "DatumTargets":
+        """Declare a datum by points on features: `part.datum_targets("A", pad.point(0, 0, 0), ...)` (see DatumTargets)."""
+        for point in points:
+            if not isinstance(point, Point):
+                raise TypeError(f'datum "{letter}": {type(point).__name__} is no point; expected feature.point(x, y, z)')
+        targets = DatumTargets(letter, points, script_line())
+        self.add(targets)
+        return targets
 
     def features_from_pmi(self) -> Any:
         """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
 
-        It lists every tolerance, dimension and datum of the file with the features that state it, or with the reason why none
-        does. Faces of one surface are one feature, and so are the two planes of a slot or a tab whose size or position is
-        toleranced. A feature is named after the letter of its datum, else after its kind and the number of its first face, as
-        in "cylinder 12". Raises ModelError if the file cannot be read, or states no PMI.
+        It lists each tolerance, dimension and datum of the file, with its features or the reason why it has none (see
+        `tolcontact.pmi`). Raises ModelError if the file cannot be read, or states no PMI.
         """
         return LATER[PMI](self)
 
@@ -302,10 +307,39 @@ class Pattern(Toleranced, Readable):
         return f"pattern {self.name} of {self.part.name}{letter}: {constituents}"
 
 
-def letter_faults(datum: object) -> Iterator[str]:
-    """Yield the fault of a datum letter; None is no letter."""
-    if datum is not None and not (isinstance(datum, str) and LETTER.fullmatch(datum)):
-        yield f"its datum letter is {datum!r}; expected one or two capital letters"
+@dataclass(frozen=True, eq=False, repr=False)
+class DatumTargets(Readable):
+    """A datum that touches its part at points on features, along their normals there, as locators of a fixture do.
+
+    Several features may have targets of one datum. More targets than it locks freedoms count by least squares.
+    """
+
+    noun: ClassVar[str] = "datum"
+
+    letter: str
+    points: tuple[Point, ...]
+    declared_at: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.letter
+
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        """The features that the targets are on."""
+        return tuple(dict.fromkeys(point.on for point in self.points if point.on is not None))
+
+    def faults(self) -> Iterator[str]:
+        yield from letter_faults(self.letter)
+        if not self.points:
+            yield 'it has no targets; give points on features, as in part.datum_targets("A", pad.point(0, 0, 0))'
+        for point in self.points:
+            yield from point.faults()
+            if point.on is None or point.end is not None:
+                yield f"its target {point} is not on a face of a feature; take it from a feature, as in pad.point(0, 0, 0)"
+
+    def __str__(self) -> str:
+        return f"datum {self.letter}: targets {', '.join(map(str, self.points))}"
 
 
 def face_of(face: Face | Feature) -> Face:
@@ -315,21 +349,3 @@ def face_of(face: Face | Feature) -> Face:
             raise TypeError(f'feature "{face.name}" has {len(face.faces)} faces; choose one of them: .faces[0]')
         return face.faces[0]
     return face
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Force(Readable):
-    """A force `vector` [N] at a point of a part, constant in the assembly frame. The objective "seating" uses it."""
-
-    name: str
-    at: Point
-    vector: Vector
-    declared_at: str = ""
-
-    def faults(self) -> Iterator[str]:
-        yield from self.at.faults()
-        if not (is_finite(self.vector) and any(self.vector)):
-            yield "vector is not a nonzero vector of three finite numbers [N]"
-
-    def __str__(self) -> str:
-        return f"force {self.name}: ({', '.join(f'{c:g}' for c in self.vector)}) N at {self.at}"

@@ -1,10 +1,13 @@
 """What features and patterns have in common: tolerances, and whether these go together."""
 
+import re
 from collections.abc import Iterator
 from typing import ClassVar
 
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position, Size
 from tolcontact.declaration.values import is_length
+
+LETTER = re.compile(r"[A-Z]{1,2}")
 
 
 class Toleranced:
@@ -65,9 +68,16 @@ class Toleranced:
         tolerances = [tolerance for tolerance in self.geometric if is_length(tolerance.width)]
         for form in (tolerance for tolerance in tolerances if tolerance.is_form):
             for tolerance in tolerances:
-                contains = not tolerance.is_form and (not form.around or tolerance.kind in form.around)
+                is_around = not tolerance.is_form and not tolerance.tangent  # form is not that of a tangent plane
+                contains = is_around and (not form.around or tolerance.kind in form.around)
                 if contains and tolerance.width < form.width:
                     yield (
                         f"{form.kind} {form.width:g} is wider than {tolerance.kind} {tolerance.width:g}, which contains it; "
                         "expected form within orientation within location"
                     )
+
+
+def letter_faults(datum: object) -> Iterator[str]:
+    """Yield the fault of a datum letter; None is no letter."""
+    if datum is not None and not (isinstance(datum, str) and LETTER.fullmatch(datum)):
+        yield f"its datum letter is {datum!r}; expected one or two capital letters"

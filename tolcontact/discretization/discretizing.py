@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
+from tolcontact.declaration import Assembly, DatumTargets, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
@@ -90,7 +90,11 @@ def _add_features(assembly: Assembly, meshes: Meshes, features: Features, faults
     for index, part in enumerate(assembly.parts):
         ordered, circular = datum_order(part)
         for declared in ordered:
-            faults.attempt(f'part "{part.name}": {designation(declared.noun, declared)}', features.add, declared, index, meshes)
+            place = f'part "{part.name}": {designation(declared.noun, declared)}'
+            if isinstance(declared, DatumTargets):
+                faults.attempt(place, features.add_targets, declared, index)
+            else:
+                faults.attempt(place, features.add, declared, index, meshes)
         if circular:
             names = ", ".join(f'"{declared.name}"' for declared in circular)
             faults.append(

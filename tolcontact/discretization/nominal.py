@@ -13,7 +13,7 @@ from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
-from tolcontact.features import FaceDeviation, Features, NominalFeature, NominalPattern
+from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import triangles
@@ -207,6 +207,10 @@ class Nominal:
     def patterns(self) -> tuple[NominalPattern, ...]:
         """The features that are toleranced together, of all parts; a feature by itself is a pattern of one member."""
         return tuple(self._features.patterns)
+
+    def datums(self, part: int) -> dict[str | None, tuple[Datum, ...]]:
+        """Return the datums of a part by their letters: several features or targets for a common datum."""
+        return self._features.datums(part)
 
     @property
     def faces(self) -> tuple[FaceDeviation, ...]:

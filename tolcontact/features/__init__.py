@@ -57,12 +57,13 @@ second position tolerance, with fewer datums. Each tolerance draws the freedoms 
 the block shows.
 """
 
+from tolcontact.features.datum_order import datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureOfSize, PlaneFeature
-from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, NominalPattern, datum_order
+from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.features.tolerance_kinds import zone_of
-from tolcontact.features.tolerance_layers import Layer
+from tolcontact.features.tolerance_layers import Datum, Layer
 
 __all__ = [
-    "AxisFeature", "FaceDeviation", "FeatureOfSize", "Features", "Layer", "NominalFeature", "NominalPattern", "PlaneFeature",
-    "datum_order", "zone_of",
+    "AxisFeature", "Datum", "FaceDeviation", "FeatureOfSize", "Features", "Layer", "NominalFeature", "NominalPattern",
+    "PlaneFeature", "datum_order", "zone_of",
 ]  # fmt: skip

@@ -2,13 +2,13 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tolcontact.declaration import Face, Feature, Part, Pattern
+from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
 from tolcontact.errors import GeometryFault
-from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize
+from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, TargetPoint
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
 from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
@@ -91,6 +91,19 @@ class NominalFeature:
         nearest = int(np.argmin(distances))
         return nearest if distances[nearest] <= tolerance else None
 
+    def target(self, position: np.ndarray) -> Datum:
+        """Return the datum that touches the feature at a point (3,) [mm]. Raises GeometryFault for a point beside it."""
+        number = self.face_with(position)
+        surface = self.surfaces[number or 0]
+        triangle, foot = surface.nearest(position[None])
+        if number is None or np.linalg.norm(foot[0] - position) > FACE_TOLERANCE * surface.mesh.scale:
+            raise GeometryFault(f'its target at {_in_words(position)} is not on feature "{self.feature.name}"; move it there')
+        normal = surface.normals(triangle, foot)[0]
+        deviation = self.deviation(number, (np.eye(3), np.zeros(3)))
+        coordinates = np.zeros((1, self.coordinates.shape[1]))
+        coordinates[:, deviation.columns] = deviation.outward(position[None], normal[None])
+        return Datum(self.feature, TargetPoint.at(position, normal), coordinates)
+
     def deviation(self, number: int | None, placement: Placement) -> FaceDeviation:
         """Return how a face deviates in a part at `placement`; with `number` None the middle, which no size moves."""
         geometry, size_column = self.geometry, self.size_column
@@ -148,6 +161,7 @@ class Features:
     first_column: int
     patterns: list[NominalPattern] = field(default_factory=list)
     features: list[NominalFeature] = field(default_factory=list)
+    _targets: dict[tuple[int, str], tuple[Datum, ...]] = field(default_factory=dict)
     _used_faces: dict[tuple[Feature, int | None], FaceDeviation] = field(default_factory=dict)
 
     @property
@@ -158,6 +172,10 @@ class Features:
     @property
     def labels(self) -> tuple[str, ...]:
         return tuple(label for pattern in self.patterns for label in pattern.labels)
+
+    def copy(self) -> "Features":
+        """Return the same features, to which others can be added without changing these."""
+        return replace(self, patterns=list(self.patterns), features=list(self.features), _targets=dict(self._targets))
 
     def add(self, declared: Feature | Pattern, part: int, meshes: Meshes) -> None:
         """Add a feature or a pattern whose datums have been added before. Raises GeometryFault."""
@@ -175,8 +193,7 @@ class Features:
             check_alike(shapes)
         geometry = PatternGeometry(tuple(shapes))
         start = self.first_column + len(self.labels)
-        datums = {pattern.declared.datum: pattern.datums for pattern in self.patterns if pattern.part == part}
-        layers = tolerance_layers(declared, geometry, datums, start)
+        layers = tolerance_layers(declared, geometry, self.datums(part), start)
         names = _freedom_names(declared, geometry, layers)
         leans, coordinates = _coordinates(geometry, layers, start)
         names += [f"{declared.name}.datum {lean.datum} of {system}" for lean, system in leans.values()]
@@ -199,6 +216,20 @@ class Features:
         labels = tuple(f"{declared.part.name}.{name}" for name in names)
         shifts = {column: lean for column, (lean, _) in leans.items()}
         self.patterns.append(NominalPattern(declared, tuple(members), geometry, layers, start, labels, shifts))
+
+    def add_targets(self, targets: DatumTargets, part: int) -> None:
+        """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
+        present = {nominal.feature: nominal for nominal in self.features}
+        if lost := [feature.name for feature in targets.features if feature not in present]:
+            raise GeometryFault(f'its feature "{lost[0]}" could not be made; mend that feature first')
+        self._targets[part, targets.letter] = tuple(
+            present[point.on].target(np.array(point.position)) for point in targets.points if point.on is not None
+        )
+
+    def datums(self, part: int) -> dict[str | None, tuple[Datum, ...]]:
+        """Return the datums of a part that have been added, by letters: several features or targets for a common datum."""
+        patterns = {pattern.declared.datum: pattern.datums for pattern in self.patterns if pattern.part == part}
+        return patterns | {letter: datums for (owner, letter), datums in self._targets.items() if owner == part}
 
     def _check_disjoint(
         self, feature: Feature, areas: Mapping[Feature, Sequence[FaceArea]], members: Sequence[Feature], meshes: Meshes
@@ -251,6 +282,10 @@ class Features:
         return next(nominal for nominal in self.features if nominal.feature is feature)
 
 
+def _in_words(position: np.ndarray) -> str:
+    return f"({', '.join(f'{coordinate:g}' for coordinate in position)})"
+
+
 def _moving_faces(feature: Feature) -> list[bool]:
     """Return which faces of a feature deviate with it: a face from which a size is only measured does not."""
     if feature.size is None or feature.size.moves == "both":
@@ -300,24 +335,3 @@ def _coordinates(
         coordinates[:, shift : shift + shifts] = followed[:, start:]
         column, shift = column + count, shift + shifts
     return leans, coordinates
-
-
-def datum_order(part: Part) -> tuple[list[Feature | Pattern], list[Feature | Pattern]]:
-    """Return the features and patterns of a part, each after its datums, and those whose datums refer to each other."""
-    remaining, letters, ordered = list(part.toleranced), set[str](), list[Feature | Pattern]()
-    while remaining:
-        ready = [declared for declared in remaining if _letters(declared) <= letters and _borrowed(declared) <= set(ordered)]
-        if not ready:
-            return ordered, remaining
-        ordered += ready
-        letters |= {declared.datum for declared in ready if declared.datum}
-        remaining = [declared for declared in remaining if declared not in ready]
-    return ordered, []
-
-
-def _letters(declared: Feature | Pattern) -> set[str]:
-    return {letter for tolerance in declared.geometric for compartment in tolerance.system for letter in compartment}
-
-
-def _borrowed(declared: Feature | Pattern) -> set[Feature | Pattern]:
-    return set(declared.borrowed) if isinstance(declared, Pattern) else set()

@@ -219,4 +219,6 @@ def zone_of(tolerance: GeometricTolerance, feature: FeatureGeometry, primary: Fe
         kinds = f"{', '.join(plurals)} and {last}" if plurals else last
         advice = "; use tc.Profile" if isinstance(feature, GeneralFeature) else ""
         raise GeometryFault(f"{tolerance.kind} is for {kinds}, and it is {feature.in_words}{advice}")
+    if tolerance.tangent and type(feature) is not PlaneFeature:
+        raise GeometryFault(f"{tolerance.kind}: tangent is for planes, and it is {feature.in_words}; leave it out")
     return zones[type(feature)](tolerance, feature, primary)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from tolcontact.declaration.values import Vector
 from tolcontact.pmi.annotations import Datum, Dimension, Pmi, Tolerance
 from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.declared import Annotation, DeclaredAnnotation
@@ -18,12 +19,14 @@ class Claim:
 
     stated    number of faces and targets that the file states for it
     numbers   of those of its faces that are on the part
+    targets   points of a datum that is established by points alone, with the numbers of their faces
     places    of the features that are to state it
     """
 
     annotation: Annotation
     stated: int
     numbers: list[int]
+    targets: list[tuple[int, Vector]] = field(default_factory=list)
     places: list[Place] = field(default_factory=list)
     features: list[str] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
@@ -63,14 +66,20 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
 
 
 def _datum_claim(datum: Datum, surfaces: TolerancedSurfaces) -> Claim:
-    """Return the claim of a datum: of its features on the part, else of its targets, which may be areas or points of faces."""
+    """Return the claim of a datum: of its features on the part, else of its targets, which may be areas or points of faces.
+
+    A line or an area locks more than a point: its face is taken as a datum feature.
+    """
     if numbers := surfaces.numbers(datum.face_records):
         return Claim(datum, len(numbers), numbers)
     records = [record for target in datum.targets for record in target.face_records]
     bare = [target for target in datum.targets if not surfaces.numbers(target.face_records)]
-    points = [target.point for target in bare if target.point is not None]
-    numbers = list(dict.fromkeys([*surfaces.numbers(records), *surfaces.numbers_at(points)]))
-    return Claim(datum, len(numbers) or len(datum.face_records) + len(records) + len(points), numbers)
+    places = [(surfaces.number_at(target.point), target.point) for target in bare if target.point is not None]
+    targets = [(number, point) for number, point in places if number is not None]
+    numbers = list(dict.fromkeys([*surfaces.numbers(records), *(number for number, _ in targets)]))
+    stated = len(numbers) or len(datum.face_records) + len(records) + len(places)
+    are_points = len(targets) == len(datum.targets) and all(target.kind == "point" for target in datum.targets)
+    return Claim(datum, stated, numbers, targets if are_points else [])
 
 
 def _check(annotation: Annotation) -> None:

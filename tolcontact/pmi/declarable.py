@@ -38,10 +38,12 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     for modifier in stated.modifiers:
         if modifier in _MATERIALS:
             options["material"] = _MATERIALS[modifier]
+        elif modifier == "tangent plane":
+            options["tangent"] = True
         elif modifier not in _UNCHANGED:
             raise Undeclared(_MODIFIED.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance"))
     if stated.per_unit:
-        raise Undeclared("it is per unit of length or area")
+        options["per"] = stated.per_unit if len(stated.per_unit) > 1 else stated.per_unit[0]
     if stated.projected is not None:
         options["projected"] = stated.projected
     if stated.displacement is not None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from tolcontact.declaration import Feature, Pattern
+from tolcontact.declaration import DatumTargets, Feature, Pattern
 from tolcontact.pmi.annotations import Datum, Dimension, Tolerance
 from tolcontact.readable import Readable
 
@@ -27,9 +27,9 @@ class DeclaredAnnotation(Readable):
 
 @dataclass(frozen=True, repr=False)
 class DeclaredPmi(Readable):
-    """The features and patterns that were declared from the PMI of a file, and what became of each annotation."""
+    """The features, patterns and datum targets that were declared from the PMI of a file, and what became of each annotation."""
 
-    features: tuple[Feature | Pattern, ...]
+    features: tuple[Feature | Pattern | DatumTargets, ...]
     annotations: tuple[DeclaredAnnotation, ...]
 
     @property

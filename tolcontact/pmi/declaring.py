@@ -1,9 +1,9 @@
 """Declaration of a part's features from the PMI of its file, as far as features can state it."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from pathlib import Path
 
-from tolcontact.declaration import Feature, Mesh, Part, Pattern
+from tolcontact.declaration import DatumTargets, Mesh, Part
 from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.geometry import STEP
 from tolcontact.errors import GeometryFault, ModelError, OptionError
@@ -14,7 +14,7 @@ from tolcontact.geometry.shapes import shape
 from tolcontact.pmi.annotations import Pmi
 from tolcontact.pmi.claims import Claim, claims_of
 from tolcontact.pmi.declared import DeclaredPmi
-from tolcontact.pmi.drafts import Constituent, Draft, drafts_of, letters_of
+from tolcontact.pmi.drafts import Constituent, Declared, Draft, drafts_of, letters_of
 from tolcontact.pmi.reading import read_pmi
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
@@ -42,7 +42,7 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
     return DeclaredPmi(features, tuple(claim.result for claim in claims))
 
 
-def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Feature | Pattern, ...], list[Claim]]:
+def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared, ...], list[Claim]]:
     """Declare the features that PMI states of a part with a shape; return them, and what became of each annotation."""
     surfaces = TolerancedSurfaces(read)
     claims = claims_of(pmi, surfaces)
@@ -50,21 +50,24 @@ def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Feature |
     return _declare(part, meshes, drafts_of(part, meshes, claims, surfaces)), claims
 
 
-def _declare(part: Part, meshes: Meshes, drafts: Sequence[Draft]) -> tuple[Feature | Pattern, ...]:
+def _declare(part: Part, meshes: Meshes, drafts: Sequence[Draft]) -> tuple[Declared, ...]:
     """Declare drafts on a part, as far as their tolerances go together, and write into the claims what became of them."""
     trial = Features(0)
-    for declared in datum_order(part)[0]:
-        trial.add(declared, 0, meshes)
-    for draft in _in_order(drafts, part):
+    for present in datum_order(part)[0]:
+        _add(present, trial, meshes)
+    for draft in _in_order(drafts, trial.datums(0)):
         draft.declared = _tried(draft, part, trial, meshes)
         if draft.declared is not None:
             part.add(draft.declared)
     return tuple(draft.declared for draft in drafts if draft.declared is not None)
 
 
-def _in_order(drafts: Iterable[Draft], part: Part) -> Iterator[Draft]:
-    """Yield drafts after those of their datums. Tolerances to datums that no draft is are taken away, with the reason."""
-    waiting, made = list(drafts), {declared.datum for declared in part.toleranced}
+def _in_order(drafts: Iterable[Draft], letters: Collection[str | None]) -> Iterator[Draft]:
+    """Yield drafts after those of their datums, unless these have `letters` that are declared already.
+
+    Tolerances to datums that no draft is are taken away, with the reason.
+    """
+    waiting, made = list(drafts), {None, *letters}
     while waiting:
         ready = [draft for draft in waiting if draft.letters <= made and not any(one in waiting for one in draft.borrowed)]
         yield from ready
@@ -89,7 +92,7 @@ def _take_away(waiting: Sequence[Draft], made: set[str | None]) -> None:
         draft.stated = kept
 
 
-def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Feature | Pattern | None:
+def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declared | None:
     """Return a feature with all that it can state together, which is part of the trial then; None if that is nothing."""
     tolerances: tuple[Constituent, ...] = ()
     name = draft.letter or draft.name
@@ -108,16 +111,23 @@ def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Feature
         (draft.datum.reasons if reason else draft.datum.features).append(reason or name)
     if reason:
         return None
-    trial.add(declared, 0, meshes)
+    _add(declared, trial, meshes)
     return declared
 
 
-def _fault(declared: Feature | Pattern, trial: Features, meshes: Meshes) -> str:
-    """Return why a feature or pattern cannot be added to those that are declared before it; "" if it can."""
+def _add(declared: Declared, features: Features, meshes: Meshes) -> None:
+    if isinstance(declared, DatumTargets):
+        features.add_targets(declared, 0)
+    else:
+        features.add(declared, 0, meshes)
+
+
+def _fault(declared: Declared, trial: Features, meshes: Meshes) -> str:
+    """Return why something cannot be added to what is declared before it; "" if it can."""
     for fault in declared.faults():
         return fault
     try:
-        Features(0, list(trial.patterns), list(trial.features)).add(declared, 0, meshes)
+        _add(declared, trial.copy(), meshes)
     except GeometryFault as error:
         return str(error)
     return ""

@@ -4,9 +4,9 @@ from collections import defaultdict
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from tolcontact.declaration import Brep, Face, Feature, Part, Pattern
+from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
-from tolcontact.declaration.values import script_line
+from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, GeneralFeature, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
@@ -19,16 +19,18 @@ from tolcontact.pmi.declarable import Undeclared
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
 Constituent = Size | GeometricTolerance
+Declared = Feature | Pattern | DatumTargets
 
 
 @dataclass(eq=False)
 class Draft:
-    """A feature, or a pattern of several members, and the tolerances that it may state, each with its claim.
+    """A feature, a pattern of several members or targets of a datum, and the tolerances that it may state, with their claims.
 
     faces       of each member
     geometries  of each member
     datum       claim of the datum that it is
-    borrowed    drafts whose features make up a pattern that is a datum alone
+    borrowed    drafts whose features make up a pattern that is a datum alone, or on which targets are
+    targets     points of a datum, one for each of `borrowed`
     is_needed   whether it is to be declared even without tolerances
     declared    what it became
     """
@@ -39,8 +41,9 @@ class Draft:
     datum: Claim | None = None
     stated: list[tuple[Claim, Constituent]] = field(default_factory=list)
     borrowed: "tuple[Draft, ...]" = ()
+    targets: tuple[Vector, ...] = ()
     is_needed: bool = False
-    declared: Feature | Pattern | None = None
+    declared: Declared | None = None
 
     @property
     def letter(self) -> str | None:
@@ -52,12 +55,15 @@ class Draft:
         """The letters of the datums to which its tolerances refer."""
         return {letter for _, constituent in self.stated for letter in letters_of(constituent)}
 
-    def with_tolerances(self, part: Part, tolerances: tuple[Constituent, ...]) -> Feature | Pattern:
-        """Return the feature or pattern with some tolerances."""
+    def with_tolerances(self, part: Part, tolerances: tuple[Constituent, ...]) -> Declared:
+        """Return what it declares with some tolerances."""
         name = self.letter or self.name
         if len(self.faces) == 1:
             return Feature(name, part, self.faces[0], tolerances, self.letter, script_line())
         borrowed = tuple(draft.declared for draft in self.borrowed if isinstance(draft.declared, Feature))
+        if self.targets:
+            points = zip(borrowed, self.targets, strict=True) if len(borrowed) == len(self.targets) else ()
+            return DatumTargets(name, tuple(feature.point(*point) for feature, point in points), script_line())
         return Pattern(name, part, borrowed or tuple(self.faces), tolerances, self.letter, script_line())
 
 
@@ -80,18 +86,18 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
             except (Undeclared, GeometryFault) as reason:
                 numbers = ", ".join(str(number) for number in sorted(number for surface in place for number in surface))
                 claim.reasons.append(f"faces {numbers}: {reason}" if len(claim.places) > 1 else str(reason))
-    common_datums = {
-        frozenset(claim.places): claim
-        for claim in claims
-        if isinstance(claim.annotation, Datum) and len(claim.places) > 1 and not claim.reasons
-    }
-    merged = list(_patterns(drafts, common_datums.keys()))
+    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.reasons]
+    targeted = [claim for claim in datums if claim.targets]
+    common_datums = {frozenset(claim.places): claim for claim in datums if len(claim.places) > 1 and not claim.targets}
+    kept = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
+    merged = list(_patterns(drafts, kept))
     for pattern, places in merged:
         pattern.datum = common_datums.pop(places, None)
         for place in places:
             del drafts[place]
     patterns = [pattern for pattern, _ in merged]
-    return [*drafts.values(), *patterns, *(_common_datum(claim, drafts) for claim in common_datums.values())]
+    datum_drafts = [_common_datum(claim, drafts) for claim in (*common_datums.values(), *targeted)]
+    return [*drafts.values(), *patterns, *datum_drafts]
 
 
 def _draft(part: Part, meshes: Meshes, place: Place, surfaces: TolerancedSurfaces) -> Draft:
@@ -109,7 +115,7 @@ def _state(claim: Claim, draft: Draft) -> None:
     (geometry,) = draft.geometries
     match claim.annotation:
         case Datum():
-            if len(claim.places) > 1:
+            if len(claim.places) > 1 or claim.targets:
                 return
             if draft.letter is not None:
                 raise Undeclared(f"its surface is datum {draft.letter} already")
@@ -158,8 +164,10 @@ def _are_alike(members: Sequence[Draft]) -> bool:
 
 
 def _common_datum(claim: Claim, drafts: Mapping[Place, Draft]) -> Draft:
-    """Return the draft of a datum of several surfaces, each of which is a feature by itself."""
-    borrowed = tuple(drafts[place] for place in claim.places)
+    """Return the draft of a datum of several surfaces, or of targets on them; each surface is a feature by itself."""
+    place_of = {number: place for place in claim.places for surface in place for number in surface}
+    places = [place_of[number] for number, _ in claim.targets] or claim.places
+    borrowed = tuple(drafts[place] for place in places)
     for draft in borrowed:
         draft.is_needed = True
-    return Draft("", datum=claim, borrowed=borrowed)
+    return Draft("", datum=claim, borrowed=borrowed, targets=tuple(point for _, point in claim.targets))

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from tolcontact.declaration import Brep, Face, Feature, Mesh, Part, Pattern
+from tolcontact.declaration import Brep, Face, Feature, Mesh, Part, Pattern, Point
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
@@ -46,10 +46,13 @@ def _part_lines(part: Part) -> Iterator[str]:
     body = "" if part.geometry.body is None else f", body={_text(part.geometry.body)}"
     place = "".join(f", {name}={vector!r}" for name in ("at", "rotation") if any(vector := getattr(part, name)))
     yield f"    part = model.part({_text(part.name)}, tc.Mesh({_text(str(part.geometry.source))}{body}){place})"
-    borrowed = {feature for pattern in part.toleranced if isinstance(pattern, Pattern) for feature in pattern.borrowed}
+    named = {feature for pattern in part.toleranced if isinstance(pattern, Pattern) for feature in pattern.borrowed}
+    named |= {feature for targets in part.targets for feature in targets.features}
     for declared in part.toleranced:
-        name = f"{_identifier(declared.name)} = " if declared in borrowed else ""
+        name = f"{_identifier(declared.name)} = " if declared in named else ""
         yield from _lines(f"    {name}part.{declared.noun}(", _arguments(declared))
+    for targets in part.targets:
+        yield from _lines("    part.datum_targets(", [_text(targets.letter), *map(_point, targets.points)])
 
 
 def _arguments(declared: Feature | Pattern) -> list[str]:
@@ -62,6 +65,11 @@ def _arguments(declared: Feature | Pattern) -> list[str]:
             arguments.append(_identifier(member.name) if isinstance(member, Feature) else _member(member))
     arguments += map(_source, declared.tolerances)
     return arguments + ([] if declared.datum is None else [f"datum={_text(declared.datum)}"])
+
+
+def _point(point: Point) -> str:
+    assert point.on is not None and point.position is not None
+    return f"{_identifier(point.on.name)}.point({', '.join(f'{c:.{_DIGITS}g}' for c in point.position)})"
 
 
 def _lines(beginning: str, arguments: Sequence[str]) -> Iterator[str]:

@@ -38,12 +38,10 @@ class TolerancedSurfaces:
         """Return the numbers of the faces that some records are, without those that are not on this part."""
         return [self._numbers[record] for record in records if record in self._numbers]
 
-    def numbers_at(self, points: Iterable[Vector]) -> Iterator[int]:
-        """Yield the numbers of the faces on which points lie, for those that lie on one face alone."""
-        for point in points:
-            numbers, distance = faces_at(self._mesh, point)
-            if len(numbers) == 1 and distance < MAX_DISTANCE * self._mesh.scale:
-                yield numbers[0]
+    def number_at(self, point: Vector) -> int | None:
+        """Return the number of the face on which a point lies; None if it lies on none, or where faces meet."""
+        numbers, distance = faces_at(self._mesh, point)
+        return numbers[0] if len(numbers) == 1 and distance < MAX_DISTANCE * self._mesh.scale else None
 
     def surfaces(self, numbers: Iterable[int]) -> list[frozenset[int]]:
         """Return the surfaces that some faces make up, each with all of its faces.

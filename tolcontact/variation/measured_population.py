@@ -13,7 +13,7 @@ import scipy
 from tolcontact.declaration import OUTSIDE
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
-from tolcontact.features import Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
+from tolcontact.features import Datum, Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
 from tolcontact.variation.component_zones import bonus
 from tolcontact.variation.draws import Draws
 
@@ -60,12 +60,11 @@ def measured_population(nominal: Nominal, draws: Draws, *, seed: int, count: int
             stated = STATED_SHARE if size.distribution == "normal" and size.cp is None else np.nan
             needed = 2 * np.abs(sizes - (size.upper + size.lower) / 2)
             yield _measured_zone(pattern, str(size), stated, needed, size.upper - size.lower)
-        datums = {datum.declared.datum: datum for datum in nominal.patterns if datum.part == pattern.part}
+        datums = nominal.datums(pattern.part)
         for layer in pattern.layers:
             if layer.controlled.shape[1]:
                 system = [
-                    [member for letter in compartment for member in datums[letter].members]
-                    for compartment in layer.tolerance.system
+                    [datum for letter in compartment for datum in datums[letter]] for compartment in layer.tolerance.system
                 ]
                 yield _measured_tolerance(pattern, layer, system, deviations)
 
@@ -85,7 +84,7 @@ def _measured_zone(
 
 
 def _measured_tolerance(
-    pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[NominalFeature]], deviations: np.ndarray
+    pattern: NominalPattern, layer: Layer, system: Sequence[Sequence[Datum]], deviations: np.ndarray
 ) -> MeasuredZone:
     """Measure one tolerance of a feature or pattern in the system of its datum features."""
     tolerance, centre = layer.tolerance, pattern.geometry.centre
@@ -125,7 +124,7 @@ def _stated_share(pattern: NominalPattern, layer: Layer) -> float:
 
 
 def _measurement(
-    feature: NominalFeature, places: np.ndarray, directions: np.ndarray, deviations: np.ndarray, centre: np.ndarray
+    feature: NominalFeature | Datum, places: np.ndarray, directions: np.ndarray, deviations: np.ndarray, centre: np.ndarray
 ) -> _Measurement:
     """Measure drawn features at `places` (point, 3) along `directions` (point, entry, 3); motions turn about `centre` (3,)."""
     geometry = feature.geometry
@@ -136,13 +135,13 @@ def _measurement(
     return _Measurement(rows, np.einsum("npk,pek->npe", displacements, directions).reshape(len(deviations), -1))
 
 
-def _touches_outside(datum: NominalFeature) -> bool:
+def _touches_outside(datum: Datum) -> bool:
     return isinstance(datum.geometry, PlaneFeature) and datum.feature.association == OUTSIDE
 
 
 def _fitted_frame(
     pattern: NominalPattern,
-    system: Sequence[Sequence[NominalFeature]],
+    system: Sequence[Sequence[Datum]],
     deviations: np.ndarray,
     orientation_only: Sequence[bool],
 ) -> tuple[np.ndarray, np.ndarray]:
