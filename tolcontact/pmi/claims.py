@@ -10,17 +10,20 @@ from tolcontact.pmi.declared import Annotation, DeclaredAnnotation
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
 Place = tuple[frozenset[int], ...]  # of a feature: the numbers of the faces of its surface, or of each of its two planes
+MAX_NAMES = 6  # of features in a reason
 _MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
 
 
 @dataclass(eq=False)
 class Claim:
-    """An annotation, the faces that it claims, the names of the features that state it, and the reasons why others do not.
+    """An annotation, the faces that it claims, the features that state it, and why others do not.
 
     stated    number of faces and targets that the file states for it
     numbers   of those of its faces that are on the part
     targets   points of a datum that is established by points alone, with the numbers of their faces
     places    of the features that are to state it
+    features  names of those that state it
+    refusals  names of those that do not, by the reasons; none if a reason is for all
     """
 
     annotation: Annotation
@@ -29,7 +32,7 @@ class Claim:
     targets: list[tuple[int, Vector]] = field(default_factory=list)
     places: list[Place] = field(default_factory=list)
     features: list[str] = field(default_factory=list)
-    reasons: list[str] = field(default_factory=list)
+    refusals: dict[str, list[str]] = field(default_factory=dict)
 
     @property
     def result(self) -> DeclaredAnnotation:
@@ -37,6 +40,21 @@ class Claim:
         missing = [missing_faces(self.stated - len(self.numbers), self.stated)] if self.numbers else []
         reasons = dict.fromkeys(filter(None, [*missing, *self.reasons]))
         return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(reasons))
+
+    @property
+    def reasons(self) -> list[str]:
+        """Why it is not declared, or not for all features: each reason with their names, unless it is for all."""
+        return [_reason(reason, names, len(self.places)) for reason, names in self.refusals.items()]
+
+    def refuse(self, reason: object, name: str = "") -> None:
+        """Write down why it is not declared for the feature with a name, or for none."""
+        self.refusals.setdefault(str(reason), []).extend(filter(None, [name]))
+
+
+def _reason(reason: str, names: Sequence[str], count: int) -> str:
+    if not names or len(names) >= count:
+        return reason
+    return f"{', '.join(names[:MAX_NAMES])}{', ...' if len(names) > MAX_NAMES else ''}: {reason}"
 
 
 def missing_faces(missing: int, stated: int) -> str:
@@ -58,7 +76,7 @@ def claims_of(pmi: Pmi, surfaces: TolerancedSurfaces) -> list[Claim]:
             _check(claim.annotation)
             claim.places = _places(claim, surfaces, place_of)
         except Undeclared as reason:
-            claim.reasons.append(str(reason))
+            claim.refuse(reason)
         place_of |= {
             number: place for place in claim.places for surface in place for number in surface if number not in place_of
         }

@@ -34,20 +34,7 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
         raise Undeclared("its value is not stated")
     if stated.maximum is not None:
         raise Undeclared("its value has an upper bound, which zones do not have")
-    options: dict[str, Any] = {}
-    for modifier in stated.modifiers:
-        if modifier in _MATERIALS:
-            options["material"] = _MATERIALS[modifier]
-        elif modifier == "tangent plane":
-            options["tangent"] = True
-        elif modifier not in _UNCHANGED:
-            raise Undeclared(_MODIFIED.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance"))
-    if stated.per_unit:
-        options["per"] = stated.per_unit if len(stated.per_unit) > 1 else stated.per_unit[0]
-    if stated.projected is not None:
-        options["projected"] = stated.projected
-    if stated.displacement is not None:
-        options["outside"] = stated.displacement
+    options = _options(stated)
     has_zone = "zone" in kind.options
     if is_axis and has_zone and stated.zone not in _ROUND_ZONES:
         raise Undeclared("its zone is flat, and the file does not state across which direction")
@@ -59,6 +46,21 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     for fault in result.faults():
         raise Undeclared(fault)
     return result
+
+
+def _options(stated: Tolerance) -> dict[str, Any]:
+    """Return the options of a declared tolerance by their names. Raises Undeclared for modifiers that are none."""
+    options: dict[str, Any] = {"projected": stated.projected, "outside": stated.displacement}
+    for modifier in stated.modifiers:
+        if modifier in _MATERIALS:
+            options["material"] = _MATERIALS[modifier]
+        elif modifier == "tangent plane":
+            options["tangent"] = True
+        elif modifier not in _UNCHANGED:
+            raise Undeclared(_MODIFIED.get(modifier, f"its modifier, {modifier}, is not one of a declared tolerance"))
+    if stated.per_unit:
+        options["per"] = stated.per_unit if len(stated.per_unit) > 1 else stated.per_unit[0]
+    return options
 
 
 def _compartment(reference: DatumReference) -> str:

@@ -27,7 +27,7 @@ class DeclaredAnnotation(Readable):
 
 @dataclass(frozen=True, repr=False)
 class DeclaredPmi(Readable):
-    """The features, patterns and datum targets that were declared from the PMI of a file, and what became of each annotation."""
+    """The features, patterns and datum targets that the PMI of a file has become, and what became of each annotation."""
 
     features: tuple[Feature | Pattern | DatumTargets, ...]
     annotations: tuple[DeclaredAnnotation, ...]

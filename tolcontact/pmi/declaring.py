@@ -86,7 +86,7 @@ def _take_away(waiting: Sequence[Draft], made: set[str | None]) -> None:
         for claim, tolerance in draft.stated:
             absent = letters_of(tolerance) - (made if is_circle else possible)
             if absent:
-                claim.reasons.append(f"datum {min(absent)} {'refers back to it' if is_circle else 'is not declared'}")
+                claim.refuse(f"datum {min(absent)} {'refers back to it' if is_circle else 'is not declared'}", draft.name)
             else:
                 kept.append((claim, tolerance))
         draft.stated = kept
@@ -99,7 +99,7 @@ def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declare
     for claim, constituent in sorted(draft.stated, key=lambda stated: not isinstance(stated[1], Size)):
         reason = _fault(draft.with_tolerances(part, (*tolerances, constituent)), trial, meshes)
         if reason:
-            claim.reasons.append(f"{name}: {reason}" if len(claim.places) > 1 else reason)
+            claim.refuse(reason, name)
         else:
             claim.features.append(name)
             tolerances = (*tolerances, constituent)
@@ -107,10 +107,12 @@ def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declare
         return None
     declared = draft.with_tolerances(part, tolerances)
     reason = _fault(declared, trial, meshes)
-    if draft.datum:
-        (draft.datum.reasons if reason else draft.datum.features).append(reason or name)
+    if reason and draft.datum:
+        draft.datum.refuse(reason)
     if reason:
         return None
+    if draft.datum:
+        draft.datum.features.append(name)
     _add(declared, trial, meshes)
     return declared
 

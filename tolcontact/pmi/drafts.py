@@ -8,7 +8,7 @@ from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Patt
 from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
-from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, GeneralFeature, SlabFeature
+from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
 from tolcontact.features.feature_recognition import feature_geometry
 from tolcontact.features.pattern_geometry import check_alike
 from tolcontact.geometry.faces import Meshes, patch
@@ -79,14 +79,14 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
     drafts: dict[Place, Draft] = {}
     for claim in claims:
         for place in claim.places:
+            name = f"{_kind(place, surfaces)} {min(min(surface) for surface in place)}"
             try:
                 if place not in drafts:
-                    drafts[place] = _draft(part, meshes, place, surfaces)
+                    drafts[place] = _draft(name, part, meshes, place)
                 _state(claim, drafts[place])
             except (Undeclared, GeometryFault) as reason:
-                numbers = ", ".join(str(number) for number in sorted(number for surface in place for number in surface))
-                claim.reasons.append(f"faces {numbers}: {reason}" if len(claim.places) > 1 else str(reason))
-    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.reasons]
+                claim.refuse(reason, name)
+    datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
     targeted = [claim for claim in datums if claim.targets]
     common_datums = {frozenset(claim.places): claim for claim in datums if len(claim.places) > 1 and not claim.targets}
     kept = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
@@ -100,14 +100,18 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
     return [*drafts.values(), *patterns, *datum_drafts]
 
 
-def _draft(part: Part, meshes: Meshes, place: Place, surfaces: TolerancedSurfaces) -> Draft:
+def _kind(place: Place, surfaces: TolerancedSurfaces) -> str:
+    kind = "planes" if len(place) > 1 else surfaces.kind(place[0])
+    return "surface" if kind == "general" else kind
+
+
+def _draft(name: str, part: Part, meshes: Meshes, place: Place) -> Draft:
     """Return a draft of the feature at a place. Raises GeometryFault if the place is no feature."""
     faces = tuple(Face(part, (Brep(*sorted(surface)),)) for surface in place)
     geometry = feature_geometry([patch(face, meshes) for face in faces])
-    kind = "surface" if isinstance(geometry, GeneralFeature) else surfaces.kind(place[0])
     if isinstance(geometry, SlabFeature):
-        kind = "slot" if geometry.is_inner else "tab"
-    return Draft(f"{kind} {min(min(surface) for surface in place)}", [faces], [geometry])
+        name = name.replace("planes", "slot" if geometry.is_inner else "tab")
+    return Draft(name, [faces], [geometry])
 
 
 def _state(claim: Claim, draft: Draft) -> None:
@@ -122,7 +126,10 @@ def _state(claim: Claim, draft: Draft) -> None:
             draft.datum = claim
         case Dimension() as dimension:
             if not isinstance(geometry, FeatureOfSize):
-                raise Undeclared(f"a size is for cylinders, spheres and two opposed planes, and it is {geometry.in_words}")
+                kind = draft.name.split()[0]
+                raise Undeclared(
+                    f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
+                )
             draft.stated.append((claim, declarable.size(dimension, geometry.size)))
         case tolerance:
             draft.stated.append((claim, declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))))
