@@ -308,7 +308,7 @@ def test_the_command_prints_tables_in_80_columns(tmp_path):
     done = call(tmp_path, "pmi", path.name)
     assert done.returncode == 0, done.stderr
     assert max(map(len, done.stdout.splitlines())) <= 80
-    for words in ("AP242 edition 1: 1 tolerances, 1 dimensions, 4 datums", "position", "A | B (M) | C-D", "12.7", "B1 point"):
+    for words in ("AP242 edition 1: 1 tolerances, 1 dimensions, 4 datums", "position", "A | B (M)", "12.7", "B1 point"):
         assert words in done.stdout
     data = json.loads(call(tmp_path, "pmi", path.name, "--json").stdout)
     assert data["tolerances"][0]["face_records"] == [11] and data["edition"] == 1
@@ -356,14 +356,15 @@ def test_faces_of_tolerances_have_the_numbers_of_the_listing(tmp_path):
     records = cover_with_pmi(path)
     found = faces_of_records(path)
     assert [found[record].number for record in records] == list(range(1, len(records) + 1))
-    done = call(tmp_path, "pmi", path.name, "--faces")
+    done = call(tmp_path, "pmi", path.name)
     assert done.returncode == 0, done.stderr
     (row,) = [line for line in done.stdout.splitlines() if "flatness" in line]
-    assert row.split() == ["1", "flatness", "0.05", "2"]
-    (row,) = csv.DictReader(io.StringIO(call(tmp_path, "pmi", path.name, "--csv", "--faces").stdout))
+    assert row.split() == ["1", "flatness", "0.05", "plane", "2", "plane", "2"]  # the face, and the feature that is declared
+    (row,) = csv.DictReader(io.StringIO(call(tmp_path, "pmi", path.name, "--csv").stdout))
     assert (row["faces"], row["face_records"]) == ("2", str(records[1]))
-    data = json.loads(call(tmp_path, "pmi", path.name, "--json", "--faces").stdout)
-    assert data["faces"][str(records[4])] == {"number": 5, "name": "", "bodies": [1]}
+    assert (row["features"], row["reason"]) == ("plane 2", "")
+    data = json.loads(call(tmp_path, "pmi", path.name, "--json").stdout)
+    assert data["faces"][str(records[4])] == {"number": 5, "name": "", "bodies": [1], "kind": ""}
     assert not faces_of_records(COVER)
 
 

@@ -22,7 +22,7 @@
     tolcontact view MODEL.py | FILE.stp                  show an assembly or a file before a run
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes
     tolcontact faces FILE.stp --body NAME                the faces of a body: numbers, kinds, directions, radii, areas
-    tolcontact pmi FILE.stp [--faces] [--json | --csv]   the tolerances, dimensions and datums that a STEP file states
+    tolcontact pmi FILE.stp [--json | --csv | --script]  the tolerances, dimensions and datums that a STEP file states
     tolcontact --version
 
 `tolcontact COMMAND --help` lists the options, with examples; `tolcontact --install-completion` enables completion in the

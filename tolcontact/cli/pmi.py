@@ -4,9 +4,11 @@ import csv
 import io
 import json
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 from rich import box
@@ -16,51 +18,78 @@ from rich.text import Text
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples, only_one
 from tolcontact.cli.output import console
-from tolcontact.errors import clipped, shown
-from tolcontact.geometry.step_listing import RecordedFace, faces_of_records
+from tolcontact.errors import OptionError, clipped, shown
+from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
+from tolcontact.pmi.declared import Annotation
+from tolcontact.pmi.declared_file import DeclaredFile, declared_file
+from tolcontact.pmi.script import script
 from tolcontact.pmi.second_reading import SecondReading, second_reading
 
 WIDTH = 80  # of files and pipes
 MAX_ROWS = 2000  # of a table, which takes a second; a drawing has a hundred
 _CSV = (
     "type", "number", "record", "kind", "name", "value", "lower", "upper", "unit", "zone", "details", "datums", "refines",
-    "face_records", "other_records", "end_face_records", "end_other_records", "faces", "end_faces",
+    "face_records", "other_records", "end_face_records", "end_other_records", "faces", "end_faces", "features", "reason",
 )  # fmt: skip
-_TOLERANCES = ("", "kind", "value", "zone, modifiers", "datums", "faces")
-_DIMENSIONS = ("", "kind", "name", "nominal", "limits", "details", "faces")
-_DATUMS = ("", "faces", "targets")
+_TOLERANCES = ("", "kind", "value", "zone, modifiers", "datums", "faces", "declared as")
+_DIMENSIONS = ("", "dimension", "nominal", "limits", "details", "faces", "declared as")
+_DATUMS = ("", "faces", "targets", "declared as")
+MIN_WIDTHS = {"dimension": 9, "declared as": 12, "faces": 11}  # of columns, so that no word of theirs is cut
 MAX_FACES = 12  # in a cell
+MAX_FEATURES = 6  # in a cell
 
 AsCsv = Annotated[bool, typer.Option("--csv", help="Print the tolerances and dimensions as CSV.")]
-WithFaces = Annotated[
-    bool,
-    typer.Option(
-        "--faces", help="Give the numbers of faces as tolcontact faces does, and compare with the CAD kernel's own reading."
-    ),
-]
-FacesOfRecords = Mapping[int, RecordedFace]
+AsScript = Annotated[bool, typer.Option("--script", help="Print a model script that declares the parts with these tolerances.")]
 
 
-@app.command(epilog=examples("pmi part.stp --faces", "pmi part.stp --csv > part.csv"))
-def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, with_faces: WithFaces = False) -> None:
-    """List the geometric tolerances, dimensions and datums that a STEP file of AP242 states. Lengths in mm, angles in rad."""
-    only_one(json=as_json, csv=as_csv)
+@app.command(epilog=examples("pmi part.stp", "pmi part.stp --csv > part.csv", "pmi part.stp --script > part.py"))
+def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_script: AsScript = False) -> None:
+    """List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.
+
+    The CAD kernel's own reading is compared with the list, and differences are told.
+    """
+    only_one(json=as_json, csv=as_csv, script=as_script)
     information = read_pmi(file)
-    faces = faces_of_records(file) if with_faces else {}
-    if with_faces and not faces and not information.is_empty:
-        typer.echo("warning: the faces have no numbers here: their records cannot be told, or the file has none", err=True)
-    reading = second_reading(information, file, faces) if with_faces and not (as_csv or information.is_empty) else None
-    if as_json:
-        listed = {"faces": {record: asdict(face) for record, face in faces.items()}} if with_faces else {}
-        compared = {"second_reading": asdict(reading)} if reading else {}
-        typer.echo(json.dumps(asdict(information) | listed | compared, allow_nan=False))
+    declared = _declared(file, information)
+    if as_script and information.is_empty:
+        raise OptionError(f"{_reason(information, shown(str(file)))}, so there is nothing to declare")
+    if as_script and not declared.parts:
+        raise OptionError(f'"{file}": none of its tolerances, dimensions and datums applies to a face that is listed')
+    if as_script:
+        typer.echo(script(file, declared), nl=False)
     elif as_csv:
-        typer.echo(_csv(information, faces), nl=False)
-    elif information.is_empty:
+        typer.echo(_csv(declared), nl=False)
+    elif information.is_empty and not as_json:
         typer.echo(_reason(information, shown(str(file))))
     else:
-        _print_tables(information, faces, reading)
+        reading = None if information.is_empty else second_reading(information, file, declared.faces)
+        if as_json:
+            typer.echo(json.dumps(_entries(declared, reading), allow_nan=False))
+        else:
+            _print_tables(declared, reading)
+
+
+def _declared(file: Path, information: Pmi) -> DeclaredFile:
+    """Return how features declare what a file states; nothing, with a warning, if its shapes cannot be read."""
+    if information.is_empty:
+        return DeclaredFile(information, (), (), {})
+    try:
+        declared = declared_file(file, information)
+    except OptionError as error:
+        typer.echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
+        return DeclaredFile(information, (), (), {})
+    for fault in declared.faults:
+        typer.echo(f"warning: {fault}", err=True)
+    return declared
+
+
+def _entries(declared: DeclaredFile, reading: SecondReading | None) -> dict[str, Any]:
+    """Return everything for JSON: what the file states, its faces, what became of it, and the kernel's reading."""
+    faces = {record: asdict(face) for record, face in declared.faces.items()}
+    declarations = {one.annotation.record: {"features": one.features, "reason": one.reason} for one in declared.annotations}
+    entries = {"faces": faces, "declared": declarations, "second_reading": asdict(reading) if reading else None}
+    return asdict(declared.pmi) | entries
 
 
 def _reason(information: Pmi, name: str) -> str:
@@ -76,19 +105,21 @@ def _reason(information: Pmi, name: str) -> str:
     return f'"{name}" states no tolerances, dimensions or datums{details}'
 
 
-def _print_tables(information: Pmi, faces: FacesOfRecords, reading: SecondReading | None) -> None:
+def _print_tables(declared: DeclaredFile, reading: SecondReading | None) -> None:
     output = console()
     width = output.width if sys.stdout.isatty() else WIDTH
-    output.print(Text(str(information), style="bold"))
-    for part in (*_sections(information, faces), *([] if reading is None else _reading_lines(reading))):
+    output.print(Text(str(declared.pmi), style="bold"))
+    parts = *_sections(declared), *_undeclared_lines(declared), *([] if reading is None else _reading_lines(reading))
+    for part in parts:
         output.print(part, width=width)
 
 
-def _sections(information: Pmi, faces: FacesOfRecords) -> Iterator[RenderableType]:
+def _sections(declared: DeclaredFile) -> Iterator[RenderableType]:
     """Yield the tables with their titles. Tables without rows are left out."""
-    tolerances = [_tolerance_row(tolerance, faces) for tolerance in information.tolerances[:MAX_ROWS]]
-    dimensions = [_dimension_row(dimension, faces) for dimension in information.dimensions[:MAX_ROWS]]
-    datums = [_datum_row(datum, faces) for datum in information.datums[:MAX_ROWS]]
+    information = declared.pmi
+    tolerances = [_tolerance_row(tolerance, declared) for tolerance in information.tolerances[:MAX_ROWS]]
+    dimensions = [_dimension_row(dimension, declared) for dimension in information.dimensions[:MAX_ROWS]]
+    datums = [_datum_row(datum, declared) for datum in information.datums[:MAX_ROWS]]
     for title, columns, rows, count in (
         ("tolerances [mm]", _TOLERANCES, tolerances, len(information.tolerances)),
         ("dimensions [mm]", _DIMENSIONS, dimensions, len(information.dimensions)),
@@ -111,6 +142,24 @@ def _sections(information: Pmi, faces: FacesOfRecords) -> Iterator[RenderableTyp
         yield Text("the shapes of the file are triangles, without faces")
 
 
+def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
+    """Yield what is not declared, or only in part, with the reasons."""
+    numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
+        for one in declared.annotations:
+            if isinstance(one.annotation, kind) and one.reason:
+                reason = f"only in part, {one.reason}" if one.features else one.reason
+                numbers[noun, reason].append(_number(one.annotation))
+    if numbers:
+        yield Text("\nnot declared", style="bold")
+    for (noun, reason), group in numbers.items():
+        yield Text(shown(f"{noun}{'s' if len(group) > 1 else ''} {', '.join(group[:MAX_ROWS])}: {reason}"))
+
+
+def _number(annotation: Annotation) -> str:
+    return annotation.letter if isinstance(annotation, Datum) else str(annotation.number)
+
+
 def _reading_lines(reading: SecondReading) -> Iterator[RenderableType]:
     """Yield the sentences on the kernel's reading, and the differences."""
     yield Text("\nsecond reading, by the CAD kernel", style="bold")
@@ -126,42 +175,54 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     for column in columns:
         is_figure = column in ("value", "nominal")
         is_short = column in ("", "value", "nominal", "limits")
-        table.add_column(column, justify="right" if is_figure else "left", no_wrap=is_short, overflow="fold")
+        justify = "right" if is_figure else "left"
+        table.add_column(column, justify=justify, no_wrap=is_short, overflow="fold", min_width=MIN_WIDTHS.get(column))
     for row in rows:
         table.add_row(*map(Text, row))
     return table
 
 
-def _tolerance_row(tolerance: Tolerance, faces: FacesOfRecords) -> tuple[str, ...]:
+def _tolerance_row(tolerance: Tolerance, declared: DeclaredFile) -> tuple[str, ...]:
     return (
         str(tolerance.number), tolerance.kind or "not stated", _figure(tolerance.value), tolerance.details,
-        tolerance.datum_system, _faces(tolerance.face_records, tolerance.other_records, faces),
+        tolerance.datum_system, _faces(tolerance.face_records, tolerance.other_records, declared.faces),
+        _features(tolerance, declared),
     )  # fmt: skip
 
 
-def _dimension_row(dimension: Dimension, faces: FacesOfRecords) -> tuple[str, ...]:
-    places = _faces(dimension.face_records, dimension.other_records, faces)
+def _dimension_row(dimension: Dimension, declared: DeclaredFile) -> tuple[str, ...]:
+    places = _faces(dimension.face_records, dimension.other_records, declared.faces)
     if dimension.end_face_records or dimension.end_other_records:
-        places += f"{';' if faces else ','} {_faces(dimension.end_face_records, dimension.end_other_records, faces)}"
+        places += f" to {_faces(dimension.end_face_records, dimension.end_other_records, declared.faces)}"
     limits = f"{_figure(dimension.lower)} to {_figure(dimension.upper)}".strip()
     unit = "" if dimension.unit in ("mm", "") else f" {dimension.unit}"
     return (
-        str(dimension.number), dimension.kind, shown(dimension.name), f"{_figure(dimension.nominal)}{unit}",
-        "" if limits == "to" else limits, dimension.details, places,
+        str(dimension.number), shown(dimension.name) or dimension.kind, f"{_figure(dimension.nominal)}{unit}",
+        "" if limits == "to" else limits, dimension.details, places, _features(dimension, declared),
     )  # fmt: skip
 
 
-def _datum_row(datum: Datum, faces: FacesOfRecords) -> tuple[str, ...]:
+def _datum_row(datum: Datum, declared: DeclaredFile) -> tuple[str, ...]:
     targets = ", ".join(map(str, datum.targets))
-    return shown(datum.letter), _faces(datum.face_records, datum.other_records, faces), targets
+    places = _faces(datum.face_records, datum.other_records, declared.faces)
+    return shown(datum.letter), places, targets, _features(datum, declared)
+
+
+def _features(annotation: Annotation, declared: DeclaredFile) -> str:
+    """Return the names of the features that declare an annotation; a dash if none does."""
+    names = next((one.features for one in declared.annotations if one.annotation is annotation), ())
+    more = f", and {len(names) - MAX_FEATURES} more" if len(names) > MAX_FEATURES else ""
+    return shown(", ".join(names[:MAX_FEATURES])) + more if names else "-"
 
 
 def _faces(records: Sequence[int], others: Sequence[int], faces: FacesOfRecords) -> str:
     """Return the faces if they are known, else how many there are; if there are none, how many other items, in parentheses."""
     if faces and records:
-        known = [str(faces[record]) for record in records if record in faces][:MAX_FACES]
+        known = [faces[record] for record in records if record in faces][:MAX_FACES]
+        kinds = dict.fromkeys(face.kind for face in known)
+        groups = [f"{kind} {', '.join(str(face) for face in known if face.kind == kind)}".strip() for kind in kinds]
         more = len(records) - len(known)
-        return ", ".join([*known, *([f"and {more} more"] if more else [])])
+        return ", ".join([*groups, *([f"and {more} more"] if more else [])])
     return str(len(records)) if records or not others else f"({len(others)})"
 
 
@@ -169,8 +230,10 @@ def _figure(value: float | None) -> str:
     return "" if value is None else f"{value:.6g}"
 
 
-def _csv(information: Pmi, faces: FacesOfRecords) -> str:
+def _csv(declared: DeclaredFile) -> str:
     text = io.StringIO()
+    information, faces = declared.pmi, declared.faces
+    became = {one.annotation.record: ("; ".join(one.features), one.reason) for one in declared.annotations}
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_CSV)
     for tolerance in information.tolerances:
@@ -178,7 +241,7 @@ def _csv(information: Pmi, faces: FacesOfRecords) -> str:
             "tolerance", tolerance.number, tolerance.record, tolerance.kind, shown(tolerance.name), tolerance.value, None, None,
             "mm", shown(tolerance.zone), tolerance.details, tolerance.datum_system, tolerance.refines,
             _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
-            _named(tolerance.face_records, faces), None,
+            _named(tolerance.face_records, faces), None, *map(shown, became.get(tolerance.record, ("", ""))),
         ))  # fmt: skip
     for dimension in information.dimensions:
         rows.writerow((
@@ -186,7 +249,7 @@ def _csv(information: Pmi, faces: FacesOfRecords) -> str:
             dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
             _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
             _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
-            _named(dimension.end_face_records, faces),
+            _named(dimension.end_face_records, faces), *map(shown, became.get(dimension.record, ("", ""))),
         ))  # fmt: skip
     return text.getvalue()
 

@@ -2,7 +2,7 @@
 
 import logging
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -78,14 +78,21 @@ def faces_in(path: str | Path, body: str | int | None = None) -> tuple[FaceInFil
 
 @dataclass(frozen=True, repr=False)
 class RecordedFace(Readable):
-    """A B-rep face by its `number` and `name` in a body, and the numbers of the `bodies` that have it: one for each place."""
+    """A B-rep face by its `number` and `name` in a body, and the numbers of the `bodies` that have it, one for each place.
+
+    kind   of its surface; empty if the shape of the body was not looked at
+    """
 
     number: int
     name: str
     bodies: tuple[int, ...]
+    kind: str = ""
 
     def __str__(self) -> str:
         return f"{self.number}" if self.bodies == (1,) else f"{self.number} of body {', '.join(map(str, self.bodies))}"
+
+
+FacesOfRecords = Mapping[int, RecordedFace]
 
 
 def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:

@@ -2,7 +2,7 @@
 
 A STEP file of AP242 can state the product and manufacturing information (PMI) of a drawing as data: geometric tolerances,
 dimensions and datums, with the faces to which they apply. `tc.read_pmi` reads them, and `tolcontact pmi FILE.stp` lists them
-as tables, JSON or CSV. Lengths are in mm and angles in rad, whatever the units of the file. No CAD kernel is needed.
+as tables, JSON or CSV. Lengths are in mm and angles in rad, whatever the units of the file.
 
 >>> import tolcontact as tc
 >>> from pathlib import Path
@@ -44,12 +44,35 @@ AP242 edition 1: 1 tolerances, 0 dimensions, 0 datums
 `face_records` are the numbers of B-rep faces in the text of the file, `other_records` those of edges, curves and points: a
 tolerance of a thread is often stated on curves. Patterns, groups and derived features, such as a centre of symmetry, are
 resolved into their faces. A tolerance of the whole product (`extent` "all over") has all faces of the file. Some tolerances
-have no faces, because the file states none. `tolcontact pmi FILE.stp --faces` reads the shapes, too, and gives the numbers that
-`tolcontact faces` lists.
+have no faces, because the file states none. `tolcontact pmi FILE.stp` gives the numbers that `tolcontact faces` lists.
+
+## Features
+
+`part.features_from_pmi()` declares what features can state (see `tolcontact.features`), and returns every annotation with its
+features, or with the reason why it has none. `tolcontact pmi FILE.stp` lists the same, and `--script` writes a model script with
+these features, to go on from.
+
+| stated in the file | declared as |
+|---|---|
+| faces that lie in one plane, or on one cylinder, cone, sphere or torus | one feature |
+| a size, position or symmetry of two opposed planes | a slot or a tab |
+| a size | the size of the shape, with the limits of the file about it |
+| a position of several like features, a composite frame, a common zone | a pattern |
+| the lower segment of a composite frame | a tolerance whose datums lock directions alone, "A><" |
+| a datum of several surfaces | a pattern of their features |
+| datum targets at points | targets on the features there; lines and areas stand for their faces |
+| an unequally disposed zone | `outside`, the part of the zone out of the material (ASME Y14.5) |
+
+Features are named after the letter of their datum, else after their kind and the number of their first face: "cylinder 12",
+"cylinders 12" for a pattern. Not declared are tolerances without faces or of the whole product, in the free state of a part,
+or statistical ones; zones between planes for an axis, whose direction is not read; dimensions between features, which are
+places that positions tolerance; sizes without limits, or of other surfaces than cylinders, spheres and opposed planes; and
+what other tolerances of the same feature imply. The reader assumes that a pattern keeps together, as in ASME Y14.5; under ISO
+5458 this needs CZ.
 
 ## Second reading
 
-With `--faces`, the CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from
+The CAD kernel reads the tolerances and dimensions, too, and the command tells where its reading differs from
 the listed one: in kind, value, form of the zone, projected length, modifiers, datums and faces of a tolerance, and in value,
 limits, fit and faces of a dimension. Values agree if they differ by less than 1e-9 of their size. The kernel reads less, so
 that its reading changes nothing: it does not know composite frames, unequally disposed zones, areas per unit and equidistant
@@ -59,9 +82,9 @@ a process of its own; if it crashes at a file, a sentence says so.
 ## Limits
 
 Editions 1 to 3 of AP242 are read; edition 4, AP242 XML and QIF are refused by name. A file of AP203 or AP214 is read, but
-nothing in it. A fit such as H7 is named, and not turned into limits. Places and sizes of datum targets, coordinate systems,
-orientations of zones, and occurrences of a part in an assembly are not read. A dimension with a value that has no unit of its
-own is listed without it. A damaged file leads to a single message.
+nothing in it. A fit such as H7 is named, and not turned into limits. Sizes of datum targets, coordinate systems, orientations
+of zones, and occurrences of a part in an assembly are not read. A dimension with a value that has no unit of its own is listed
+without it. A damaged file leads to a single message.
 """
 
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance

@@ -1,13 +1,14 @@
 """The PMI of a whole file, declared on each of its bodies that has toleranced faces."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
-from tolcontact.geometry.files import STATED_FACES
+from tolcontact.errors import GeometryFault
+from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
-from tolcontact.geometry.step_listing import LISTING_CHORD, bodies_in, part_name
+from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.pmi.annotations import Pmi
 from tolcontact.pmi.claims import Claim, missing_faces
 from tolcontact.pmi.declared import Annotation, DeclaredAnnotation, DeclaredPmi
@@ -17,11 +18,17 @@ from tolcontact.readable import Readable
 
 @dataclass(frozen=True, repr=False)
 class DeclaredFile(Readable):
-    """The PMI of a file as features of `parts`, one for each body with toleranced faces, and what became of each annotation."""
+    """The PMI of a file as features of `parts`, one for each body with toleranced faces, and what became of each annotation.
+
+    faces    the faces of the file by their records
+    faults   sentences on bodies whose shapes cannot be used
+    """
 
     pmi: Pmi
     parts: tuple[Part, ...]
     annotations: tuple[DeclaredAnnotation, ...]
+    faces: FacesOfRecords
+    faults: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return str(DeclaredPmi(tuple(feature for part in self.parts for feature in part.toleranced), self.annotations))
@@ -33,21 +40,33 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
     A body that stands at several places is declared once.
     """
     model = Assembly(path.stem)
-    annotations: tuple[Annotation, ...] = (*pmi.tolerances, *pmi.dimensions, *pmi.datums)
-    stated = {record for annotation in annotations for record in annotation.face_records}
-    bodies = bodies_in(path)
-    parts, claims, known = list[Part](), list[list[Claim]](), set[frozenset[int]]()
+    bodies, faces = bodies_in(path), faces_of_records(path)
+    parts, claims, known, faults = list[Part](), list[list[Claim]](), set[frozenset[int]](), list[str]()
     for body in bodies:
+        records = frozenset(record for record, face in faces.items() if body.number in face.bodies) & _records(pmi)
+        if not records or records in known:
+            continue
+        known.add(records)
         geometry = Mesh(path, body=body.number if len(bodies) > 1 else None, chord=LISTING_CHORD)
-        read = shape(geometry)
-        records = frozenset(record for face in read.mesh.metadata[STATED_FACES] for record in face.records) & stated
-        if records and records not in known:
-            known.add(records)
-            part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
-            claims.append(declare_features(part, pmi, read)[1])
-            parts.append(part)
+        try:
+            read = shape(geometry)
+        except GeometryFault as fault:
+            faults.append(f"nothing is declared of body {body.number}: {fault}")
+            continue
+        part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
+        claims.append(declare_features(part, pmi, read)[1])
+        parts.append(part)
+        kinds = {face.number: face.kind for face in describe_faces(read.mesh)}
+        faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
     merged = [_merged(parts, own) for own in zip(*claims, strict=True)]
-    return DeclaredFile(pmi, tuple(parts), tuple(merged))
+    return DeclaredFile(pmi, tuple(parts), tuple(merged), faces, tuple(faults))
+
+
+def _records(pmi: Pmi) -> frozenset[int]:
+    """Return the records of all faces to which annotations apply."""
+    toleranced: tuple[Annotation, ...] = (*pmi.tolerances, *pmi.dimensions, *pmi.datums)
+    ends = (record for dimension in pmi.dimensions for record in dimension.end_face_records)
+    return frozenset((*(record for annotation in toleranced for record in annotation.face_records), *ends))
 
 
 def _merged(parts: Sequence[Part], claims: Sequence[Claim]) -> DeclaredAnnotation:

@@ -4,7 +4,7 @@ The kernel reads less, so that its reading changes nothing: differences are only
 """
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from tolcontact.geometry.kernel_annotations import (
     KernelTolerance,
     kernel_annotations,
 )
-from tolcontact.geometry.step_listing import RecordedFace
+from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi.annotations import Dimension, Pmi, Tolerance
 from tolcontact.readable import Readable
 
@@ -30,7 +30,6 @@ _WITH_VALUES = (
     "projected",
     "spherical",
 )  # modifiers of datums that the kernel does not tell
-FacesOfRecords = Mapping[int, RecordedFace]
 
 
 @dataclass(frozen=True, repr=False)
