@@ -266,11 +266,11 @@ def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer:
     candidates = np.hstack([motions[:, within], coordinates[:, spanned], projector])
     basis, rank = np.zeros((geometry.count, count)), 0
     for candidate in candidates.T:
-        rest = candidate
+        remainder = candidate
         for _ in range(2):  # twice is enough to be orthogonal to rounding
-            rest = rest - basis[:, :rank] @ (basis[:, :rank].T @ rest)
-        if (length := np.linalg.norm(rest)) > RANK_TOLERANCE:
-            basis[:, rank] = np.where(np.abs(rest) < MIN_PART * length, 0.0, rest / length)
+            remainder = remainder - basis[:, :rank] @ (basis[:, :rank].T @ remainder)
+        if (length := np.linalg.norm(remainder)) > RANK_TOLERANCE:
+            basis[:, rank] = np.where(np.abs(remainder) < MIN_PART * length, 0.0, remainder / length)
             rank += 1
         if rank == count:
             break
