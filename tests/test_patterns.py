@@ -150,13 +150,15 @@ def test_rules_that_draw_together_draw_each_member_by_itself():
 
 
 def test_the_worst_case_of_a_distance_is_the_zone_of_the_lower_frame():
+    """The upper zone is largest, 0.45, with the largest holes."""
     a, part, faces = plate_with_holes(2)
-    holes = part.pattern("H", *faces, tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"))
-    a.measure("distance", holes.members[1].point(30, 0, 0), to=holes.members[0].point(-30, 0, 0), along="x", absolute=False)
-    a.measure("place", holes.members[0].point(-30, 0, 0), along="x")
+    tolerances = tc.Size(8, 0.05, 0), tc.Position(0.4, "A|B|C", material="M"), tc.Position(0.1, "A")
+    left, right = part.pattern("H", *faces, *tolerances).members
+    a.measure("distance", right.axis(1), to=left.axis(1), along="x", absolute=False)
+    a.measure("place", left.axis(1), along="x")
     worst = tc.worst_case(a, samples=256)["worst"].sel(state="corrected")
     assert np.abs(worst.sel(measure="distance")).values == pytest.approx([0.1, 0.1], abs=1e-6)
-    assert np.abs(worst.sel(measure="place")).values == pytest.approx([0.25, 0.25], abs=1e-6)
+    assert np.abs(worst.sel(measure="place")).values == pytest.approx([0.225, 0.225], abs=1e-6)
 
 
 def test_members_may_be_pairs_of_planes():

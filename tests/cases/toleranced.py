@@ -55,10 +55,10 @@ def ball_with(*tolerances, frame: Frame = STILL, letter: str | None = None) -> t
 HOLES = ((-30.0, 0.0), (30.0, 0.0), (0.0, 20.0), (0.0, -20.0))
 
 
-def plate_with_holes(count: int, *, frame: Frame = STILL, turn: np.ndarray | None = None):
+def plate_with_holes(count: int, *side: tc.Perpendicularity, frame: Frame = STILL, turn: np.ndarray | None = None):
     """A fixed plate of 100 x 60 x 10 about its middle, datums A (bottom), B (side) and C (end), and the faces of its holes.
 
-    With `turn` (3, 3) the shape itself is turned in its own frame.
+    `side` are tolerances of datum B. With `turn` (3, 3) the shape itself is turned in its own frame.
     """
     a = tc.Assembly("plate")
     tubes = [trimesh.creation.cylinder(4, 9, sections=48).apply_translation((x, y, 0)) for x, y in HOLES[:count]]
@@ -71,15 +71,17 @@ def plate_with_holes(count: int, *, frame: Frame = STILL, turn: np.ndarray | Non
     part = a.part("plate", tc.Mesh(mesh), **frame.place(5, -7, 3), fixed=True)
     for letter, axis, height in (("A", 2, 5), ("B", 1, 30), ("C", 0, 50)):
         is_face = (abs(centres[:, axis] + height) < 1e-9) & (normals[:, axis] < -0.5)
-        part.feature(letter, part.face(np.flatnonzero(is_face).tolist()), datum=letter)
+        part.feature(letter, part.face(np.flatnonzero(is_face).tolist()), *(side if letter == "B" else ()), datum=letter)
     beside = [np.hypot(centres[:, 0] - x, centres[:, 1] - y) < 4.5 for x, y in HOLES[:count]]
     faces = [part.face(np.flatnonzero(near & (abs(normals[:, 2]) < 0.5)).tolist()) for near in beside]
     return a, part, faces
 
 
-def pattern_with(*tolerances, count: int = 4, follower: tc.Position | None = None, frame: Frame = STILL) -> tc.Assembly:
+def pattern_with(
+    *tolerances, count: int = 4, follower: tc.Position | None = None, side=(), frame: Frame = STILL
+) -> tc.Assembly:
     """A plate with a pattern of holes, datum H; the last one is toleranced to the others if there is a `follower`."""
-    a, part, faces = plate_with_holes(count, frame=frame)
+    a, part, faces = plate_with_holes(count, *side, frame=frame)
     pattern = part.pattern("H", *(faces[:-1] if follower else faces), *tolerances, datum="H")
     if follower:
         part.feature("last", faces[-1], follower)
@@ -134,6 +136,12 @@ EVERY = {  # of the kinds that move features; all state 99.73 % inside
     "composite pattern": lambda frame: pattern_with(tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"), frame=frame),
     "pattern of three frames": lambda frame: pattern_with(
         tc.Position(0.5, "A|B|C"), tc.Position(0.2, "A|B"), tc.Position(0.05), frame=frame
+    ),
+    "pattern with orientation within": lambda frame: pattern_with(
+        tc.Position(0.5, "A|B|C"), tc.Position(0.1, "A"), tc.Perpendicularity(0.05, "A"), frame=frame
+    ),
+    "pattern that follows a datum": lambda frame: pattern_with(
+        tc.Position(0.1, "A|B|C"), tc.Position(0.05, "A"), side=[tc.Perpendicularity(0.3, "A")], frame=frame
     ),
     "common zone of axes": lambda frame: pattern_with(tc.Position(0.1), frame=frame),
     "pattern with a bonus": lambda frame: pattern_with(tc.Size(8, 0.1, 0), tc.Position(0, "A|B|C", material="M"), frame=frame),

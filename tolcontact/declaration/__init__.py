@@ -90,7 +90,8 @@ without naming it.
 feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
 >>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
 
-`tolcontact.features` lists the tolerances, what each of them controls, and how datums work.
+`part.pattern("H", face, face, ..., tolerances...)` declares several like features with common tolerances, such as holes.
+`tolcontact.features` lists the tolerances, what each of them controls, and how datums, their targets and patterns work.
 
 ## Shared causes, correlation, measured parts
 

@@ -208,7 +208,7 @@ class GeometricTolerance(Readable):
 
 
 class Position(GeometricTolerance):
-    """Position of an axis, a centre, or a plane (ISO 1101, 17.12)."""
+    """Position of an axis, a centre, or a plane (ISO 1101, 17.12); in a pattern also without datums, as a common zone."""
 
     kind, options = "position", ("zone", "along", "material", "projected", "tangent")
 

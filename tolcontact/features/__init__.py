@@ -36,9 +36,11 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 | `tc.Roundness` | cylinder, cone, sphere | form |
 | `tc.Cylindricity` | cylinder | form |
 
-`zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum.
-`material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the
-process uses the bonus), "accepts" (only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in
+`tc.Flatness(0.1, per=(25, 25))`, or `per=25` for lines, limits the form of any part of this size; like all form it moves no
+feature. `tangent=True` states the orientation or place of the plane that touches a plane from outside; without form the two
+are equal. `zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary
+datum. `material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"`
+(the process uses the bonus), "accepts" (only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in
 `tolcontact.variation`. All this follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), unlike
 under ASME's Rule #1.
 
@@ -52,9 +54,40 @@ association="least squares")`. That shift is a contributor, "far.datum B of A|B"
 of the plane. Planes of a common datum count by least squares. The frame of a part is the frame of its
 shape, in which datums are nominal. A datum shift is not drawn: it follows from the contact of the datum feature with its mate.
 
+`part.datum_targets("A", foot.point(5, 5, 0), ...)` is a datum that touches features at points, along their normals there, like
+the locators of a fixture. The features may be of any kind, also free-form, and several may have targets of one datum. Three
+targets on one plane give that plane. A fixture that holds the part at its targets has locators there, one for each:
+`tc.Locator("A1", (5, 5, 0), "z", 0.1, on=foot)`. The tolerances of the part and its place then have the same frame.
+
 Several tolerances of a feature are nested, form within orientation within location; a finer lower segment of a frame is a
 second position tolerance, with fewer datums. Each tolerance draws the freedoms that narrower tolerances leave, as the top of
 the block shows.
+
+## Patterns
+
+A pattern is several features of one kind and size with common tolerances: `holes = part.pattern("H", face, face, ...)` has
+the members "H 1", "H 2", ..., each of which is a feature like any other (`holes.members[0]`). A member may also be a pair of
+planes, as in `(face, face)`. The zones of a tolerance keep the places to each other that the drawing gives them, and move
+together in the motions that its datums leave free. So a second, narrower position with fewer datums, or with none, limits the
+members to each other, and the wider one moves the pattern as a whole:
+
+>>> other = tc.Assembly("other")
+>>> part = other.part("part", tc.Box(40, 40, 10), fixed=True)
+>>> for letter, way in {"A": "-z", "B": "-y", "C": "-x"}.items():
+...     datum = part.feature(letter, part.face(way), datum=letter)
+>>> sides = part.pattern("S", part.face("+x"), part.face("+y"), tc.Profile(0.3, "A|B|C"), tc.Profile(0.1))
+>>> corner = other.measure("corner", sides.members[0].point(40, 40, 0), along="x")
+>>> tc.build(other).nominal.contributors  # the inner tolerance limits how square the sides are to each other
+('part.S.relative 1', 'part.S 1.offset', 'part.S 2.offset', 'part.S 2.tilt z', 'part.S 1.tilt z', 'part.S.mixed 1')
+
+Contributors of one member are "part.H 1.shift x", those of several "part.H.common shift x", "part.H.common turn z" or
+"part.H.relative 1". The latter are directions of length 1 in the coordinates of all members: as the contributor "common shift
+x" of four holes deviates by 1 mm, each of them moves by 1/2 mm. Sizes of members are independent of each other.
+
+With `datum="D"` all members together are the datum, by least squares. A pattern without tolerances, which is a datum alone,
+names one datum of several surfaces: coplanar pads, or the two seats of a shaft. Its members may be unlike, and features that
+were declared before with tolerances of their own: `part.pattern("seats", seat, other_seat, datum="A")`. Tolerances that each
+member has by itself, without a common zone, are those of features: declare one for each.
 """
 
 from tolcontact.features.datum_order import datum_order

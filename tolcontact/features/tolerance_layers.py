@@ -269,13 +269,14 @@ def _named_basis(directions: np.ndarray, geometry: PatternGeometry, *, is_outer:
     motions = motions[:, lengths > MIN_LENGTH] / lengths[lengths > MIN_LENGTH]
     within = np.linalg.norm(projector @ motions - motions, axis=0) < RANK_TOLERANCE
     candidates = np.hstack([motions[:, within], coordinates[:, spanned], projector])
-    basis = np.zeros((geometry.count, 0))
+    basis, rank = np.zeros((geometry.count, count)), 0
     for candidate in candidates.T:
-        rest = candidate
+        remainder = candidate
         for _ in range(2):  # twice is enough to be orthogonal to rounding
-            rest = rest - basis @ (basis.T @ rest)
-        if (length := np.linalg.norm(rest)) > RANK_TOLERANCE and basis.shape[1] < count:
-            vector = rest / length
-            vector[np.abs(vector) < MIN_PART] = 0.0
-            basis = np.column_stack([basis, vector])
-    return basis
+            remainder = remainder - basis[:, :rank] @ (basis[:, :rank].T @ remainder)
+        if (length := np.linalg.norm(remainder)) > RANK_TOLERANCE:
+            basis[:, rank] = np.where(np.abs(remainder) < MIN_PART * length, 0.0, remainder / length)
+            rank += 1
+        if rank == count:
+            break
+    return basis[:, :rank]

@@ -64,8 +64,14 @@ larger.
 >>> bool(lower < 0.9973 < upper)
 True
 
-Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, patterns that shift as a group
-(give all their features one `tc.Variable`), and datum shift, which follows from contact.
+Of a pattern, 99.73 % of the *members* lie inside. A pattern with one position whose datums lock its members has the spreads of
+features by themselves. Where its datums leave a motion of the whole pattern free, the place of the pattern counts as fitted by
+least squares, and a wider tolerance with more datums draws that motion. "truncated", "uniform" and "polar" are for members that
+deviate by themselves. A bonus goes by the size of each member, and for what moves several of them by the smallest of theirs.
+A population judges one member of each drawn pattern, in turn.
+
+Not covered are form (features stay planes, cylinders, ...), the envelope of ASME's Rule #1, and datum shift, which follows from
+contact.
 
 ## Draws depend only on the seed and the realization
 

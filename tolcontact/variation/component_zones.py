@@ -70,12 +70,12 @@ def member_groups(pattern: NominalPattern, layer: Layer, zones: Sequence[MemberZ
         moved = np.ones((1, count), dtype=bool)
     else:
         moved = np.array([(zone.component_rows != 0).any(axis=(0, 1)) for zone in zones])
-    left = list(range(len(zones)))
-    while left:
-        numbers, components = [left[0]], moved[left[0]]
-        while joined := [k for k in left if k not in numbers and (moved[k] & components).any()]:
+    remaining = list(range(len(zones)))
+    while remaining:
+        numbers, components = [remaining[0]], moved[remaining[0]]
+        while joined := [k for k in remaining if k not in numbers and (moved[k] & components).any()]:
             numbers, components = sorted([*numbers, *joined]), components | moved[joined].any(axis=0)
-        left = [k for k in left if k not in numbers]
+        remaining = [k for k in remaining if k not in numbers]
         columns = np.flatnonzero(components)
         rows = tuple(zones[k].component_rows[..., columns] for k in numbers)
         yield MemberGroup(

@@ -18,6 +18,8 @@ from scipy.special import ndtri
 
 SHARE = 0.9973002039367398  # of a normal distribution within three standard deviations
 LOG2_DIRECTIONS = 14
+MEMBER_DIRECTIONS = 1 << 17  # for all members of a pattern that differ; the mean share then has an error of some 3e-5
+MIN_DIRECTIONS = 1 << 11  # for each of these members
 CHUNK = 1024  # components that are evaluated at once
 MIN_SPREAD = 1e-9  # of the width: a smaller spread counts as 0
 
@@ -42,7 +44,7 @@ class MemberZone:
         """Return the same zone of the first components alone."""
         return MemberZone(self.rows, self.coordinates[:, :count])
 
-    def share_inside(self, spreads: np.ndarray, width: float) -> float:
+    def share_inside(self, spreads: np.ndarray, width: float, directions: int = 1 << LOG2_DIRECTIONS) -> float:
         """Return the share of members, with standard deviations (component,), inside a zone of a width."""
         rows = self.component_rows
         if not rows.size:
@@ -55,19 +57,20 @@ class MemberZone:
             rows, varied = self.rows @ _root(scaled @ scaled.T), np.ones(self.rows.shape[2])
         if not len(varied):
             return 1.0
-        longest = _longest(rows, _directions(len(varied)) * varied)
+        longest = _longest(rows, _directions(len(varied))[:directions] * varied)
         return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
 def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: float) -> float:
-    """Return the share of members, with standard deviations (component,), inside their zones of a width: of all, the mean."""
+    """Return the mean share of members, with standard deviations (component,), inside their zones of a width."""
     counts, zones = Counter[tuple[bytes, bytes]](), dict[tuple[bytes, bytes], MemberZone]()
     for member in members:
         rows = member.component_rows
         key = rows[..., (rows != 0).any(axis=(0, 1))].tobytes(), spreads[(rows != 0).any(axis=(0, 1))].tobytes()
         counts[key] += 1
         zones[key] = member
-    shares = [zones[key].share_inside(spreads, width) for key in counts]
+    directions = max(MIN_DIRECTIONS, MEMBER_DIRECTIONS >> len(counts).bit_length())
+    shares = [zones[key].share_inside(spreads, width, directions) for key in counts]
     return shares[0] if len(shares) == 1 else float(np.average(shares, weights=list(counts.values())))
 
 
