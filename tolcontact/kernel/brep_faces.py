@@ -96,6 +96,7 @@ def box(faces: Sequence[Any], location: Any) -> np.ndarray:
     for face in faces:
         is_tessellated = BRep_Tool.Surface_s(as_face(face)) is None
         BRepBndLib.AddOptimal_s(face.Moved(location), bounds, is_tessellated, False)
+    bounds.SetGap(0.0)
     return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
 
 
