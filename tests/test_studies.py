@@ -13,6 +13,7 @@ STUDIES = {
     "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
     "cad/pmi_readings.py": [ROOT / "studies" / "cad"],
     "cad/read_files.py": [ROOT / "studies" / "cad"],
+    "cad/trimmed_faces.py": [ROOT / "models" / "cover.step"],
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
     "exact/tables.py": ["--samples", "20"],

@@ -15,7 +15,8 @@ from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS
+
+from tolcontact.kernel.releases import as_face
 
 RECOGNITION_TOLERANCE = 1e-4  # [mm] between a B-spline surface and the simple surface for which it is taken
 
@@ -54,7 +55,7 @@ def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure
     count = 0
     for number, face in enumerate(faces):
         location = TopLoc_Location()
-        mesh = BRep_Tool.Triangulation_s(TopoDS.Face(face), location)
+        mesh = BRep_Tool.Triangulation_s(as_face(face), location)
         if mesh is None:
             measures.append(None)
             continue
@@ -82,8 +83,8 @@ def measure(face: Any, parameters: Sequence[tuple[float, float]]) -> Measure | N
     The result is None where the surface has no normal.
     """
     properties, point, along, across = GProp_GProps(), gp_Pnt(), gp_Vec(), gp_Vec()
-    BRepGProp.SurfaceProperties_s(TopoDS.Face(face), properties, AREA_TOLERANCE)
-    BRepAdaptor_Surface(TopoDS.Face(face)).D1(*np.mean(parameters, axis=0), point, along, across)
+    BRepGProp.SurfaceProperties_s(as_face(face), properties, AREA_TOLERANCE)
+    BRepAdaptor_Surface(as_face(face)).D1(*np.mean(parameters, axis=0), point, along, across)
     normal = np.cross(along.Coord(), across.Coord())
     length = float(np.linalg.norm(normal)) * (-1 if face.Orientation() == TopAbs_REVERSED else 1)
     return (properties.Mass(), point.Coord(), (normal / length).tolist()) if length else None
@@ -93,14 +94,15 @@ def box(faces: Sequence[Any], location: Any) -> np.ndarray:
     """Return the lower and the upper corner (2, 3) of the box around faces that are moved to a location."""
     bounds = Bnd_Box()
     for face in faces:
-        is_tessellated = BRep_Tool.Surface_s(TopoDS.Face(face)) is None
+        is_tessellated = BRep_Tool.Surface_s(as_face(face)) is None
         BRepBndLib.AddOptimal_s(face.Moved(location), bounds, is_tessellated, False)
+    bounds.SetGap(0.0)
     return np.array([bounds.CornerMin().Coord(), bounds.CornerMax().Coord()])
 
 
 def surface(face: Any) -> dict[str, Any] | None:
     """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
-    adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
+    adaptor = BRepAdaptor_Surface(as_face(face))
     kind = adaptor.GetType().name.removeprefix("GeomAbs_")
     if kind in ("BSplineSurface", "BezierSurface"):
         return recognized_surface(face)

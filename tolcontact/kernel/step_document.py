@@ -12,7 +12,6 @@ from typing import Any
 
 from OCP.BRep import BRep_Tool
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
-from OCP.collections import Sequence_TDF_Label
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.Interface import Interface_Static
 from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -28,6 +27,7 @@ from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
 from tolcontact.kernel.brep_faces import explore
+from tolcontact.kernel.releases import LabelSequence
 
 NAMED_FACE = re.compile(rb"\b(?:ADVANCED_FACE|FACE_SURFACE)\s*\(\s*'(?!'|NONE')")  # in the text of a file
 SOLID = re.compile(rb"\b(?:MANIFOLD_SOLID_BREP|BREP_WITH_VOIDS|FACETED_BREP)\s*\(")
@@ -75,7 +75,7 @@ class Document:
 
     def places(self) -> Iterator[PlacedShape]:
         """Yield each place of a shape that is no assembly, in the file's order."""
-        roots = Sequence_TDF_Label()
+        roots = LabelSequence()
         XCAFDoc_DocumentTool.ShapeTool_s(self.document.Main()).GetFreeShapes(roots)
         for label in roots:
             yield from self._places_within(label, [], TopLoc_Location())
@@ -87,7 +87,7 @@ class Document:
             referred = label
         names = parents if is_nameless(name := label_name(label) or label_name(referred)) else [*parents, name]
         if XCAFDoc_ShapeTool.IsAssembly_s(referred):
-            components = Sequence_TDF_Label()
+            components = LabelSequence()
             XCAFDoc_ShapeTool.GetComponents_s(referred, components, False)
             for component in components:
                 yield from self._places_within(component, names, location)
@@ -160,7 +160,7 @@ class Document:
 
 def subshape_names(label: Any) -> dict[int, str]:
     """Return the names of the solids and faces in the shape of a label that have one, by their hashes."""
-    labels = Sequence_TDF_Label()
+    labels = LabelSequence()
     XCAFDoc_ShapeTool.GetSubShapes_s(label, labels)
     return {hash(XCAFDoc_ShapeTool.GetShape_s(piece)): label_name(piece) for piece in labels}
 
