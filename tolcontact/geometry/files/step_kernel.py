@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepMesh import BRepMesh_IncrementalMesh
 from OCP.collections import Sequence_TDF_Label
@@ -31,7 +31,7 @@ from OCP.TDocStd import TDocStd_Document
 from OCP.TopAbs import TopAbs_COMPOUND, TopAbs_FACE, TopAbs_REVERSED, TopAbs_SHELL, TopAbs_SOLID
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
-from OCP.TopoDS import TopoDS, TopoDS_Iterator
+from OCP.TopoDS import TopoDS, TopoDS_Face, TopoDS_Iterator
 from OCP.XCAFDoc import XCAFDoc_DocumentTool, XCAFDoc_ShapeTool
 
 from tolcontact.child import Refusal
@@ -96,7 +96,6 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
                     pieces.append(piece)
                     breps.append(brep)
         placed.extend((number, place) for number in shape_numbers[key])
-    names = body_names([(shapes[number], place) for number, place in placed])
     return pieces, {
         "brep": np.concatenate(breps),
         "surfaces": np.array([json.dumps([surface(face) for face in body.faces]) for body in shapes], dtype=str),
@@ -107,7 +106,7 @@ def read(path: Path, chord: float, angle: float) -> tuple[list[Piece], dict[str,
         "shape": np.array([number for number, _ in placed], dtype=np.int64),
         "transforms": np.array([place.transform for _, place in placed]).reshape(-1, 4, 4),
         "paths": np.array([json.dumps(place.names) for _, place in placed], dtype=str),
-        "names": np.array(names, dtype=str),
+        "names": np.array(body_names([(shapes[number], place) for number, place in placed]), dtype=str),
     }
 
 
@@ -316,15 +315,16 @@ def surface(face: Any) -> dict[str, Any] | None:
     """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
     adaptor = BRepAdaptor_Surface(TopoDS.Face(face))
     kind = adaptor.GetType().name.removeprefix("GeomAbs_")
-    if kind in ("BSplineSurface", "BezierSurface"):
-        return recognized_surface(face)
-    if kind not in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
-        return None
-    return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
+    if kind in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
+        return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
+    is_spline = kind in ("BSplineSurface", "BezierSurface")
+    return recognized_surface(getattr(adaptor, kind.removesuffix("Surface"))()) if is_spline else None
 
 
-def recognized_surface(face: Any) -> dict[str, Any] | None:
+def recognized_surface(spline: Any) -> dict[str, Any] | None:
     """Return the simple surface that a B-spline surface represents; None if there is none."""
+    face = TopoDS_Face()  # of the whole surface: the kernel fails at faces whose surface is stated as a part of one
+    BRep_Builder().MakeFace(face, spline, RECOGNITION_TOLERANCE)
     recognition = ShapeAnalysis_CanonicalRecognition(face)
     for kind, geometry in (("Plane", gp_Pln()), ("Cylinder", gp_Cylinder()), ("Cone", gp_Cone()), ("Sphere", gp_Sphere())):
         if getattr(recognition, f"Is{kind}")(RECOGNITION_TOLERANCE, geometry):
