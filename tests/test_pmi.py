@@ -362,3 +362,11 @@ def test_faces_of_tolerances_have_the_numbers_of_the_listing(tmp_path):
     data = json.loads(call(tmp_path, "pmi", path.name, "--json", "--faces").stdout)
     assert data["faces"][str(records[4])] == {"number": 5, "name": "", "bodies": [1]}
     assert not faces_of_records(COVER)
+
+
+@pytest.mark.parametrize(("suffix", "words"), [(".p21", "unknown kind of file"), (".stl", "is a STEP file by its content")])
+def test_faces_of_a_file_that_is_not_called_a_step_file_are_refused(suffix, words, tmp_path):
+    path = tmp_path / f"part{suffix}"
+    path.write_text(step(*POSITION))
+    with pytest.raises(OptionError, match=words):
+        faces_of_records(path)

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
 from tolcontact.geometry.brep_face import FaceInFile, describe_faces, plain_vector
@@ -137,7 +138,7 @@ def _part_name(body: BodyInFile) -> str:
 
 
 def _product(path: str | Path, chord: float | None = None) -> Product:
-    geometry = Mesh(path, chord=chord)
+    geometry = Mesh(path, chord=chord if Path(path).suffix.lower() in STEP else None)
     for fault in geometry.faults():
         raise OptionError(fault)
     content = read_files([geometry])[key_of(geometry)]
