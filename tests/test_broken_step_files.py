@@ -7,7 +7,7 @@ import pytest
 import tolcontact as tc
 from tests import cases
 from tests.helpers import nightly
-from tolcontact.errors import GeometryFault
+from tolcontact.errors import GeometryFault, OptionError
 from tolcontact.geometry.files import Limits, read_files
 
 pytestmark = pytest.mark.slow
@@ -69,3 +69,10 @@ def test_broken_files_end_in_a_message_each_or_are_read(kinds, tmp_path):
     for kind, path in paths.items():
         if kind not in messages:
             assert tc.bodies_in(path), kind
+
+
+def test_a_byte_order_mark_is_named(tmp_path):
+    path = tmp_path / "cover.step"
+    path.write_text("\ufeff" + WHOLE, encoding="utf-8")
+    with pytest.raises(OptionError, match=r'cover\.step" begins with a byte order mark.*save it as UTF-8 without'):
+        tc.bodies_in(path)

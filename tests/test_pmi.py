@@ -385,3 +385,11 @@ def test_a_face_that_stands_twice_has_one_number_for_both_of_its_records(tmp_pat
     found = {record: face.number for record, face in faces_of_records(path).items()}
     assert {found.pop(record) for record in (records[1], 90100, 90101)} == {face.number}
     assert len(found) == len(set(found.values())) == 14 and face.number not in found.values()
+
+
+@pytest.mark.parametrize(("suffix", "words"), [(".p21", "unknown kind of file"), (".stl", "is a STEP file by its content")])
+def test_faces_of_a_file_that_is_not_called_a_step_file_are_refused(suffix, words, tmp_path):
+    path = tmp_path / f"part{suffix}"
+    path.write_text(step(*POSITION))
+    with pytest.raises(OptionError, match=words):
+        faces_of_records(path)

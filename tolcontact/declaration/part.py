@@ -115,8 +115,7 @@ class Part(Readable):
     def features_from_pmi(self) -> Any:
         """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
 
-        It lists each tolerance, dimension and datum of the file, with its features or the reason why it has none (see
-        `tolcontact.pmi`). Raises ModelError if the file cannot be read, or states no PMI.
+        It lists each annotation with its features, or the reason why it has none. Raises ModelError if the file states none.
         """
         return LATER[PMI](self)
 

@@ -10,6 +10,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Assembly, Mesh, Part
+from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
 from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, plain_vector
@@ -166,7 +167,7 @@ def _part(product: Product, body: str | int | None) -> trimesh.Trimesh:
 
 
 def _product(path: str | Path, chord: float | None = None) -> Product:
-    geometry = Mesh(path, chord=chord)
+    geometry = Mesh(path, chord=chord if Path(path).suffix.lower() in STEP else None)
     for fault in geometry.faults():
         raise OptionError(fault)
     content = read_files([geometry])[key_of(geometry)]

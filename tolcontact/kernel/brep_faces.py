@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 from OCP.Bnd import Bnd_Box
-from OCP.BRep import BRep_Tool
+from OCP.BRep import BRep_Builder, BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Surface
 from OCP.BRepBndLib import BRepBndLib
 from OCP.BRepGProp import BRepGProp
@@ -15,6 +15,7 @@ from OCP.ShapeAnalysis import ShapeAnalysis_CanonicalRecognition
 from OCP.TopAbs import TopAbs_REVERSED
 from OCP.TopExp import TopExp_Explorer
 from OCP.TopLoc import TopLoc_Location
+from OCP.TopoDS import TopoDS_Face
 
 from tolcontact.kernel.releases import as_face
 
@@ -104,15 +105,16 @@ def surface(face: Any) -> dict[str, Any] | None:
     """Return the plane, with its outward normal, the cylinder, cone, sphere or torus of a face; None for another surface."""
     adaptor = BRepAdaptor_Surface(as_face(face))
     kind = adaptor.GetType().name.removeprefix("GeomAbs_")
-    if kind in ("BSplineSurface", "BezierSurface"):
-        return recognized_surface(face)
-    if kind not in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
-        return None
-    return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
+    if kind in ("Plane", "Cylinder", "Cone", "Sphere", "Torus"):
+        return described(kind.lower(), getattr(adaptor, kind)(), face.Orientation() == TopAbs_REVERSED)
+    is_spline = kind in ("BSplineSurface", "BezierSurface")
+    return recognized_surface(getattr(adaptor, kind.removesuffix("Surface"))()) if is_spline else None
 
 
-def recognized_surface(face: Any) -> dict[str, Any] | None:
+def recognized_surface(spline: Any) -> dict[str, Any] | None:
     """Return the simple surface that a B-spline surface represents; None if there is none."""
+    face = TopoDS_Face()  # of the whole surface: the kernel fails at faces whose surface is stated as a part of one
+    BRep_Builder().MakeFace(face, spline, RECOGNITION_TOLERANCE)
     recognition = ShapeAnalysis_CanonicalRecognition(face)
     for kind, geometry in (("Plane", gp_Pln()), ("Cylinder", gp_Cylinder()), ("Cone", gp_Cone()), ("Sphere", gp_Sphere())):
         if getattr(recognition, f"Is{kind}")(RECOGNITION_TOLERANCE, geometry):

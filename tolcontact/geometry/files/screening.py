@@ -9,6 +9,7 @@ from tolcontact.geometry.files.step_text import StepText, endless_number, step_t
 
 MESH_SUFFIXES = (".stl", ".obj", ".ply", ".glb", ".gltf")
 HEAD_SIZE = 10_000  # [byte] at the beginning of a file, by which its kind is recognized
+BYTE_ORDER_MARK = b"\xef\xbb\xbf"  # of UTF-8
 _PLY_ELEMENT = re.compile(rb"^element (\w+) (\d+)", re.MULTILINE)
 # The beginnings of files with a wrong suffix, and the advice for each.
 _BEGINNINGS = (
@@ -86,7 +87,7 @@ def _stl_size(head: bytes) -> int:
 
 def _check_kind(path: Path, head: bytes) -> None:
     suffix = path.suffix.lower()
-    start = head.removeprefix(b"\xef\xbb\xbf").lstrip()
+    start = head.removeprefix(BYTE_ORDER_MARK).lstrip()
     for beginning, content, advice in _BEGINNINGS:
         expected = (b"ISO-10303-21",) if suffix in STEP else _SIGNATURES.get(suffix, ())
         if start[: len(beginning)].lower() == beginning.lower() and beginning not in expected:
@@ -150,6 +151,10 @@ def _check_ply(path: Path, head: bytes, size: int) -> None:
 
 def _check_step(path: Path) -> StepText:
     content = path.read_bytes()
+    if content.startswith(BYTE_ORDER_MARK):
+        raise GeometryFault(
+            f'"{path}" begins with a byte order mark, which no STEP file has; save it as UTF-8 without this mark'
+        )
     text = step_text(content)
     references = text.files or (() if b"_SHELL" in content else text.documents)
     if references:
