@@ -175,8 +175,8 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     for column in columns:
         is_figure = column in ("value", "nominal")
         is_short = column in ("", "value", "nominal", "limits")
-        justify = "right" if is_figure else "left"
-        table.add_column(column, justify=justify, no_wrap=is_short, overflow="fold", min_width=MIN_WIDTHS.get(column))
+        options = {"no_wrap": is_short, "min_width": MIN_WIDTHS.get(column)}
+        table.add_column(column, justify="right" if is_figure else "left", overflow="fold", **options)
     for row in rows:
         table.add_row(*map(Text, row))
     return table

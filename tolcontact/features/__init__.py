@@ -60,7 +60,8 @@ targets on one plane give that plane. A fixture that holds the part at its targe
 `tc.Locator("A1", (5, 5, 0), "z", 0.1, on=foot)`. The tolerances of the part and its place then have the same frame.
 
 Several tolerances of a feature are nested, form within orientation within location; a finer lower segment of a frame is a
-second position tolerance, with fewer datums. Each tolerance draws the freedoms that narrower tolerances leave, as the top of
+second position tolerance. The datums of the lower segments of a composite frame lock directions alone, which "><" says, as in
+`tc.Position(0.1, "A><|B><")`; without it they lock places, too. Each tolerance draws the freedoms that narrower tolerances leave, as the top of
 the block shows.
 
 ## Patterns
