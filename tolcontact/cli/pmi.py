@@ -174,9 +174,12 @@ def _table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
     for column in columns:
         is_figure = column in ("value", "nominal")
-        is_short = column in ("", "value", "nominal", "limits")
-        options = {"no_wrap": is_short, "min_width": MIN_WIDTHS.get(column)}
-        table.add_column(column, justify="right" if is_figure else "left", overflow="fold", **options)
+        is_short = column in ("", "limits")
+        width = MIN_WIDTHS.get(column)
+        if is_figure:
+            table.add_column(column, justify="right", no_wrap=True, min_width=width)
+        else:
+            table.add_column(column, no_wrap=is_short, overflow="fold", min_width=width)
     for row in rows:
         table.add_row(*map(Text, row))
     return table

@@ -61,8 +61,8 @@ targets on one plane give that plane. A fixture that holds the part at its targe
 
 Several tolerances of a feature are nested, form within orientation within location; a finer lower segment of a frame is a
 second position tolerance. The datums of the lower segments of a composite frame lock directions alone, which "><" says, as in
-`tc.Position(0.1, "A><|B><")`; without it they lock places, too. Each tolerance draws the freedoms that narrower tolerances leave, as the top of
-the block shows.
+`tc.Position(0.1, "A><|B><")`; without it they lock places, too. Each tolerance draws the freedoms that narrower tolerances
+leave, as the top of the block shows.
 
 ## Patterns
 
