@@ -41,7 +41,7 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
     mark = "" if stated.refines is None else "><"  # the lower segments of a composite frame lock directions alone
     system = "|".join(_compartment(reference) + mark for reference in stated.datums)
     result = kind(stated.value, system, **options)
-    if not system and kind.needs_datums:
+    if not system and kind.needs_datums and kind is not declared.Position:  # which members of a pattern may have
         raise Undeclared("it needs datums, and the file states none")
     for fault in result.faults():
         raise Undeclared(fault)
