@@ -3,19 +3,40 @@
 
 const OF_FEATURE = "#2563eb", OF_FACE = "#f59e0b";
 const BEHIND = 0.35; // opacity of a highlighted face behind other faces
+const GREATER_DEPTH = 6; // of three.js; the bundle does not export its name
 
-/** Faces in colours over those of the parts. `level` is the order of colours on one face; none is above FRONT. */
+/** Faces in colours over those of the parts, and names of members. `level` is the order of colours on one face; none is above FRONT. */
 class Highlights {
-  constructor() { this.entries = []; }
+  constructor(viewer) {
+    this.viewer = viewer;
+    this.entries = [];
+  }
 
   clear() {
-    for (const { part, mesh } of this.entries) {
-      part.group.remove(mesh);
-      part.materials = part.materials.filter((material) => material !== mesh.material);
-      mesh.geometry.dispose();
-      mesh.material.dispose();
+    for (const { part, drawn } of this.entries) {
+      part.group.remove(drawn);
+      part.materials = part.materials.filter((material) => material !== drawn.material);
+      if (drawn.isMesh) drawn.geometry.dispose();
+      else drawn.material.map.dispose();
+      drawn.material.dispose();
     }
     this.entries = [];
+  }
+
+  keep(part, drawn) {
+    part.group.add(drawn);
+    this.entries.push({ part, drawn });
+  }
+
+  /** Write a name in the middle of faces {runs, boundary}, or in the middle of what their boundaries leave. */
+  name(part, faces, text) {
+    const corners = part.mesh.geometry.getAttribute("position").array, all = faces.flatMap((face) => face.runs);
+    const box = new THREE.Box3().setFromArray(sliced(corners, all)), middle = box.getCenter(new THREE.Vector3());
+    for (const plane of faces.flatMap((face) => face.boundary)) {
+      const depth = plane.distanceToPoint(middle);
+      if (depth < 0) middle.addScaledVector(plane.normal, -depth);
+    }
+    this.keep(part, this.viewer.label(text, middle.toArray()));
   }
 
   add(part, runs, boundary, colour, level) {
@@ -23,15 +44,13 @@ class Highlights {
     const geometry = new THREE.BufferGeometry(), whole = part.mesh.geometry;
     for (const name of ["position", "normal"])
       geometry.setAttribute(name, new THREE.BufferAttribute(sliced(whole.getAttribute(name).array, runs), 3));
-    const hidden = { ...offset(FRONT), depthFunc: THREE.GreaterDepth, depthWrite: false, transparent: true, opacity: BEHIND };
+    const hidden = { ...offset(FRONT), depthFunc: GREATER_DEPTH, depthWrite: false, transparent: true, opacity: BEHIND };
     for (const options of [offset(level), hidden]) {
       const material = new THREE.MeshLambertMaterial({ color: colour, side: THREE.DoubleSide, ...options });
       material.userData.planes = boundary;
       material.clippingPlanes = [...part.materials[0].clippingPlanes, ...boundary];
-      const mesh = new THREE.Mesh(geometry, material);
       part.materials.push(material);
-      part.group.add(mesh);
-      this.entries.push({ part, mesh });
+      this.keep(part, new THREE.Mesh(geometry, material));
     }
   }
 }
@@ -78,7 +97,7 @@ class FeatureList {
   constructor(viewer) {
     const margin = 1e-6 * viewer.size;
     this.viewer = viewer;
-    this.highlights = new Highlights();
+    this.highlights = new Highlights(viewer);
     this.entries = data.scene.toleranced.flatMap((group) => {
       this.heading(`part ${group.part}`);
       return group.features.map((feature) => {
@@ -129,8 +148,13 @@ class FeatureList {
   choose(entries) {
     this.highlights.clear();
     for (const entry of this.entries) entry.button.setAttribute("aria-pressed", String(entries.includes(entry)));
-    for (const { part, faces } of entries)
+    for (const { part, faces, feature } of entries) {
       for (const { runs, boundary } of faces) this.highlights.add(part, runs, boundary, OF_FEATURE, 1);
+      for (const member of feature.members) {
+        const ofMember = faces.filter((face) => face.member === member);
+        if (ofMember.length) this.highlights.name(part, ofMember, member.name);
+      }
+    }
     if (entries.length) reveal(entries[0].button);
   }
 }
