@@ -15,10 +15,10 @@ from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
 from tolcontact.declaration.values import key_faults
-from tolcontact.discretization import Nominal, discretize
+from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError, OptionError, shown
 from tolcontact.geometry import parts_from
-from tolcontact.report import population_text, write_page, write_view
+from tolcontact.report import nominal_and_faults, population_text, write_page, write_view
 from tolcontact.workflow.models import DEFAULT_SOLVER, build, check_population
 from tolcontact.workflow.run import summarize
 
@@ -98,9 +98,9 @@ def view(
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Show an assembly before a run: faces with their selectors, locators, contact points and nominal gaps.
+    """Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.
 
-    The page lists the faults of a model. For an archive it is the report.
+    The page lists the faults of a model, which may be incomplete: it needs no measures. For an archive it is the report.
     """
     if out is not None:
         check_page(out, overwrite=overwrite)
@@ -113,19 +113,11 @@ def view(
         parts_from(model, source)
         write_view(model, None, [], path)
     else:
-        _write_model(load_model(source), path)
+        model = load_model(source)
+        write_view(model, *nominal_and_faults(model), path)
     typer.echo(f"page: {shown(str(path))}")
     if out is None:
         typer.launch(str(path))
-
-
-def _write_model(model: Assembly, path: Path) -> None:
-    try:
-        nominal = discretize(model)
-    except ModelError as error:
-        write_view(model, None, error.faults, path)
-    else:
-        write_view(model, nominal, (), path)
 
 
 def temporary_page(source: Path) -> Path:

@@ -189,12 +189,20 @@ class Assembly(Pictured):
         widths += [float(m.width) for m in self.measures if m.width is not None and m.units == "mm"]
         return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
-    def faults(self) -> Iterator[str]:
-        """Yield the faults of the declarations, one sentence each, which names the declaration and its script line."""
-        if not self.parts:
-            yield "it has no parts; declare at least one with assembly.part(name, geometry)"
+    def omissions(self) -> Iterator[str]:
+        """Yield the faults of a model that is not complete yet: declarations that only a run needs."""
         if not self.measures:
             yield "it measures nothing; declare at least one measure with assembly.measure(...)"
+        for part in self.parts:
+            if self.location_of(part) is None and part.fixed is not True:
+                advice = "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
+                yield from _located("part", part, iter([advice]))
+
+    def faults(self) -> Iterator[str]:
+        """Yield the faults of the declarations, among them omissions: sentences that name a declaration and its script line."""
+        if not self.parts:
+            yield "it has no parts; declare at least one with assembly.part(name, geometry)"
+        yield from self.omissions()
         yield from text_faults("assembly", [self.name])
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
@@ -259,8 +267,6 @@ class Assembly(Pictured):
         count = sum(location.part is part for location in self.locations)
         if count > 1:
             yield f"it is located {count} times; locate it once"
-        if count == 0 and part.fixed is not True:
-            yield "it is not located; call locate(...), or declare it fixed=True to hold it at its nominal place"
         chain: list[Part] = []
         support: Part | None = part
         while support is not None:

@@ -38,12 +38,14 @@ class _Faults(list[str]):
             return None
 
 
-def discretize(assembly: Assembly) -> Nominal:
+def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     """Return the nominal model of an assembly.
 
+    An `incomplete` model may lack what only a run needs: measures, and locations of parts.
     Raises ModelError with every fault of the declaration and of its geometry.
     """
-    faults = _Faults(assembly.faults())
+    omissions = tuple(assembly.omissions()) if incomplete else ()
+    faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
     shapes = _shapes(assembly, faults)
     meshes = {part: read.mesh for part, read in shapes.items()}

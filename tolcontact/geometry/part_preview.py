@@ -19,12 +19,14 @@ MARGIN = 1e-6  # of a direction, and of a part's size
 class PartPreview(NamedTuple):
     """The triangles of a part in the nominal assembly: vertices (vertex, 3) [mm] and faces (triangle, 3).
 
+    mesh          the same triangles in the part's own frame
     rotation      (3, 3) of the part
     face_of       (triangle,) numbers of faces from 0: of the B-rep faces of a STEP file, or of smooth pieces
     descriptions  of the faces
     snippets      Python code that chooses each face
     """
 
+    mesh: trimesh.Trimesh
     rotation: np.ndarray
     vertices: np.ndarray
     faces: np.ndarray
@@ -46,7 +48,7 @@ def preview(part: Part) -> PartPreview | None:
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
-    return PartPreview(R, vertices, np.asarray(mesh.faces), face_of, faces, snippets)
+    return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets)
 
 
 def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:

@@ -22,8 +22,10 @@ variation simulation of stand: 1000 realizations
 that needs no network and runs no scripts but its own; commands replace other files than pages only with `--overwrite`. It shows
 the assembly in 3D, with fields, single realizations and sections; histograms with limits, and the convergence of estimates;
 measures against contributors; contact, certificates, and the settings of the run. `write_view` (`tolcontact view`) writes the
-assembly before a run: faces with their selectors, locators, contact points, and nominal gaps. In a notebook, a declared
-assembly or a program shows this page, a summary shows its tables, and `results.tolcontact` shows the report.
+assembly before a run: faces with their selectors, features with their tolerances, locators, contact points, and nominal gaps.
+A feature or a pattern that you choose in the list is highlighted on all of its faces, and a face that you click on names its
+features. The model may still lack measures and locations of parts. In a notebook, a declared assembly or a program shows this
+page, a summary shows its tables, and `results.tolcontact` shows the report.
 `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes a comparison of runs.
 
 How to read the text:
@@ -40,10 +42,10 @@ says so.
 """
 
 from tolcontact.report.figures import grouped
-from tolcontact.report.html import is_page, write_comparison, write_page, write_view
+from tolcontact.report.html import is_page, nominal_and_faults, write_comparison, write_page, write_view
 from tolcontact.report.text import analysis_text, capability_text, comparison_text, population_text, runs_text, summary_text
 
 __all__ = [
-    "analysis_text", "capability_text", "comparison_text", "grouped", "is_page", "population_text", "runs_text", "summary_text",
-    "write_comparison", "write_page", "write_view",
+    "analysis_text", "capability_text", "comparison_text", "grouped", "is_page", "nominal_and_faults", "population_text",
+    "runs_text", "summary_text", "write_comparison", "write_page", "write_view",
 ]  # fmt: skip

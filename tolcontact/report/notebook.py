@@ -7,9 +7,7 @@ import xarray as xr
 
 from tolcontact.compilation import Program
 from tolcontact.declaration import Assembly
-from tolcontact.discretization import discretize
-from tolcontact.errors import ModelError
-from tolcontact.report.html import page_of, summary_table, view_page
+from tolcontact.report.html import nominal_and_faults, page_of, summary_table, view_page
 from tolcontact.report.text.summary import contact_lines
 from tolcontact.statistics import Summary
 
@@ -25,11 +23,7 @@ def html_of(thing: object) -> str:
 
 @html_of.register
 def _(model: Assembly) -> str:
-    try:
-        page = view_page(model, discretize(model), ())
-    except ModelError as error:
-        page = view_page(model, None, error.faults)
-    return _declared(model) + framed(page)
+    return _declared(model) + framed(view_page(model, *nominal_and_faults(model)))
 
 
 @html_of.register

@@ -12,8 +12,8 @@ import markupsafe
 import xarray as xr
 
 from tolcontact.declaration import Assembly
-from tolcontact.discretization import Nominal
-from tolcontact.errors import ArchiveError
+from tolcontact.discretization import Nominal, discretize
+from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
@@ -27,7 +27,7 @@ HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
 SCRIPTS = {
     "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "viewer.js", "charts.js", "report.js"),
-    "view": ("vendor/three.min.js", "data.js", "viewer.js", "view.js"),
+    "view": ("vendor/three.min.js", "data.js", "viewer.js", "features.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
 }
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
@@ -83,14 +83,26 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
 
 
 def view_page(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:
-    """Return the view of a model before a run; `nominal` is None for a model with faults."""
+    """Return the view of a model before a run; `nominal` is None for a model with faults other than omissions."""
+    omissions = [fault for fault in assembly.omissions() if fault in faults]
+    others = [fault for fault in faults if fault not in omissions]
     values = {
         "title": assembly.name,
-        "faults": faults,
+        "faults": others,
+        "omissions": omissions,
+        "has_features": any(part.toleranced for part in assembly.parts),
         "pairs": gap_rows(nominal),
         "file": _file(assembly, nominal, faults),
     }
-    return _page("view", values, {"scene": view_of(assembly, nominal, faults), "charts": []})
+    return _page("view", values, {"scene": view_of(assembly, nominal, others), "charts": []})
+
+
+def nominal_and_faults(assembly: Assembly) -> tuple[Nominal | None, tuple[str, ...]]:
+    """Return what the view of a model shows: its nominal model if its only faults are omissions, and its faults."""
+    try:
+        return discretize(assembly, incomplete=True), tuple(assembly.omissions())
+    except ModelError as error:
+        return None, tuple(dict.fromkeys([*assembly.omissions(), *error.faults]))
 
 
 def _file(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> str:

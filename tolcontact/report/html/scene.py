@@ -1,19 +1,20 @@
 """The 3D scenes of pages: of an archive with fields, contact points and single realizations, and of a declared assembly."""
 
 import base64
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
-from tolcontact.declaration import Assembly
+from tolcontact.declaration import Assembly, Part
 from tolcontact.discretization import Nominal
-from tolcontact.geometry import preview
+from tolcontact.geometry import PartPreview, preview
 from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.html.decimation import coarser, triangle_budgets
+from tolcontact.report.html.feature_list import feature_lists
 from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
 from tolcontact.statistics import touching
 
@@ -112,7 +113,13 @@ def _motions(R: np.ndarray, t: np.ndarray) -> Packed:
 def view_of(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str]) -> Scene:
     """Return the scene. Without a `nominal` assembly, for a model with faults, it has only parts with sound shapes."""
     marks = Marks([], [], [], [], []) if nominal is None else marks_of_nominal(nominal)
-    return {"parts": list(_drawn_parts(assembly, _faulty(assembly, faults))), **packed_marks(marks)}
+    previews = {part: image for part in assembly.parts if (image := preview(part)) is not None}
+    faulty = _faulty(assembly, faults)
+    return {
+        "parts": [_drawn_part(part, image, faulty) for part, image in previews.items()],
+        "toleranced": feature_lists(assembly, {part: image.mesh for part, image in previews.items()}),
+        **packed_marks(marks),
+    }
 
 
 def gap_rows(nominal: Nominal | None) -> list[dict[str, Any]]:
@@ -133,19 +140,15 @@ def _faulty(assembly: Assembly, faults: Sequence[str]) -> set[str]:
     return of_pairs | {part.name for part in assembly.parts if f'part "{part.name}"' in text}
 
 
-def _drawn_parts(assembly: Assembly, faulty: set[str]) -> Iterator[Scene]:
-    for part in assembly.parts:
-        own = preview(part)
-        if own is None:
-            continue
-        yield {
-            "name": part.name,
-            "faulty": part.name in faulty,
-            "placement": [*own.rotation.ravel().tolist(), *part.at],
-            "vertices": packed(own.vertices),
-            "faces": packed(own.faces, "i4"),
-            "faceOfTriangle": packed(own.face_of, "i4"),
-            "described": [
-                {"said": str(face), "words": words} for face, words in zip(own.descriptions, own.snippets, strict=True)
-            ],
-        }
+def _drawn_part(part: Part, image: PartPreview, faulty: set[str]) -> Scene:
+    return {
+        "name": part.name,
+        "faulty": part.name in faulty,
+        "placement": [*image.rotation.ravel().tolist(), *part.at],
+        "vertices": packed(image.vertices),
+        "faces": packed(image.faces, "i4"),
+        "faceOfTriangle": packed(image.face_of, "i4"),
+        "described": [
+            {"said": str(face), "words": words} for face, words in zip(image.descriptions, image.snippets, strict=True)
+        ],
+    }

@@ -1,10 +1,10 @@
 "use strict";
-// The view before a run: a click on a face shows its selector in a script.
+// The view before a run: a click on a face shows its selector in a script, and the features that it belongs to.
 
 const GAP_TOLERANCE = 1e-6; // mm
 const SNAP_DISTANCE = 0.03; // of the size of the assembly, between a click and a corner
 
-function pick(viewer) {
+function pick(viewer, features) {
   const ray = new THREE.Raycaster(), place = new THREE.Vector2();
   let pressed = null;
   viewer.canvas.addEventListener("pointerdown", (event) => { pressed = [event.clientX, event.clientY]; });
@@ -16,25 +16,24 @@ function pick(viewer) {
     const shown = viewer.parts.filter((part) => part.group.visible);
     const inside = (hit) => !viewer.parts[0].materials[0].clippingPlanes.length || viewer.section.distanceToPoint(hit.point) >= 0;
     const hit = ray.intersectObjects(shown.map((part) => part.mesh)).find(inside);
-    choose(viewer, hit && viewer.parts.find((part) => part.mesh === hit.object), hit);
+    choose(viewer, features, hit && viewer.parts.find((part) => part.mesh === hit.object), hit);
   });
 }
 
-function choose(viewer, part, hit) {
-  viewer.paint("", 3, CORRECTED);
+function choose(viewer, features, part, hit) {
+  const owners = part ? features.at(part, hit.faceIndex, hit.point) : [];
+  features.choose(owners.map(({ entry }) => entry));
   if (!part) {
-    byId("said").textContent = "Click on a face for its selector and the point.";
+    viewer.draw();
+    say(null);
     return;
   }
   const known = data.scene.parts[viewer.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
   const number = faces[hit.faceIndex], face = known.described[number];
-  const colour = part.mesh.geometry.getAttribute("color"), red = new THREE.Color("#f59e0b").toArray();
-  faces.forEach((own, triangle) => {
-    if (own === number) for (const corner of [0, 1, 2]) colour.setXYZ(3 * triangle + corner, ...red);
-  });
-  colour.needsUpdate = true;
+  features.highlights.add(part, runsOf(faces, number), [], OF_FACE, 2);
   viewer.draw();
-  byId("said").textContent = [`part ${part.name}`, face.said, face.words, pointAt(known, part, hit)].join("\n");
+  const ofFeatures = owners.flatMap(({ entry, member }) => ["", ...linesOf(entry.feature, member)]);
+  say([`part ${part.name}`, face.said, face.words, pointAt(known, part, hit), ...ofFeatures]);
 }
 
 /** Return the selector of the nearest corner of the triangle, or of the hit if no corner is near, in the frame of the part. */
@@ -64,5 +63,5 @@ const viewer = new Viewer(data.scene);
 control(viewer);
 gaps(viewer);
 viewer.paint("", 3, CORRECTED);
-pick(viewer);
+pick(viewer, new FeatureList(viewer));
 window.viewer = viewer;

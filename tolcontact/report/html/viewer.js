@@ -277,7 +277,8 @@ class Viewer {
       const low = this.box.min.getComponent(k), high = this.box.max.getComponent(k);
       this.section.constant = low + share * (high - low) + 1e-6 * this.size;
     }
-    for (const part of this.parts) for (const material of part.materials) material.clippingPlanes = planes;
+    for (const part of this.parts)
+      for (const material of part.materials) material.clippingPlanes = [...planes, ...(material.userData.planes || [])];
     this.draw();
   }
 }
