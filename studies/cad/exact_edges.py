@@ -5,7 +5,7 @@ Nothing here uses the CAD kernel, or the reader of shape files.
 
 import re
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -34,14 +34,22 @@ class Reference(int):
 
 @dataclass(frozen=True)
 class Curve:
-    """A curve with its derivative, over `knots` in the direction of travel. Between two knots it is smooth."""
+    """A curve with its derivative, over `knots` in the direction of travel. Between two knots it is smooth.
+
+    Its ends are vertices of the file, or the points of the curve that are nearest to them. `gap` is the distance in between.
+    """
 
     at: Callable[[np.ndarray], Points]
     slope: Callable[[np.ndarray], Points]
     knots: np.ndarray
+    gap: float = 0.0
 
     def reversed(self) -> "Curve":
-        return Curve(self.at, self.slope, self.knots[::-1])
+        return replace(self, knots=self.knots[::-1])
+
+    def with_gap(self, ends: Sequence[np.ndarray]) -> "Curve":
+        """Return the curve with its gap from the vertices at its `ends`."""
+        return replace(self, gap=float(np.linalg.norm(self.at(self.knots[[0, -1]]) - ends, axis=1).max()))
 
     @cached_property
     def quadrature(self) -> tuple[Points, Points]:
@@ -92,8 +100,12 @@ class Text:
 
     def __init__(self, content: str) -> None:
         self.bodies = {int(number): body for number, body in RECORD.findall(re.sub(r"/\*.*?\*/", "", content, flags=re.DOTALL))}
-        is_degree = any("CONVERSION_BASED_UNIT" in body and "PLANE_ANGLE_UNIT" in body for body in self.bodies.values())
-        self.angle_unit = np.pi / 180 if is_degree else 1.0
+        contexts = [
+            body for body in self.bodies.values() if re.search("GEOMETRIC_REPRESENTATION_CONTEXT.*GLOBAL_UNIT_ASS", body, re.S)
+        ]
+        assigned = {int(number) for body in contexts for number in re.findall(r"#(\d+)", body)}
+        angles = [self.bodies[number] for number in assigned if "PLANE_ANGLE_UNIT" in self.bodies.get(number, "")]
+        self.angle_units = {np.pi / 180 if "CONVERSION_BASED_UNIT" in body else 1.0 for body in angles}
 
     def record(self, number: int) -> dict[str, list[Any]]:
         """Return the entities of a record with their parameters."""
@@ -140,7 +152,9 @@ class Text:
         values = record[kind]
         sizes = [*values[2:]]
         if kind == "CONICAL_SURFACE":
-            sizes[1] *= self.angle_unit
+            if len(self.angle_units) != 1:
+                raise Missing("a cone, for which units of angles differ")
+            sizes[1] *= next(iter(self.angle_units))
         loops = [[*self._loop(bound)] for bound in bounds]
         return FaceInText(number, Surface(kind, *self.placement(values[1]), tuple(sizes)), loops, is_along == ".T.")
 
@@ -151,7 +165,7 @@ class Text:
             return
         if kind != "EDGE_LOOP":
             raise Missing(kind)
-        for edge in values[1]:
+        for edge in values[1] if is_forward == ".T." else reversed(values[1]):
             *_, curve, direction = self.entity(edge)[1]
             yield self._edge(curve) if direction == is_forward else self._edge(curve).reversed()
 
@@ -159,7 +173,8 @@ class Text:
         """Return the curve of an edge from its first vertex to its second."""
         _, first, second, curve, is_along = self.entity(number)[1]
         ends = [self.vector(self.entity(vertex)[1][1]) for vertex in (first, second)]
-        return self._curve(curve, *ends) if is_along == ".T." else self._curve(curve, *ends[::-1]).reversed()
+        piece = self._curve(curve, *ends) if is_along == ".T." else self._curve(curve, *ends[::-1]).reversed()
+        return piece if piece.gap else piece.with_gap(ends)
 
     def _curve(self, number: int, start: np.ndarray, end: np.ndarray) -> Curve:
         """Return the piece of a curve from `start` to `end`, in the curve's direction."""
@@ -168,7 +183,9 @@ class Text:
         if kind in ("SURFACE_CURVE", "SEAM_CURVE", "INTERSECTION_CURVE"):
             return self._curve(record[kind][1], start, end)
         if kind == "LINE":
-            return line(start, end)
+            point, along = self.vector(record[kind][1]), self.vector(self.entity(record[kind][2])[1][1])
+            off = [np.linalg.norm(np.cross(end_point - point, along)) / np.linalg.norm(along) for end_point in (start, end)]
+            return replace(line(start, end), gap=float(max(off)))
         if kind in ("CIRCLE", "ELLIPSE"):
             values = record[kind]
             return conic(*self.placement(values[1]), values[2], values[-1], start, end)

@@ -9,11 +9,12 @@ import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from studies.cad.exact_edges import Curve, FaceInText, Missing, Surface, Text
@@ -24,8 +25,8 @@ from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES, read_files
 
 CHORD = 0.02  # [mm]
 WITH_RECORDS = b"/* GEOMETRIC_ITEM_SPECIFIC_USAGE( */"  # a comment for which the reader looks for the records of faces
-NEAR = 1e-6  # [mm] of an edge curve from the surface, beyond which the file's edges count as off their surfaces
-ANY_AXIS = np.array([0.36, 0.48, 0.8])  # of a sphere, whose poles should not lie on edges
+NEAR = 1e-6  # [mm] of an edge curve from the surface and its vertices, which the file states apart from each other
+FRAMES = Rotation.random(20, random_state=1).as_matrix()  # of a sphere
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Comparison:
     """A face that was compared.
 
     face     name of the file and number of the record
-    gap      [mm] largest distance of its edge curves from its surface, both of the file
+    gap      [mm] largest distance of its edge curves from its surface and from its vertices, all of the file
     area     relative difference
     vertex   [mm] largest distance of a vertex of the triangles' rim from the edge curves
     middle   [mm] largest distance of the middle of a rim's segment from the edge curves
@@ -64,6 +65,8 @@ class Comparison:
 def area(face: FaceInText) -> tuple[float, float]:
     """Return the area of a face by Green's theorem, and the area by which it is ambiguous: 0, or a part of a round surface."""
     surface = face.surface
+    if surface.kind == "SPHERICAL_SURFACE":
+        surface = replace(surface, frame=frame_off_edges(face))
     integrals = [loop_integral(surface, loop) for loop in face.loops if loop]
     total = sum(integrals) if face.is_along else -sum(integrals)
     if surface.kind == "SPHERICAL_SURFACE":
@@ -73,15 +76,17 @@ def area(face: FaceInText) -> tuple[float, float]:
     return abs(total), 0.0
 
 
+def frame_off_edges(face: FaceInText) -> np.ndarray:
+    """Return a frame (3, 3) of a sphere whose poles, where the integral's form is singular, are far from the edges."""
+    points = np.concatenate([np.zeros((0, 3)), *(curve.quadrature[0] for loop in face.loops for curve in loop)])
+    heights = np.abs((points - face.surface.origin) @ FRAMES[:, 2].T).max(axis=0, initial=0)
+    return FRAMES[heights.argmin()]
+
+
 def loop_integral(surface: Surface, loop: list[Curve]) -> float:
     """Return the integral around a loop of a form whose differential is the surface's area."""
     points, steps = (np.concatenate(parts) for parts in zip(*(curve.quadrature for curve in loop), strict=True))
-    frame = surface.frame
-    if surface.kind == "SPHERICAL_SURFACE":
-        z = ANY_AXIS - ANY_AXIS @ frame[0] * frame[0]
-        z = z / np.linalg.norm(z)
-        frame = np.array([frame[0], np.cross(z, frame[0]), z])
-    (x, y, z), (dx, dy, dz) = ((points - surface.origin) @ frame.T).T, (steps @ frame.T).T
+    (x, y, z), (dx, dy, dz) = ((points - surface.origin) @ surface.frame.T).T, (steps @ surface.frame.T).T
     if surface.kind == "PLANE":
         return float((x * dy - y * dx).sum() / 2)
     turn = (x * dy - y * dx) / np.maximum(x**2 + y**2, 1e-300)
@@ -145,6 +150,7 @@ def compare(path: Path, read: ReadFace, text: Text) -> Comparison:
     curves = [curve for loop in face.loops for curve in loop]
     points = np.concatenate([np.zeros((0, 3)), *(curve.quadrature[0] for curve in curves)]) * read.unit
     gap = 0.0 if read.surface is None else float(np.abs(read.surface.distance(points)[0]).max(initial=0))
+    gap = max([gap, *(curve.gap * read.unit for curve in curves)])
     name, kind = f"{path.stem} #{read.record}", face.surface.kind.lower().replace("_", " ")
     return Comparison(
         name, kind, gap, abs(difference) / read.area, *rim_distances(curves, read), surface_difference(face, read)
