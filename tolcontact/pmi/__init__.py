@@ -64,8 +64,8 @@ with these features, to go on from.
 | an unequally disposed zone | `outside`, the part of the zone out of the material (ASME Y14.5) |
 
 Features are named after the letter of their datum, else after their kind and the number of their first face: "cylinder 12",
-"cylinders 12" for a pattern. Not declared are tolerances without faces or of the whole product, in the free state of a part,
-or statistical ones; zones between planes for an axis, whose direction is not read; dimensions between features, which are
+"cylinders 12" for a pattern. Not declared are tolerances without faces, of the whole product, or in the free state of a part;
+zones between planes for an axis, whose direction is not read; dimensions between features, which are
 places that positions tolerance; sizes without limits, or of other surfaces than cylinders, spheres and opposed planes; and
 what other tolerances of the same feature imply. The reader assumes that a pattern keeps together, as in ASME Y14.5; under ISO
 5458 this needs CZ.

@@ -12,11 +12,9 @@ _KINDS = {
 }  # fmt: skip
 _MATERIALS = {"maximum material requirement": "M", "least material requirement": "L"}
 _ROUND_ZONES = ("cylindrical or circular", "within a cylinder", "within a circle", "spherical", "within a sphere")
-_UNCHANGED = ("common zone", "separate requirement")  # modifiers that the faces of a tolerance have told already
-_MODIFIED = {
-    "free state": "it is for the part in its free state, and parts are rigid here",
-    "statistical tolerance": "it is a statistical tolerance, whose process the file does not state",
-}
+# Modifiers that change nothing here: the faces tell zones in common, and the draws are statistical anyhow.
+_UNCHANGED = ("common zone", "separate requirement", "statistical tolerance")
+_MODIFIED = {"free state": "it is for the part in its free state, and parts are rigid here"}
 _DIGITS = 9  # of sizes [mm] after the point
 MAX_SIZE_DIFFERENCE = 1.0  # in widths of the limits: between them and the size of the shape
 
