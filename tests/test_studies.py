@@ -11,6 +11,8 @@ from tests.helpers import ROOT, run
 STUDIES = {
     "cad/as1.py": ["--samples", "20"],
     "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
+    "cad/pmi_fixture.py": [ROOT / "studies" / "cad"],
+    "cad/pmi_parts.py": [ROOT / "studies" / "cad"],
     "cad/pmi_readings.py": [ROOT / "studies" / "cad"],
     "cad/read_files.py": [ROOT / "studies" / "cad"],
     "cad/trimmed_faces.py": [ROOT / "models" / "cover.step"],

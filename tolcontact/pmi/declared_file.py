@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tolcontact.declaration import Assembly, Mesh, Part
-from tolcontact.errors import GeometryFault
+from tolcontact.errors import GeometryFault, OptionError
 from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
@@ -35,9 +35,9 @@ class DeclaredFile(Readable):
 
 
 def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
-    """Declare the PMI of a file on its bodies, as far as features can state it. Raises OptionError if it has no shapes.
+    """Declare the PMI of a file on its bodies, as far as features can state it.
 
-    A body that stands at several places is declared once.
+    A body that stands at several places is declared once. Raises OptionError if the file has no shapes that can be used.
     """
     model = Assembly(path.stem)
     bodies, faces = bodies_in(path), faces_of_records(path)
@@ -58,6 +58,8 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         parts.append(part)
         kinds = {face.number: face.kind for face in describe_faces(read.mesh)}
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
+    if faults and not parts:
+        raise OptionError("; ".join(faults))
     merged = [_merged(parts, own) for own in zip(*claims, strict=True)]
     return DeclaredFile(pmi, tuple(parts), tuple(merged), faces, tuple(faults))
 

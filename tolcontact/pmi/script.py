@@ -32,6 +32,7 @@ def script(path: Path, declared: DeclaredFile) -> str:
         f"    model = tc.Assembly({_text(path.stem)})",
         *(line for part in declared.parts for line in _part_lines(part)),
         *(["    # Tolerances that are not declared, or not wholly:", *rest] if rest else []),
+        *(f"    # Not declared: {shown(fault)}" for fault in declared.faults),
         "    return model",
         "",
         "",

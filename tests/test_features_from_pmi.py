@@ -1,0 +1,320 @@
+"""Features and patterns that the PMI of a STEP file states: what is declared, and the reason for what is not."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tests.pmi_records import Annotated
+from tests.step_files import Step
+from tests.test_cad import COVER
+from tolcontact.discretization import discretize
+from tolcontact.errors import ModelError
+from tolcontact.pmi.declared_file import declared_file
+from tolcontact.pmi.script import script
+from tolcontact.variation import Draws
+
+ROUND = "cylindrical or circular"
+END, SIDE, UNDER, TOP, FAR_SIDE, FAR_END = 1, 6, 5, 2, 7, 10  # numbers of faces of the cover
+CORNERS, HOLE, SLOT, SLOT_ENDS = (3, 4, 8, 9), (11,), (12, 14), (13, 15)
+
+
+def cover(annotate, path) -> tc.Part:
+    """The cover with PMI, in an assembly of its own."""
+    file = Annotated(COVER.read_text())
+    annotate(file)
+    return tc.Assembly("cover").part("cover", tc.Mesh(file.write(path / "cover.stp")), fixed=True)
+
+
+def datums(file: Annotated) -> None:
+    for letter, face in {"A": UNDER, "B": SIDE, "C": END}.items():
+        file.datum(letter, face)
+
+
+def drawing(file: Annotated) -> None:
+    """Tolerances of each kind that features and patterns state."""
+    datums(file)
+    file.tolerance("flatness", 0.1, file.aspect(UNDER))
+    hole, slot, corners = (file.aspect(*faces) for faces in (HOLE, SLOT, CORNERS))
+    file.size(hole, 8.1, (0, 0.03))
+    file.tolerance("position", 0.2, hole, "A|B(M)|C", zone=ROUND, modifier="M")
+    file.size(corners, 6, (-0.05, 0.05), "radius")
+    upper = file.tolerance("position", 0.5, corners, "A|B|C", zone=ROUND)
+    file.composite(upper, file.tolerance("position", 0.1, corners, "A|B", zone=ROUND))
+    file.size(slot, 8.1, (-0.05, 0.05), "width")
+    file.tolerance("position", 0.3, slot, "A|B|C")
+    file.datum("D", *SLOT_ENDS)
+    file.targets("E", (60, 40, 8), (20, 70, 8), (100, 5, 8))
+    unequal = f"UNEQUALLY_DISPOSED_GEOMETRIC_TOLERANCE(#{file.length(0.1)})"
+    file.tolerance("surface_profile", 0.4, file.aspect(FAR_END), "A|B|C", unequal)
+    file.tolerance("surface_profile", 0.3, file.aspect(FAR_SIDE), "E|D")
+
+
+DECLARED = [
+    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1 mm",
+    "feature B of cover (datum B): cover B-rep face 6",
+    "feature C of cover (datum C): cover B-rep face 1",
+    "feature E of cover (datum E): cover B-rep face 2",
+    "feature cylinder 13 of cover: cover B-rep face 13",
+    "feature cylinder 15 of cover: cover B-rep face 15",
+    "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2M mm to A|B(M)|C",
+    "feature slot 12 of cover: cover B-rep face 12, cover B-rep face 14; size 8.1 +0.05 -0.05 mm; position 0.3 mm to A|B|C",
+    "feature plane 10 of cover: cover B-rep face 10; profile 0.4 mm to A|B|C",
+    "feature plane 7 of cover: cover B-rep face 7; profile 0.3 mm to E|D",
+    "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 mm to A|B|C; position 0.1 mm to A><|B><",
+    "pattern D of cover (datum D): 2 members",
+]  # fmt: skip
+
+
+def spreads(part: tc.Part, **place: Sequence[float]) -> dict[str, float]:
+    """The standard deviation of each contributor of a part, which may be moved, by its label."""
+    model = tc.Assembly("spreads")
+    moved = model.part(part.name, part.geometry, fixed=True, **place)
+    moved.features_from_pmi()
+    return spreads_of(model)
+
+
+def spreads_of(model: tc.Assembly) -> dict[str, float]:
+    (part,) = model.parts
+    if part.fixed is None:
+        points = {"z1": (0, 0, 0), "z2": (100, 0, 0), "z3": (0, 50, 0), "y1": (0, 0, 0), "y2": (100, 0, 0), "x1": (0, 0, 0)}
+        model.locate(part, [tc.Locator(name, point, name[0], 0.0) for name, point in points.items()])
+    model.measure("origin", part.point(0, 0, 0), along="z")
+    return {contributor.label: contributor.variance**0.5 for contributor in Draws(discretize(model)).contributors}
+
+
+def test_tolerances_of_a_drawing_become_features_and_patterns(tmp_path):
+    part = cover(drawing, tmp_path)
+    declared = part.features_from_pmi()
+    assert sorted(map(str, part.toleranced)) == sorted(DECLARED) and part.toleranced != ()
+    assert set(declared.features) == set(part.toleranced) and not declared.undeclared
+    names = {str(one.annotation).split(",")[0]: one.features for one in declared.annotations}
+    assert names["4. position 0.1 mm (diameter"] == ("cylinders 3",) and names["datum E: 0 faces"] == ("E",)
+    assert str(declared) == ("12 features and patterns, which state 7 of 7 tolerances, 3 of 3 dimensions, 5 of 5 datums")
+    (unequal,) = next(feature for feature in part.features if feature.name == "plane 10").tolerances
+    assert unequal.outside == pytest.approx(0.1)
+
+
+def test_spreads_are_those_of_the_zones(tmp_path):
+    """Closed forms of 99.73 % inside: an end of an axis t / 7.28, coordinates of a rectangle t / 11.77, a size t / 6.
+
+    An end of an axis deviates by the sum of a shift and a tilt, which are equal.
+    """
+    spread = spreads(cover(drawing, tmp_path))
+    assert spread["cover.cylinder 11.size"] == pytest.approx(0.03 / 6, rel=1e-4)
+    axis = spread["cover.cylinder 11.shift x"]
+    assert axis == spread["cover.cylinder 11.tilt y"] == pytest.approx(0.2 / 7.28 / 2**0.5, rel=2e-3)
+    assert spread["cover.slot 12.offset"] == pytest.approx(0.3 / 11.77, rel=1e-3)
+    assert spread["cover.plane 10.tilt y"] == pytest.approx(0.4 / 11.77, rel=1e-3)
+    assert spread["cover.cylinders 3 2.size"] == pytest.approx(0.2 / 6, rel=1e-4)
+    assert not any(label.startswith(("cover.A.", "cover.E.", "cover.D.")) for label in spread)
+
+
+def test_a_part_that_is_turned_and_moved_has_the_same_spreads(tmp_path):
+    part = cover(drawing, tmp_path)
+    still = spreads(part)
+    moved = spreads(part, at=(1000, -700, 300), rotation=Rotation.from_euler("xyz", (0.4, -1.1, 2.0)).as_rotvec())
+    assert list(moved) == list(still) and np.array([*moved.values()]) == pytest.approx(np.array([*still.values()]), rel=1e-6)
+
+
+def test_the_script_of_a_file_declares_the_same(tmp_path):
+    part = cover(drawing, tmp_path)
+    part.features_from_pmi()
+    path = part.geometry.source
+    text = script(path, declared_file(path, tc.read_pmi(path)))
+    namespace = {"__name__": "model"}
+    exec(compile(text, "model.py", "exec"), namespace)
+    model = namespace["assembly"]()
+    (written,) = model.parts
+    assert written.name == "COMPOUND" and [str(feature).replace("COMPOUND", "cover") for feature in written.toleranced] == [
+        str(feature) for feature in part.toleranced
+    ]
+    expected = {label.split(".", 1)[1]: spread for label, spread in spreads(part).items()}
+    actual = {label.split(".", 1)[1]: spread for label, spread in spreads_of(model).items()}
+    assert {label: actual[label] for label in expected} == pytest.approx(expected, rel=1e-6)
+    assert len(actual) == len(expected) + 6
+    assert "not declared" not in text and max(map(len, text.splitlines())) <= 120
+
+
+def test_a_second_call_declares_nothing_twice(tmp_path):
+    part = cover(drawing, tmp_path)
+    part.features_from_pmi()
+    before = part.toleranced
+    again = part.features_from_pmi()
+    assert part.toleranced == before and again.features == ()
+    reasons = {str(one.annotation).split(":")[0]: one.reason for one in again.undeclared}
+    assert len(reasons) == len(again.annotations)
+    assert reasons["datum A"] == (
+        'it shares a face with feature "A", so that would deviate twice; give all tolerances of a face to one feature'
+    )
+    assert reasons["datum D"] == "of its surfaces, cylinder 13, cylinder 15 could not be declared"
+
+
+def test_features_of_the_script_stay_and_can_be_datums(tmp_path):
+    part = cover(drawing, tmp_path)
+    part.feature("bottom", part.face(tc.Brep(UNDER)), tc.Flatness(0.02), datum="A")
+    part.features_from_pmi()
+    assert [str(feature) for feature in part.toleranced if feature.datum == "A"] == [
+        "feature bottom of cover (datum A): cover B-rep face 5; flatness 0.02 mm"
+    ]
+    assert DECLARED[6] in map(str, part.toleranced)
+
+
+def all_over(file):
+    datums(file)
+    file.tolerance("surface_profile", 1.0, file.add("PRODUCT_DEFINITION_SHAPE('','',#1)"), "A|B|C")
+
+
+def circle(file):
+    file.datum("A", UNDER)
+    for letter, face, other in (("B", SIDE, "C"), ("C", END, "B")):
+        file.datum(letter, face)
+        file.letters.setdefault(other, 0)
+    for face, system in ((SIDE, "A|C"), (END, "A|B")):
+        file.tolerance("perpendicularity", 0.1, file.aspect(face), system)
+
+
+def other_body(file):
+    record = file.add("ADVANCED_FACE('',(),#1,.T.)")
+    file.faces.append(record)
+    file.tolerance("flatness", 0.1, file.aspect(len(file.faces)))
+    file.tolerance("flatness", 0.1, file.aspect(TOP, len(file.faces)))
+
+
+def of_one(kind, value, faces, system="", *entities, **options):
+    def annotate(file):
+        datums(file)
+        file.tolerance(kind, value, file.aspect(*faces), system, *entities, **options)
+
+    return annotate
+
+
+def per_unit(file):
+    of_one("flatness", 0.1, (UNDER,), "", f"GEOMETRIC_TOLERANCE_WITH_DEFINED_UNIT(#{file.length(25)})")(file)
+
+
+def unequal(file):
+    entity = f"UNEQUALLY_DISPOSED_GEOMETRIC_TOLERANCE(#{file.length(0.1)})"
+    of_one("surface_profile", 0.4, HOLE, "A|B|C", entity)(file)
+
+
+def nothing(file):
+    file.datum("A")
+    file.tolerance("perpendicularity", 0.1, file.aspect(SIDE), "A")
+
+
+def twice(file):
+    datums(file)
+    for width in (0.4, 0.6):
+        file.tolerance("position", width, file.aspect(*HOLE), "A|B|C", zone=ROUND)
+
+
+def sizes(file):
+    file.size(file.aspect(*HOLE), 8.1)
+    file.size(file.aspect(*HOLE), 9.0, (-0.1, 0.1))
+    file.size(file.aspect(UNDER), 8.1, (-0.1, 0.1))
+    file.size(file.aspect(), 8.1, (-0.1, 0.1))
+    file.size(file.aspect(*CORNERS, UNDER), 12.0, (-0.1, 0.1))
+
+
+NO_SIZE = "a size is for cylinders, spheres and two opposed planes, and it is a plane"
+REASONS = {
+    "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
+    "a circle of datums": (circle, ["datum C refers back to it"]),
+    "another body": (other_body, ["none of its faces is on the part", "1 of its 2 faces are not on the part"]),
+    "free state": (
+        of_one("flatness", 0.1, (UNDER,), modifier="F"), ["it is for the part in its free state, and parts are rigid here"],
+    ),
+    "per unit": (per_unit, ["it is per unit of length or area"]),
+    "an unequal profile of a hole": (
+        unequal, ["profile is for planes, if it says how much of it is outside, and it is a cylinder"],
+    ),
+    "a datum that nothing is": (nothing, ["the file states no face for it", "datum A is not declared"]),
+    "a flat zone of an axis": (
+        of_one("position", 0.2, HOLE, "A|B|C"), ["its zone is flat, and the file does not state across which direction"],
+    ),
+    "an orientation without datums": (
+        of_one("perpendicularity", 0.2, (SIDE,)), ["it needs datums, and the file states none"],
+    ),
+    "a bonus without a size": (
+        of_one("position", 0.2, HOLE, "A|B|C", zone=ROUND, modifier="M"),
+        ["position: a bonus (material 'M') needs the tolerance of a size; add tc.Size(...)"],
+    ),
+    "the same zone twice": (twice, ["position 0.6 controls nothing that others do not; leave one of them out"]),
+    "sizes": (
+        sizes,
+        [
+            "its limits are not stated", "its limits are 8.9 to 9.1, and the size of the shape is 8.1", NO_SIZE,
+            "the file states no face for it", f"faces 5: {NO_SIZE}",
+        ],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REASONS)
+def test_what_features_cannot_state_has_its_reason(name, tmp_path):
+    annotate, reasons = REASONS[name]
+    declared = cover(annotate, tmp_path).features_from_pmi()
+    assert [one.reason for one in declared.undeclared] == reasons
+
+
+def test_a_tolerance_of_several_surfaces_is_declared_in_part(tmp_path):
+    part = cover(sizes, tmp_path)
+    partly = part.features_from_pmi().undeclared[-1]
+    assert partly.features == ("cylinder 3", "cylinder 4", "cylinder 8", "cylinder 9")
+    assert str(partly).endswith(f"declared as {', '.join(partly.features)} (faces 5: {NO_SIZE})")
+
+
+def test_a_part_without_pmi_gets_one_message(tmp_path):
+    model = tc.Assembly("model")
+    empty = Annotated(COVER.read_text()).write(tmp_path / "empty.stp")
+    parts = {
+        'part "box" is a box 1 x 2 x 3 mm; only a STEP file of AP242 states PMI': tc.Box(1, 2, 3),
+        'part "empty": its file states no tolerances, dimensions or datums as AP242 does': tc.Mesh(empty),
+        'part "plain": its file states no tolerances, dimensions or datums as AP242 does': tc.Mesh(COVER),
+        f'part "lost": "{tmp_path / "nowhere.stp"}" is not a file': tc.Mesh(tmp_path / "nowhere.stp"),
+    }
+    for message, geometry in parts.items():
+        with pytest.raises(ModelError) as refused:
+            model.part(message.split('"')[1], geometry).features_from_pmi()
+        assert message in str(refused.value) and str(refused.value).count("\n") <= 1
+
+
+def test_each_body_of_a_file_gets_its_features(tmp_path):
+    made = Step()
+    made.product("pair", [made.solid((0, 0, 0), (10, 20, 30)), made.solid((40, 0, 0), (50, 20, 30))])
+    file = Annotated(str(made))
+    file.datum("A", 1)
+    file.tolerance("surface_profile", 0.2, file.aspect(2, 8), "A")
+    file.tolerance("flatness", 0.1, file.aspect(7))
+    path = file.write(tmp_path / "pair.stp")
+    declared = declared_file(path, tc.read_pmi(path))
+    assert [[str(feature) for feature in part.toleranced] for part in declared.parts] == [
+        [
+            "feature A of body 1 (datum A): body 1 B-rep face 1",
+            "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 mm to A",
+        ],
+        ["feature plane 1 of body 2: body 2 B-rep face 1; flatness 0.1 mm"],
+    ]  # fmt: skip
+    assert [(one.features, one.reason) for one in declared.annotations] == [
+        (("body 1.A",), ""), (("body 1.plane 2",), "body 2: datum A is not declared"), (("body 2.plane 1",), ""),
+    ]  # fmt: skip
+
+
+def test_a_body_whose_shape_cannot_be_used_is_left_out_with_the_reason(tmp_path):
+    made, corners = Step(), [(60, 0, 0), (70, 0, 0), (70, 10, 0), (60, 10, 0), (80, 0, 0), (80, 10, 0)]
+    solid = made.solid((0, 0, 0), (10, 20, 30))
+    sheet = made.shell(corners, "OPEN_SHELL", [(0, 1, 2, 3), (1, 2, 5, 4)])  # one face is seen from below
+    made.product("pair", [solid, made.add(f"SHELL_BASED_SURFACE_MODEL('',(#{sheet}))")])
+    file = Annotated(str(made))
+    file.tolerance("flatness", 0.1, file.aspect(5, 7))
+    path = file.write(tmp_path / "pair.stp")
+    declared = declared_file(path, tc.read_pmi(path))
+    assert [(one.features, one.reason) for one in declared.annotations] == [
+        (("plane 5",), "1 of its 2 faces are not on the part")
+    ]
+    (fault,) = declared.faults
+    assert fault.startswith("mesh pair.stp 2: neighbouring triangles are oriented inconsistently at 1 edges")
+    assert str(declared).endswith(fault) and f"    # Not declared: {fault}" in script(path, declared).splitlines()
