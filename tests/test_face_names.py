@@ -147,3 +147,18 @@ def test_faces_of_several_colours_have_their_names(tmp_path):
     made.paint(shell, red=1.0)
     (tmp_path / "painted.step").write_text(named(str(made), DIRECTIONS))
     assert [face.name for face in tc.faces_in(tmp_path / "painted.step")] == list(DIRECTIONS)
+
+
+def test_faces_beside_a_drawing_have_their_names(tmp_path):
+    """The representation of a part refers to its solid and, as those of some systems do, to the lines of a drawing."""
+    step = Step()
+    solid = step.solid((0, 0, 0), (10, 20, 30), "block")
+    ends = ",".join(f"#{step.point((x, 0, 50))}" for x in (0, 10))
+    line = step.add(f"POLYLINE('',({ends}))")
+    lines = step.add(f"GEOMETRIC_CURVE_SET('',(#{line}))")
+    _, part = step.product("part")
+    for kind, item in (("ADVANCED_BREP", solid), ("GEOMETRICALLY_BOUNDED_WIREFRAME", lines)):
+        shape = step.add(f"{kind}_SHAPE_REPRESENTATION('',(#{step.placement()},#{item}),#{step.context})")
+        step.add(f"SHAPE_REPRESENTATION_RELATIONSHIP('','',#{part},#{shape})")
+    (tmp_path / "drawn.step").write_text(counted(str(step)))
+    assert [face.name for face in tc.faces_in(tmp_path / "drawn.step")] == [f"f{number}" for number in range(6)]

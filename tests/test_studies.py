@@ -21,7 +21,7 @@ STUDIES = {
     "exact/tables.py": ["--samples", "20"],
     "paper/reproduce.py": ["--large", "2000", "--to", "."],
     "report/picture.py": ["ra1.png"],
-    "robustness/files.py": ["--archives", "1", "--shapes", "2", "--models", "2"],
+    "robustness/files.py": ["--archives", "1", "--shapes", "2", "--models", "2", "--steps", "2", "--hostile-steps", "2"],
     "robustness/machines.py": ["--only", "environments", "--first", "2"],
     "robustness/processes.py": ["--killed", "1", "--writers", "1"],
     "robustness/signals.py": ["--tries", "3"],

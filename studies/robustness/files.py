@@ -1,11 +1,12 @@
 """Give commands files of strangers: rotten archives, rotten shapes, models as JSON that ask for too much.
 
-python -m studies.robustness.files --archives 500 --shapes 200 --models 100 --seed 0
+python -m studies.robustness.files --archives 500 --shapes 200 --models 100 --steps 200 --hostile-steps 80 --seed 0
 """
 
 import argparse
 import contextlib
 import copy
+import itertools
 import json
 import random
 import shutil
@@ -17,8 +18,10 @@ import netCDF4
 import trimesh
 
 import tolcontact as tc
-from studies.robustness.attempts import Table, attempt, contents
+from studies.robustness.attempts import Ending, Table, attempt, contents
+from studies.robustness.step_texts import damaged, hostile
 from tests.hostile import HOSTILE
+from tolcontact.geometry.files import Limits
 
 ROOT = Path(__file__).resolve().parents[2]
 MODELS = ("ra1", "channel")
@@ -32,6 +35,8 @@ READERS = {
     "run --resume": ["run", "MODEL", "--samples", "40", "--solver", "daqp", "--out", "a.nc", "--resume", "--quiet"],
 }
 MAX_SECONDS, MAX_MEGABYTES = 20.0, 2048.0  # for the model of a stranger
+STEP_COMMANDS = (["bodies"], ["faces"], ["pmi", "--faces"])
+MAX_STEP_MEGABYTES = 6 * 1024.0  # for a STEP file
 
 
 def changed(data: bytes, rng: random.Random) -> bytes:
@@ -123,6 +128,40 @@ def shapes(count: int, rng: random.Random, folder: Path, table: Table) -> None:
         )
 
 
+def steps(count: int, rng: random.Random, folder: Path, table: Table) -> None:
+    """Let commands read a STEP file of 53 kB that is damaged at random."""
+    sound = (ROOT / "models/cover.step").read_bytes()
+    for number in range(count):
+        kind, content = damaged(sound, rng)
+        _try_step(f"STEP files, {kind}", str(number), folder / "cover.step", content, table)
+
+
+def hostile_steps(count: int, rng: random.Random, folder: Path, table: Table) -> None:
+    """Let commands read STEP files that are hostile on purpose."""
+    for kind, name, content in itertools.islice(hostile((ROOT / "models/cover.step").read_bytes()), count):
+        _try_step("STEP files, hostile", kind, folder / name, content, table)
+
+
+def _try_step(group: str, kind: str, path: Path, content: bytes, table: Table) -> None:
+    path.write_bytes(content)
+    for command, *options in STEP_COMMANDS:
+        ending = attempt([command, *options, "--", path.name], path.parent, limit=3600)
+        fault = ending.fault or _step_fault(ending, len(content) / 1e6)
+        words = f"{kind}, {command}: {ending.seconds:.1f} s, {ending.megabytes:.0f} MiB: {ending.error[-500:]}"
+        table.add(group, fault or ("refused" if ending.code == 2 else "read"), words, is_fault=bool(fault))
+    path.unlink()
+
+
+def _step_fault(ending: Ending, megabytes: float) -> str:
+    """Return what is wrong with the ending of a command that reads a STEP file; empty if nothing is."""
+    limits = Limits()
+    if ending.code == 1 or (ending.code == 2 and ending.error.count("error: ") != 1):
+        return "not one message"
+    if ending.seconds > 2 * (limits.seconds + limits.seconds_per_mb * megabytes) + 10:  # it is tried twice
+        return "took too long"
+    return "took too much memory" if ending.megabytes > MAX_STEP_MEGABYTES else ""
+
+
 def stand() -> dict[str, Any]:
     """Return a small model."""
     faces = [{"part": "block", "select": [way]} for way in ("-z", "-y", "-x")]
@@ -207,11 +246,11 @@ def models(count: int, rng: random.Random, folder: Path, table: Table) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    for name in ("archives", "shapes", "models"):
-        parser.add_argument(f"--{name}", type=int, default=0)
+    for name in ("archives", "shapes", "models", "steps", "hostile_steps"):
+        parser.add_argument(f"--{name.replace('_', '-')}", type=int, default=0)
     parser.add_argument("--seed", type=int, default=0)
     options, table = parser.parse_args(), Table()
-    for kind in (archives, shapes, models):
+    for kind in (archives, shapes, models, steps, hostile_steps):
         with tempfile.TemporaryDirectory() as folder:
             kind(getattr(options, kind.__name__), random.Random(options.seed), Path(folder), table)
     print("\n".join(table.lines()))

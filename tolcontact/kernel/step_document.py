@@ -102,11 +102,10 @@ class Document:
         """
         shape = XCAFDoc_ShapeTool.GetShape_s(label).Located(TopLoc_Location())
         BRepMesh_IncrementalMesh(shape, chord, False, angle, False)
-        names = subshape_names(label)
+        names = subshape_names(label) or self._record_names([shape])
         pieces = list(self._pieces(shape, names, is_alone=is_alone))
         yield from (self._body(piece, names, name, count) for piece, name, count, is_solid in pieces if is_solid)
-        sheets: list[Any] = []
-        lost_count = 0
+        sheets, lost_count = list[Any](), 0
         for piece, _, count, is_solid in pieces:
             if is_solid:
                 continue
@@ -119,11 +118,15 @@ class Document:
             yield BodyShape(sheets, face_names(sheets, names), False, "", lost_count)
 
     def _body(self, piece: Any, names: dict[int, str], name: str = "", count: int = 0) -> BodyShape:
-        """Return the body of a solid or shell. The document has no labels for faces of cavities: their records have names."""
+        """Return the body of a solid or shell."""
         faces = [*explore(piece, TopAbs_FACE)]
-        cavities = [*explore(piece, TopAbs_SHELL)][1:] if self.has_face_names else []
-        within = {hash(face): entity_name(self._entity(face)) for shell in cavities for face in explore(shell, TopAbs_FACE)}
-        return BodyShape(faces, face_names(faces, within | names if within else names), count > 0, name, count)
+        cavities = [*explore(piece, TopAbs_SHELL)][1:]
+        return BodyShape(faces, face_names(faces, self._record_names(cavities) | names), count > 0, name, count)
+
+    def _record_names(self, shapes: Sequence[Any]) -> dict[int, str]:
+        """Return the names of faces by their records: those of cavities, and of some parts with drawings, have no labels."""
+        faces = [face for shape in shapes for face in explore(shape, TopAbs_FACE)] if self.has_face_names else []
+        return {hash(face): entity_name(self._entity(face)) for face in faces}
 
     def _pieces(self, shape: Any, names: dict[int, str], *, is_alone: bool) -> Iterator[tuple[Any, str, int, bool]]:
         """Yield the solids, shells and loose faces of a shape: name and number of faces in the file, whether it is a solid.
