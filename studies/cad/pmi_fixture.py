@@ -87,7 +87,7 @@ def ftc_06(model: tc.Assembly, part: tc.Part) -> dict[str, float]:
     model.measure("D in the part", height.point(*middle), to=part.point(*middle), along="y", tolerance=1)
     model.measure("incline 56", incline.point(0, 72.39, -82.55), along=(0, 0.89442719, -0.4472136), tolerance=1.5)
     growth = np.hypot(0.635 + 0.2032, 0.4064 * SIZE)
-    return {"hole 71 1 in the part": float(growth) * AXIS}
+    return {"hole 71 1 in the part": float(growth) * AXIS, "D in the part": 0.508 * RECTANGLE}
 
 
 def ftc_10(model: tc.Assembly, part: tc.Part) -> dict[str, float]:
