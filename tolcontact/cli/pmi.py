@@ -80,7 +80,7 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
         typer.echo(f"warning: nothing is declared, and faces have no numbers: {error}", err=True)
         return DeclaredFile(information, (), (), {})
     for fault in declared.faults:
-        typer.echo(f"warning: {fault}", err=True)
+        typer.echo(f"warning: nothing is declared of {fault}", err=True)
     return declared
 
 

@@ -113,6 +113,8 @@ def _check(annotation: Annotation) -> None:
 def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Place]) -> list[Place]:
     """Return the places of a claim: those of earlier claims on the same faces, and new ones."""
     numbers = claim.numbers
+    if not numbers and isinstance(claim.annotation, Datum) and claim.annotation.targets:
+        raise Undeclared("none of its targets is on a face of the part")
     if not numbers:
         raise Undeclared("none of its faces is on the part" if claim.stated else "the file states no face for it")
     groups = surfaces.surfaces(numbers)

@@ -51,7 +51,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         try:
             read = shape(geometry)
         except GeometryFault as fault:
-            faults.append(f"nothing is declared of body {body.number}: {fault}")
+            faults.append(f"body {body.number}: {fault}")
             continue
         part = model.part(part_name(body), geometry, at=body.at, rotation=body.rotation)
         claims.append(declare_features(part, pmi, read)[1])

@@ -2,6 +2,7 @@
 
 import json
 import re
+import textwrap
 from collections.abc import Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -19,11 +20,10 @@ _DIGITS = 9  # of lengths: more than a shape resolves
 
 def script(path: Path, declared: DeclaredFile) -> str:
     """Return a model script that declares the parts of a file with their features."""
-    rest = [
-        f"    # - {shown(str(one))}" for one in declared.annotations if one.reason and isinstance(one.annotation, Tolerance)
-    ]
+    comments = [str(one) for one in declared.annotations if one.reason and isinstance(one.annotation, Tolerance)]
+    comments = [f"- {comment}" for comment in [*comments, *declared.faults]]
     return "\n".join([
-        f'"""The parts of {shown(path.name)}, with the tolerances that it states; add locators, contact and measures."""',
+        f'"""Parts of {shown(path.name)}, with the tolerances that it states; add locators, contact and measures."""',
         "",
         "import tolcontact as tc",
         "",
@@ -31,8 +31,8 @@ def script(path: Path, declared: DeclaredFile) -> str:
         "def assembly() -> tc.Assembly:",
         f"    model = tc.Assembly({_text(path.stem)})",
         *(line for part in declared.parts for line in _part_lines(part)),
-        *(["    # Tolerances that are not declared, or not wholly:", *rest] if rest else []),
-        *(f"    # Not declared: {shown(fault)}" for fault in declared.faults),
+        *(["    # Not declared, or not wholly:"] if comments else []),
+        *(line for comment in comments for line in _comment_lines(comment)),
         "    return model",
         "",
         "",
@@ -40,6 +40,10 @@ def script(path: Path, declared: DeclaredFile) -> str:
         "    tc.main(assembly)",
         "",
     ])  # fmt: skip
+
+
+def _comment_lines(comment: str) -> list[str]:
+    return textwrap.wrap(shown(comment), MAX_WIDTH, initial_indent="    # ", subsequent_indent="    #   ")
 
 
 def _part_lines(part: Part) -> Iterator[str]:
