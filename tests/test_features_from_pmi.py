@@ -36,7 +36,7 @@ def datums(file: Annotated) -> None:
 def drawing(file: Annotated) -> None:
     """Tolerances of each kind that features and patterns state."""
     datums(file)
-    file.tolerance("flatness", 0.1, file.aspect(UNDER))
+    file.tolerance("flatness", 0.1, file.aspect(UNDER), "", f"GEOMETRIC_TOLERANCE_WITH_DEFINED_UNIT(#{file.length(25)})")
     hole, slot, corners = (file.aspect(*faces) for faces in (HOLE, SLOT, CORNERS))
     file.size(hole, 8.1, (0, 0.03))
     file.tolerance("position", 0.2, hole, "A|B(M)|C", zone=ROUND, modifier="M")
@@ -53,10 +53,10 @@ def drawing(file: Annotated) -> None:
 
 
 DECLARED = [
-    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1 mm",
+    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1 mm per 25 mm",
     "feature B of cover (datum B): cover B-rep face 6",
     "feature C of cover (datum C): cover B-rep face 1",
-    "feature E of cover (datum E): cover B-rep face 2",
+    "feature plane 2 of cover: cover B-rep face 2",
     "feature cylinder 13 of cover: cover B-rep face 13",
     "feature cylinder 15 of cover: cover B-rep face 15",
     "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2M mm to A|B(M)|C",
@@ -66,6 +66,7 @@ DECLARED = [
     "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 mm to A|B|C; position 0.1 mm to A><|B><",
     "pattern D of cover (datum D): 2 members",
 ]  # fmt: skip
+TARGETS = "datum E: targets cover.plane 2 (60, 40, 8), cover.plane 2 (20, 70, 8), cover.plane 2 (100, 5, 8)"
 
 
 def spreads(part: tc.Part, **place: Sequence[float]) -> dict[str, float]:
@@ -89,10 +90,14 @@ def test_tolerances_of_a_drawing_become_features_and_patterns(tmp_path):
     part = cover(drawing, tmp_path)
     declared = part.features_from_pmi()
     assert sorted(map(str, part.toleranced)) == sorted(DECLARED) and part.toleranced != ()
-    assert set(declared.features) == set(part.toleranced) and not declared.undeclared
+    assert set(declared.features) == {*part.toleranced, *part.targets} and not declared.undeclared
+    assert [str(targets) for targets in part.targets] == [TARGETS]
     names = {str(one.annotation).split(",")[0]: one.features for one in declared.annotations}
     assert names["4. position 0.1 mm (diameter"] == ("cylinders 3",) and names["datum E: 0 faces"] == ("E",)
-    assert str(declared) == ("12 features and patterns, which state 7 of 7 tolerances, 3 of 3 dimensions, 5 of 5 datums")
+    assert (
+        str(declared)
+        == "13 features, patterns and datum targets, which state 7 of 7 tolerances, 3 of 3 dimensions, 5 of 5 datums"
+    )
     (unequal,) = next(feature for feature in part.features if feature.name == "plane 10").tolerances
     assert unequal.outside == pytest.approx(0.1)
 
@@ -150,6 +155,7 @@ def test_a_second_call_declares_nothing_twice(tmp_path):
         'it shares a face with feature "A", so that would deviate twice; give all tolerances of a face to one feature'
     )
     assert reasons["datum D"] == "of its surfaces, cylinder 13, cylinder 15 could not be declared"
+    assert reasons["datum E"] == "of its surfaces, plane 2 could not be declared"
 
 
 def test_features_of_the_script_stay_and_can_be_datums(tmp_path):
@@ -191,10 +197,6 @@ def of_one(kind, value, faces, system="", *entities, **options):
     return annotate
 
 
-def per_unit(file):
-    of_one("flatness", 0.1, (UNDER,), "", f"GEOMETRIC_TOLERANCE_WITH_DEFINED_UNIT(#{file.length(25)})")(file)
-
-
 def unequal(file):
     entity = f"UNEQUALLY_DISPOSED_GEOMETRIC_TOLERANCE(#{file.length(0.1)})"
     of_one("surface_profile", 0.4, HOLE, "A|B|C", entity)(file)
@@ -219,7 +221,7 @@ def sizes(file):
     file.size(file.aspect(*CORNERS, UNDER), 12.0, (-0.1, 0.1))
 
 
-NO_SIZE = "a size is for cylinders, spheres and two opposed planes, and it is a plane"
+NO_SIZE = "sizes of features are those of cylinders, spheres and two opposed planes, and it is a plane"
 REASONS = {
     "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
     "a circle of datums": (circle, ["datum C refers back to it"]),
@@ -227,7 +229,6 @@ REASONS = {
     "free state": (
         of_one("flatness", 0.1, (UNDER,), modifier="F"), ["it is for the part in its free state, and parts are rigid here"],
     ),
-    "per unit": (per_unit, ["it is per unit of length or area"]),
     "an unequal profile of a hole": (
         unequal, ["profile is for planes, if it says how much of it is outside, and it is a cylinder"],
     ),
@@ -247,7 +248,7 @@ REASONS = {
         sizes,
         [
             "its limits are not stated", "its limits are 8.9 to 9.1, and the size of the shape is 8.1", NO_SIZE,
-            "the file states no face for it", f"faces 5: {NO_SIZE}",
+            "the file states no face for it", f"plane 5: {NO_SIZE}",
         ],
     ),
 }  # fmt: skip
@@ -264,7 +265,7 @@ def test_a_tolerance_of_several_surfaces_is_declared_in_part(tmp_path):
     part = cover(sizes, tmp_path)
     partly = part.features_from_pmi().undeclared[-1]
     assert partly.features == ("cylinder 3", "cylinder 4", "cylinder 8", "cylinder 9")
-    assert str(partly).endswith(f"declared as {', '.join(partly.features)} (faces 5: {NO_SIZE})")
+    assert str(partly).endswith(f"declared as {', '.join(partly.features)} (plane 5: {NO_SIZE})")
 
 
 def test_a_part_without_pmi_gets_one_message(tmp_path):
@@ -316,5 +317,5 @@ def test_a_body_whose_shape_cannot_be_used_is_left_out_with_the_reason(tmp_path)
         (("plane 5",), "1 of its 2 faces are not on the part")
     ]
     (fault,) = declared.faults
-    assert fault.startswith("mesh pair.stp 2: neighbouring triangles are oriented inconsistently at 1 edges")
-    assert str(declared).endswith(fault) and f"    # Not declared: {fault}" in script(path, declared).splitlines()
+    assert fault.startswith("body 2: mesh pair.stp 2: neighbouring triangles are oriented inconsistently at 1 edges")
+    assert str(declared).endswith(fault) and "    # - body 2: mesh pair.stp 2: neighbouring" in script(path, declared)

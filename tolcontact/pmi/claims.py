@@ -42,9 +42,9 @@ class Claim:
         return DeclaredAnnotation(self.annotation, tuple(dict.fromkeys(self.features)), "; ".join(reasons))
 
     @property
-    def reasons(self) -> list[str]:
+    def reasons(self) -> tuple[str, ...]:
         """Why it is not declared, or not for all features: each reason with their names, unless it is for all."""
-        return [_reason(reason, names, len(self.places)) for reason, names in self.refusals.items()]
+        return tuple(_reason(reason, names, len(self.places)) for reason, names in self.refusals.items())
 
     def refuse(self, reason: object, name: str = "") -> None:
         """Write down why it is not declared for the feature with a name, or for none."""

@@ -43,5 +43,5 @@ class DeclaredPmi(Readable):
             for kind, plural in ((Tolerance, "tolerances"), (Dimension, "dimensions"), (Datum, "datums"))
             if (own := [one for one in self.annotations if isinstance(one.annotation, kind)])
         ]
-        title = f"{len(self.features)} features and patterns, which state {', '.join(counts)}"
+        title = f"{len(self.features)} features, patterns and datum targets, which state {', '.join(counts)}"
         return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])

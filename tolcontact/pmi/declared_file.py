@@ -31,7 +31,8 @@ class DeclaredFile(Readable):
     faults: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        return str(DeclaredPmi(tuple(feature for part in self.parts for feature in part.toleranced), self.annotations))
+        features = tuple(declared for part in self.parts for declared in (*part.toleranced, *part.targets))
+        return "\n".join([str(DeclaredPmi(features, self.annotations)), *(f"  {fault}" for fault in self.faults)])
 
 
 def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:

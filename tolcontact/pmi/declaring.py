@@ -98,7 +98,7 @@ def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declare
     name = draft.letter or draft.name
     absent = [member.letter or member.name for member in draft.borrowed if member.declared is None]
     if absent and draft.datum:
-        draft.datum.reasons.append(f"of its surfaces, {', '.join(absent)} could not be declared")
+        draft.datum.refuse(f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
         return None
     for claim, constituent in sorted(draft.stated, key=lambda stated: not isinstance(stated[1], Size)):
         reason = _fault(draft.with_tolerances(part, (*tolerances, constituent)), trial, meshes)
