@@ -155,7 +155,10 @@ def _listed_product(path: str | Path) -> Product:
     if product.missing_faces:
         product = _product(path)
     if product.missing_faces:
-        log.warning('"%s": %d faces are left out, since the CAD kernel makes no triangles of them', path, product.missing_faces)
+        log.warning(
+            '"%s": %d of %d faces are left out, since the CAD kernel makes no triangles of them',
+            path, product.missing_faces, sum(map(len, product.surfaces)),
+        )  # fmt: skip
     return product
 
 
