@@ -87,7 +87,9 @@ def _declared(file: Path, information: Pmi) -> DeclaredFile:
 def _entries(declared: DeclaredFile, reading: SecondReading | None) -> dict[str, Any]:
     """Return everything for JSON: what the file states, its faces, what became of it, and the kernel's reading."""
     faces = {record: asdict(face) for record, face in declared.faces.items()}
-    declarations = {one.annotation.record: {"features": one.features, "reason": one.reason} for one in declared.annotations}
+    declarations = {
+        entry.annotation.record: {"features": entry.features, "reason": entry.reason} for entry in declared.annotations
+    }
     entries = {"faces": faces, "declared": declarations, "second_reading": asdict(reading) if reading else None}
     return asdict(declared.pmi) | entries
 
@@ -146,10 +148,10 @@ def _undeclared_lines(declared: DeclaredFile) -> Iterator[RenderableType]:
     """Yield what is not declared, or only in part, with the reasons."""
     numbers: dict[tuple[str, str], list[str]] = defaultdict(list)
     for kind, noun in ((Tolerance, "tolerance"), (Dimension, "dimension"), (Datum, "datum")):
-        for one in declared.annotations:
-            if isinstance(one.annotation, kind) and one.reason:
-                reason = f"only in part, {one.reason}" if one.features else one.reason
-                numbers[noun, reason].append(_number(one.annotation))
+        for entry in declared.annotations:
+            if isinstance(entry.annotation, kind) and entry.reason:
+                reason = f"only in part, {entry.reason}" if entry.features else entry.reason
+                numbers[noun, reason].append(_number(entry.annotation))
     if numbers:
         yield Text("\nnot declared", style="bold")
     for (noun, reason), group in numbers.items():
@@ -213,7 +215,7 @@ def _datum_row(datum: Datum, declared: DeclaredFile) -> tuple[str, ...]:
 
 def _features(annotation: Annotation, declared: DeclaredFile) -> str:
     """Return the names of the features that declare an annotation; a dash if none does."""
-    names = next((one.features for one in declared.annotations if one.annotation is annotation), ())
+    names = next((entry.features for entry in declared.annotations if entry.annotation is annotation), ())
     more = f", and {len(names) - MAX_FEATURES} more" if len(names) > MAX_FEATURES else ""
     return shown(", ".join(names[:MAX_FEATURES])) + more if names else "-"
 
@@ -236,7 +238,7 @@ def _figure(value: float | None) -> str:
 def _csv(declared: DeclaredFile) -> str:
     text = io.StringIO()
     information, faces = declared.pmi, declared.faces
-    became = {one.annotation.record: ("; ".join(one.features), one.reason) for one in declared.annotations}
+    declarations = {entry.annotation.record: ("; ".join(entry.features), entry.reason) for entry in declared.annotations}
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(_CSV)
     for tolerance in information.tolerances:
@@ -244,7 +246,7 @@ def _csv(declared: DeclaredFile) -> str:
             "tolerance", tolerance.number, tolerance.record, tolerance.kind, shown(tolerance.name), tolerance.value, None, None,
             "mm", shown(tolerance.zone), tolerance.details, tolerance.datum_system, tolerance.refines,
             _numbers(tolerance.face_records), _numbers(tolerance.other_records), None, None,
-            _named(tolerance.face_records, faces), None, *map(shown, became.get(tolerance.record, ("", ""))),
+            _named(tolerance.face_records, faces), None, *map(shown, declarations.get(tolerance.record, ("", ""))),
         ))  # fmt: skip
     for dimension in information.dimensions:
         rows.writerow((
@@ -252,7 +254,7 @@ def _csv(declared: DeclaredFile) -> str:
             dimension.lower, dimension.upper, dimension.unit, None, dimension.details, None, None,
             _numbers(dimension.face_records), _numbers(dimension.other_records), _numbers(dimension.end_face_records),
             _numbers(dimension.end_other_records), _named(dimension.face_records, faces),
-            _named(dimension.end_face_records, faces), *map(shown, became.get(dimension.record, ("", ""))),
+            _named(dimension.end_face_records, faces), *map(shown, declarations.get(dimension.record, ("", ""))),
         ))  # fmt: skip
     return text.getvalue()
 

@@ -39,9 +39,9 @@ class DeclaredPmi(Readable):
 
     def __str__(self) -> str:
         counts = [
-            f"{sum(not one.reason for one in own)} of {len(own)} {plural}"
+            f"{sum(not entry.reason for entry in entries)} of {len(entries)} {plural}"
             for kind, plural in ((Tolerance, "tolerances"), (Dimension, "dimensions"), (Datum, "datums"))
-            if (own := [one for one in self.annotations if isinstance(one.annotation, kind)])
+            if (entries := [entry for entry in self.annotations if isinstance(entry.annotation, kind)])
         ]
         title = f"{len(self.features)} features, patterns and datum targets, which state {', '.join(counts)}"
         return "\n".join([title, *(f"  {annotation}" for annotation in self.undeclared)])

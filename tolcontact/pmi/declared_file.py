@@ -61,7 +61,7 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
     if faults and not parts:
         raise OptionError("; ".join(faults))
-    merged = [_merged(parts, own) for own in zip(*claims, strict=True)]
+    merged = [_merged(parts, group) for group in zip(*claims, strict=True)]
     return DeclaredFile(pmi, tuple(parts), tuple(merged), faces, tuple(faults))
 
 
@@ -80,6 +80,6 @@ def _merged(parts: Sequence[Part], claims: Sequence[Claim]) -> DeclaredAnnotatio
         names += [f"{part.name}.{name}" if len(parts) > 1 else name for name in claim.features]
         reasons += [f"{part.name}: {reason}" if len(placed) > 1 else reason for reason in claim.reasons]
     claim = claims[0]
-    missing = claim.stated - sum(len(own.numbers) for _, own in placed)
+    missing = claim.stated - sum(len(placed_claim.numbers) for _, placed_claim in placed)
     reasons += [missing_faces(missing, claim.stated)] if 0 < missing < claim.stated else []
     return DeclaredAnnotation(claim.annotation, tuple(dict.fromkeys(names)), "; ".join(dict.fromkeys(reasons)))

@@ -53,8 +53,8 @@ def declare_features(part: Part, pmi: Pmi, read: Shape) -> tuple[tuple[Declared,
 def _declare(part: Part, meshes: Meshes, drafts: Sequence[Draft]) -> tuple[Declared, ...]:
     """Declare drafts on a part, as far as their tolerances go together, and write into the claims what became of them."""
     trial = Features(0)
-    for present in datum_order(part)[0]:
-        _add(present, trial, meshes)
+    for earlier in datum_order(part)[0]:
+        _add(earlier, trial, meshes)
     for draft in _in_order(drafts, trial.datums(0)):
         draft.declared = _tried(draft, part, trial, meshes)
         if draft.declared is not None:
@@ -69,7 +69,9 @@ def _in_order(drafts: Iterable[Draft], letters: Collection[str | None]) -> Itera
     """
     waiting, made = list(drafts), {None, *letters}
     while waiting:
-        ready = [draft for draft in waiting if draft.letters <= made and not any(one in waiting for one in draft.borrowed)]
+        ready = [
+            draft for draft in waiting if draft.letters <= made and not any(member in waiting for member in draft.borrowed)
+        ]
         yield from ready
         waiting = [draft for draft in waiting if draft not in ready]
         made |= {draft.letter for draft in ready}
@@ -82,14 +84,14 @@ def _take_away(waiting: Sequence[Draft], made: set[str | None]) -> None:
     possible = made | {draft.letter for draft in waiting}
     is_circle = all(draft.letters <= possible for draft in waiting)
     for draft in [next(draft for draft in waiting if draft.stated)] if is_circle else waiting:
-        kept = []
+        followable = []
         for claim, tolerance in draft.stated:
             absent = letters_of(tolerance) - (made if is_circle else possible)
             if absent:
                 claim.refuse(f"datum {min(absent)} {'refers back to it' if is_circle else 'is not declared'}", draft.name)
             else:
-                kept.append((claim, tolerance))
-        draft.stated = kept
+                followable.append((claim, tolerance))
+        draft.stated = followable
 
 
 def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declared | None:

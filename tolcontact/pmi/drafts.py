@@ -89,8 +89,8 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
     datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
     targeted = [claim for claim in datums if claim.targets]
     common_datums = {frozenset(claim.places): claim for claim in datums if len(claim.places) > 1 and not claim.targets}
-    kept = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
-    merged = list(_patterns(drafts, kept))
+    separate = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
+    merged = list(_patterns(drafts, separate))
     for pattern, places in merged:
         pattern.datum = common_datums.pop(places, None)
         for place in places:

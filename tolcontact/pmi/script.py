@@ -20,7 +20,7 @@ _DIGITS = 9  # of lengths: more than a shape resolves
 
 def script(path: Path, declared: DeclaredFile) -> str:
     """Return a model script that declares the parts of a file with their features."""
-    comments = [str(one) for one in declared.annotations if one.reason and isinstance(one.annotation, Tolerance)]
+    comments = [str(entry) for entry in declared.annotations if entry.reason and isinstance(entry.annotation, Tolerance)]
     comments = [f"- {comment}" for comment in [*comments, *declared.faults]]
     return "\n".join([
         f'"""Parts of {shown(path.name)}, with the tolerances that it states; add locators, contact and measures."""',
