@@ -21,7 +21,7 @@ RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 DESCRIPTIONS = "descriptions"
 GENERAL = "general"  # kind of a face without an analytic surface
-UNKNOWN = StatedFace("", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
+UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
@@ -90,7 +90,10 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
-        surfaces = [surface or fit_surface(corners[own], FIT_TOLERANCE) for own, surface in zip(groups, stated, strict=True)]
+        surfaces = [
+            surface or (fit_surface(corners[own], FIT_TOLERANCE) if len(own) else None)
+            for own, surface in zip(groups, stated, strict=True)
+        ]
         known = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(stated)
         measures = [
             face.measure or _measure(mesh, own, surface) for face, own, surface in zip(known, groups, surfaces, strict=True)
@@ -145,6 +148,10 @@ def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.n
 
 def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceMeasure:
     """Return the measure of a face from its `triangles` (face,): its point lies amid the largest one, on its surface."""
+    if not len(triangles):
+        return FaceMeasure(
+            0.0, np.zeros(3) if surface is None else surface.project(np.zeros((1, 3)))[0], np.array([0.0, 0.0, 1.0])
+        )
     areas = np.asarray(mesh.area_faces)[triangles]
     largest = triangles[areas.argmax()]
     point = np.asarray(mesh.triangles_center)[largest]
