@@ -11,7 +11,8 @@ from studies.cad.trimmed_faces import area
 from tests.test_cad import COVER, triangles
 from tests.test_whole_surfaces import AS1
 from tolcontact.geometry.brep_face import DESCRIPTIONS, describe_faces
-from tolcontact.geometry.files import STATED_FACES, SURFACES
+from tolcontact.geometry.files import BREP, STATED_FACES, SURFACES, read_files
+from tolcontact.geometry.files.product import product
 from tolcontact.geometry.shapes import shape
 
 
@@ -52,3 +53,17 @@ def test_a_listing_with_few_triangles_says_what_many_would(body):
     for face, drawn in zip(tc.faces_in(AS1, body), describe_faces(mesh), strict=True):
         assert replace(face, point=drawn.point) == replace(drawn, area=face.area)
         assert drawn.area == pytest.approx(face.area, rel=1e-3)
+
+
+def test_a_face_without_triangles_keeps_its_number():
+    (content,) = read_files([tc.Mesh(COVER)]).values()
+    drawn = content.arrays["brep"] != 4
+    arrays = {**content.arrays, **{name: content.arrays[name][drawn] for name in ("faces", "piece", "brep")}}
+    arrays["face_count"] = np.zeros(1, dtype=np.int64)  # a sheet: a solid would be refused
+    cut = product(COVER, arrays, content.product.text)
+    assert cut.missing_faces == 1 and content.product.missing_faces == 0
+    mesh = cut.part(None)
+    assert set(mesh.face_attributes[BREP]) == set(range(15)) - {4}
+    for face, whole in zip(describe_faces(mesh), tc.faces_in(COVER), strict=True):
+        assert (face.number, face.area) == (whole.number, pytest.approx(whole.area))
+        assert face.kind == ("general" if face.number == 5 else whole.kind)

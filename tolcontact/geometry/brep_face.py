@@ -21,7 +21,7 @@ POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one sur
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
 GENERAL = "general"  # kind of a face without an analytic surface
-UNKNOWN = StatedFace("", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
+UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
 
 FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
@@ -108,7 +108,10 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
         order = np.argsort(number_of, kind="stable")
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
-        surfaces = [surface or fit_surface(corners[own], FIT_TOLERANCE) for own, surface in zip(groups, stated, strict=True)]
+        surfaces = [
+            surface or (fit_surface(corners[own], FIT_TOLERANCE) if len(own) else None)
+            for own, surface in zip(groups, stated, strict=True)
+        ]
         mesh.metadata[ON_SURFACES] = tuple(zip(surfaces, groups, strict=True))
     return mesh.metadata[ON_SURFACES]  # type: ignore[no-any-return]
 
@@ -160,6 +163,10 @@ def _is_outside(mesh: trimesh.Trimesh, surface: AnalyticSurface, triangles: np.n
 
 def _measure(mesh: trimesh.Trimesh, triangles: np.ndarray, surface: AnalyticSurface | None) -> FaceMeasure:
     """Return the measure of a face from its `triangles` (face,): its point lies amid the largest one, on its surface."""
+    if not len(triangles):
+        return FaceMeasure(
+            0.0, np.zeros(3) if surface is None else surface.project(np.zeros((1, 3)))[0], np.array([0.0, 0.0, 1.0])
+        )
     areas = np.asarray(mesh.area_faces)[triangles]
     largest = triangles[areas.argmax()]
     point = np.asarray(mesh.triangles_center)[largest]

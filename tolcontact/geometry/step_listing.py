@@ -17,6 +17,7 @@ from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, p
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
+from tolcontact.geometry.files.reader import ReadTimeout
 from tolcontact.readable import Readable
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
@@ -150,13 +151,18 @@ def part_name(body: BodyInFile) -> str:
 
 
 def _listed_product(path: str | Path) -> Product:
-    """Return a product for its bodies and faces, with few triangles if these are enough to give each face its number."""
-    product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
+    """Return a product for its bodies and faces, with few triangles if these are enough."""
+    try:
+        product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
+    except OptionError as error:
+        if not isinstance(error.__cause__, ReadTimeout):
+            raise
+        product = _product(path)  # the chord of a very large file is coarser
     if product.missing_faces:
         product = _product(path)
     if product.missing_faces:
         log.warning(
-            '"%s": %d of %d faces are left out, since the CAD kernel makes no triangles of them',
+            '"%s": %d of %d faces cannot be chosen, since the CAD kernel makes no triangles of them',
             path, product.missing_faces, sum(map(len, product.surfaces)),
         )  # fmt: skip
     return product
@@ -175,7 +181,7 @@ def _product(path: str | Path, chord: float | None = None) -> Product:
         raise OptionError(fault)
     content = read_files([geometry])[key_of(geometry)]
     if isinstance(content, GeometryFault):
-        raise OptionError(str(content))
+        raise OptionError(str(content)) from content
     if content.product is None:
         raise OptionError(f'"{path}" is not a STEP file; only these hold bodies and faces that have numbers')
     return content.product

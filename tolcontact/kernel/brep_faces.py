@@ -49,7 +49,7 @@ def matrix(location: Any) -> np.ndarray:
 def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure | None]]:
     """Return the vertices and triangles of faces, seen from outside, the number (face,) of each triangle's face, and measures.
 
-    A face without triangles, or without a surface, has no measure.
+    A face without a surface has no measure.
     """
     corners, triangles, brep = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
     measures: list[Measure | None] = []
@@ -58,7 +58,7 @@ def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure
         location = TopLoc_Location()
         mesh = BRep_Tool.Triangulation_s(as_face(face), location)
         if mesh is None:
-            measures.append(None)
+            measures.append(measure(face, middle_of_parameters(face)))
             continue
         nodes = np.array([mesh.Node(k).Coord() for k in range(1, mesh.NbNodes() + 1)]).reshape(-1, 3)
         if not location.IsIdentity():
@@ -78,11 +78,20 @@ def triangulation(faces: Sequence[Any]) -> tuple[Piece, np.ndarray, list[Measure
     return (np.concatenate(corners), np.concatenate(triangles)), np.concatenate(brep), measures
 
 
-def measure(face: Any, parameters: Sequence[tuple[float, float]]) -> Measure | None:
-    """Return the area of a face [mm2], the point amid the `parameters` of three of its points, and the outward normal there.
+def middle_of_parameters(face: Any) -> list[tuple[float, float]]:
+    """Return the parameters in the middle of a face without triangles. The point there may lie in one of its holes."""
+    adaptor = BRepAdaptor_Surface(as_face(face))
+    u, v = (adaptor.FirstUParameter(), adaptor.LastUParameter()), (adaptor.FirstVParameter(), adaptor.LastVParameter())
+    return [(float(np.mean(u)), float(np.mean(v)))]
 
-    The result is None where the surface has no normal.
+
+def measure(face: Any, parameters: Sequence[tuple[float, float]]) -> Measure | None:
+    """Return the area of a face [mm2], the point amid the `parameters` of some of its points, and the outward normal there.
+
+    The result is None if there is no surface, or no normal.
     """
+    if BRep_Tool.Surface_s(as_face(face)) is None:
+        return None
     properties, point, along, across = GProp_GProps(), gp_Pnt(), gp_Vec(), gp_Vec()
     BRepGProp.SurfaceProperties_s(as_face(face), properties, AREA_TOLERANCE)
     BRepAdaptor_Surface(as_face(face)).D1(*np.mean(parameters, axis=0), point, along, across)

@@ -21,7 +21,7 @@ class Body:
     triangles     (face,) its triangles among those of the file
     lower, upper  (3,) corners of the box around the body in its place
     is_open       whether its triangles do not close
-    faces         its B-rep faces that have triangles, in the file's order
+    faces         its B-rep faces, in the file's order
     face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 
@@ -47,7 +47,7 @@ class StepShape:
 
     triangles     (face,) its triangles among those of the file
     is_open       whether the triangles do not close
-    faces         its B-rep faces that have triangles, in the file's order
+    faces         its B-rep faces, in the file's order
     face_count    number of B-rep faces that the file states for a solid; 0 if it is no solid
     """
 

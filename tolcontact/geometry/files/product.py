@@ -78,8 +78,8 @@ class Product:
     def missing_faces(self) -> int:
         """The number of B-rep faces without triangles that are no copies of others."""
         faces_of_shapes = {int(self.shape[body.triangles[0]]): body.faces for body in self.bodies}
-        numbered = sum(1 + face.copies for faces in faces_of_shapes.values() for face in faces)
-        return sum(map(len, self.surfaces)) - numbered
+        pairs = np.unique(np.column_stack([self.shape, self.brep]), axis=0)
+        return sum(map(len, faces_of_shapes.values())) - len(pairs)
 
     def part(self, selector: str | int | None) -> trimesh.Trimesh:
         """Return the mesh of a body: in its own frame if it is selected, in its place if `selector` is None.
@@ -90,9 +90,9 @@ class Product:
         triangles = body.triangles
         corners, faces = np.unique(self.mesh.faces[triangles], return_inverse=True)
         vertices = np.asarray(self.mesh.vertices)[corners]
-        numbers, brep = np.unique(self.brep[triangles], return_inverse=True)
+        brep = np.searchsorted([face.place for face in body.faces], self.brep[triangles])
         stated = self.surfaces[int(self.shape[triangles[0]])]
-        surfaces, stated_faces = [stated[number] for number in numbers], body.faces
+        surfaces, stated_faces = [stated[face.place] for face in body.faces], body.faces
         if selector is None and not np.array_equal(body.place, np.eye(4)):
             vertices = vertices @ body.place[:3, :3].T + body.place[:3, 3]
             surfaces = [
@@ -101,7 +101,7 @@ class Product:
             stated_faces = tuple(face.placed(body.place[:3, :3], body.place[:3, 3]) for face in stated_faces)
         mesh = trimesh.Trimesh(vertices, faces.reshape(-1, 3), process=False)
         mesh.units = "mm"
-        mesh.face_attributes[BREP] = brep.ravel()
+        mesh.face_attributes[BREP] = brep
         mesh.metadata[SURFACES] = surfaces
         names = tuple(face.name for face in stated_faces)
         mesh.metadata[FACE_NAMES] = names if any(names) else ()
@@ -114,7 +114,7 @@ class Product:
         if gaps:
             raise GeometryFault(
                 f'"{self.path}" holds a solid whose faces do not close ({gaps} edges have a triangle on one side only; '
-                f"{len(mesh.metadata[SURFACES])} of {body.face_count} faces could be read); repair it in CAD, or "
+                f"{len(np.unique(mesh.face_attributes[BREP]))} of {body.face_count} faces could be read); repair it in CAD, or "
                 "export it again"
             )
 
