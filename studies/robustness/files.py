@@ -35,7 +35,7 @@ READERS = {
     "run --resume": ["run", "MODEL", "--samples", "40", "--solver", "daqp", "--out", "a.nc", "--resume", "--quiet"],
 }
 MAX_SECONDS, MAX_MEGABYTES = 20.0, 2048.0  # for the model of a stranger
-STEP_COMMANDS = (["bodies"], ["faces"], ["pmi", "--faces"])
+STEP_COMMANDS = (["bodies"], ["faces"], ["pmi"])
 MAX_STEP_MEGABYTES = 6 * 1024.0  # for a STEP file
 
 
