@@ -214,6 +214,17 @@ def twice(file):
         file.tolerance("position", width, file.aspect(*HOLE), "A|B|C", zone=ROUND)
 
 
+def one_letter(file):
+    file.datum("A", UNDER)
+    file.datum("A", SIDE)
+    file.tolerance("flatness", 0.1, file.aspect(SIDE))
+
+
+def two_letters(file):
+    file.datum("A", *SLOT_ENDS)
+    file.datum("B", *SLOT_ENDS)
+
+
 def sizes(file):
     file.size(file.aspect(*HOLE), 8.1)
     file.size(file.aspect(*HOLE), 9.0, (-0.1, 0.1))
@@ -227,6 +238,8 @@ REASONS = {
     "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
     "a circle of datums": (circle, ["datum C refers back to it"]),
     "another body": (other_body, ["none of its faces is on the part", "1 of its 2 faces are not on the part"]),
+    "one letter for two datums": (one_letter, ["the part has a datum A already"]),
+    "two letters for one datum": (two_letters, ["its surfaces are datum A already"]),
     "free state": (
         of_one("flatness", 0.1, (UNDER,), modifier="F"), ["it is for the part in its free state, and parts are rigid here"],
     ),
@@ -320,3 +333,12 @@ def test_a_body_whose_shape_cannot_be_used_is_left_out_with_the_reason(tmp_path)
     (fault,) = declared.faults
     assert fault.startswith("body 2: mesh pair.stp 2: neighbouring triangles are oriented inconsistently at 1 edges")
     assert str(declared).endswith(fault) and "    # - body 2: mesh pair.stp 2: neighbouring" in script(path, declared)
+
+
+def test_a_file_whose_annotations_have_no_faces_has_a_reason_for_each(tmp_path):
+    file = Annotated(COVER.read_text())
+    file.tolerance("flatness", 0.1, file.aspect())
+    file.size(file.aspect(), 8.1, (-0.1, 0.1))
+    path = file.write(tmp_path / "cover.stp")
+    declared = declared_file(path, tc.read_pmi(path))
+    assert declared.parts == () and [one.reason for one in declared.annotations] == ["the file states no face for it"] * 2

@@ -10,6 +10,7 @@ from tolcontact.pmi.declared import Annotation, DeclaredAnnotation
 from tolcontact.pmi.toleranced_surfaces import TolerancedSurfaces
 
 Place = tuple[frozenset[int], ...]  # of a feature: the numbers of the faces of its surface, or of each of its two planes
+NO_FACE = "the file states no face for it"  # a reason
 MAX_NAMES = 6  # of features in a reason
 _MEDIAN_KINDS = ("position", "symmetry")  # of two opposed planes: of the middle between them
 
@@ -116,7 +117,7 @@ def _places(claim: Claim, surfaces: TolerancedSurfaces, place_of: dict[int, Plac
     if not numbers and isinstance(claim.annotation, Datum) and claim.annotation.targets:
         raise Undeclared("none of its targets is on a face of the part")
     if not numbers:
-        raise Undeclared("none of its faces is on the part" if claim.stated else "the file states no face for it")
+        raise Undeclared("none of its faces is on the part" if claim.stated else NO_FACE)
     groups = surfaces.surfaces(numbers)
     if surfaces.are_opposed(groups) and _has_middle(claim.annotation, tuple(groups), place_of):
         return [_pair(groups, place_of)]

@@ -10,7 +10,7 @@ from tolcontact.geometry.brep_face import describe_faces
 from tolcontact.geometry.shapes import shape
 from tolcontact.geometry.step_listing import LISTING_CHORD, FacesOfRecords, bodies_in, faces_of_records, part_name
 from tolcontact.pmi.annotations import Pmi
-from tolcontact.pmi.claims import Claim, missing_faces
+from tolcontact.pmi.claims import NO_FACE, Claim, missing_faces
 from tolcontact.pmi.declared import Annotation, DeclaredAnnotation, DeclaredPmi
 from tolcontact.pmi.declaring import declare_features
 from tolcontact.readable import Readable
@@ -61,15 +61,23 @@ def declared_file(path: Path, pmi: Pmi) -> DeclaredFile:
         faces |= {record: replace(faces[record], kind=kinds[faces[record].number]) for record in records}
     if faults and not parts:
         raise OptionError("; ".join(faults))
+    if not parts:  # what the file states is on edges and curves, or on no body
+        reasons = (
+            (annotation, "none of its faces is on a body" if annotation.face_records else NO_FACE) for annotation in _all(pmi)
+        )
+        return DeclaredFile(pmi, (), tuple(DeclaredAnnotation(annotation, (), reason) for annotation, reason in reasons), faces)
     merged = [_merged(parts, group) for group in zip(*claims, strict=True)]
     return DeclaredFile(pmi, tuple(parts), tuple(merged), faces, tuple(faults))
 
 
 def _records(pmi: Pmi) -> frozenset[int]:
     """Return the records of all faces to which annotations apply."""
-    toleranced: tuple[Annotation, ...] = (*pmi.tolerances, *pmi.dimensions, *pmi.datums)
     ends = (record for dimension in pmi.dimensions for record in dimension.end_face_records)
-    return frozenset((*(record for annotation in toleranced for record in annotation.face_records), *ends))
+    return frozenset((*(record for annotation in _all(pmi) for record in annotation.face_records), *ends))
+
+
+def _all(pmi: Pmi) -> tuple[Annotation, ...]:
+    return (*pmi.datums, *pmi.dimensions, *pmi.tolerances)
 
 
 def _merged(parts: Sequence[Part], claims: Sequence[Claim]) -> DeclaredAnnotation:

@@ -102,6 +102,12 @@ def _tried(draft: Draft, part: Part, trial: Features, meshes: Meshes) -> Declare
     if absent and draft.datum:
         draft.datum.refuse(f"of its surfaces, {', '.join(dict.fromkeys(absent))} could not be declared")
         return None
+    if draft.datum and draft.letter in trial.datums(0):
+        fault = _fault(draft.with_tolerances(part, ()), trial, meshes)
+        draft.datum.refuse(fault or f"the part has a datum {draft.letter} already")
+        if draft.borrowed:
+            return None
+        draft.datum, name = None, draft.name
     for claim, constituent in sorted(draft.stated, key=lambda stated: not isinstance(stated[1], Size)):
         reason = _fault(draft.with_tolerances(part, (*tolerances, constituent)), trial, meshes)
         if reason:

@@ -88,7 +88,12 @@ def drafts_of(part: Part, meshes: Meshes, claims: Sequence[Claim], surfaces: Tol
                 claim.refuse(reason, name)
     datums = [claim for claim in claims if isinstance(claim.annotation, Datum) and not claim.refusals]
     targeted = [claim for claim in datums if claim.targets]
-    common_datums = {frozenset(claim.places): claim for claim in datums if len(claim.places) > 1 and not claim.targets}
+    common_datums: dict[frozenset[Place], Claim] = {}
+    for claim in datums:
+        if len(claim.places) > 1 and not claim.targets:
+            earlier = common_datums.setdefault(frozenset(claim.places), claim)
+            if earlier is not claim and isinstance(earlier.annotation, Datum):
+                claim.refuse(f"its surfaces are datum {earlier.annotation.letter} already")
     separate = [*common_datums.keys(), *(frozenset([place]) for claim in targeted for place in claim.places)]
     merged = list(_patterns(drafts, separate))
     for pattern, places in merged:

@@ -16,6 +16,7 @@ from tolcontact.geometry.brep_face import (
 from tolcontact.geometry.files import STATED_FACES, Shape
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
+MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less
 MAX_DISTANCE = 1e-3  # of a part's size: of a point from the face on which it is
 _ROUND = ("cylinder", "cone", "sphere", "torus")
 
@@ -51,8 +52,8 @@ class TolerancedSurfaces:
         remaining = list(dict.fromkeys(number for stated in numbers for number in self._whole(stated)))
         surfaces = []
         while remaining:
-            first = self._surfaces[remaining[0] - 1]
-            members = [n for n in remaining if n == remaining[0] or are_one_surface(self._mesh, first, self._surfaces[n - 1])]
+            first = remaining[0]
+            members = [number for number in remaining if number == first or self._are_one(first, number)]
             remaining = [number for number in remaining if number not in members]
             surfaces.append(frozenset(members))
         return surfaces
@@ -70,6 +71,15 @@ class TolerancedSurfaces:
         if len(surfaces) != 2 or any(self.kind(surface) != "plane" for surface in surfaces):
             return False
         return bool(np.linalg.norm(self.normal(surfaces[0]) + self.normal(surfaces[1])) < MAX_OPPOSED_ERROR)
+
+    def _are_one(self, number: int, other: int) -> bool:
+        """Return whether two faces are parts of one surface. Most are told apart by their numbers alone."""
+        face, next_face = self.faces[number - 1], self.faces[other - 1]
+        if face.kind != next_face.kind or face.is_inner != next_face.is_inner:
+            return False
+        if face.direction and next_face.direction and np.linalg.norm(np.cross(face.direction, next_face.direction)) > MAX_ANGLE:
+            return False
+        return are_one_surface(self._mesh, self._surfaces[number - 1], self._surfaces[other - 1])
 
     def _whole(self, number: int) -> Iterator[int]:
         face = self.faces[number - 1]
