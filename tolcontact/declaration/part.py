@@ -115,7 +115,7 @@ class Part(Readable):
     def features_from_pmi(self) -> Any:
         """Declare the features that the STEP file of this part states as PMI, and return a `tolcontact.pmi.DeclaredPmi`.
 
-        It lists each annotation with its features, or the reason why it has none. Raises ModelError if the file states none.
+        It lists each annotation with its features, or the reason why it has none. Raises OptionError if the file states none.
         """
         return LATER[PMI](self)
 

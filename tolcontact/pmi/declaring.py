@@ -1,12 +1,10 @@
 """Declaration of a part's features from the PMI of its file, as far as features can state it."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from pathlib import Path
 
 from tolcontact.declaration import DatumTargets, Mesh, Part
 from tolcontact.declaration.feature_tolerance import Size
-from tolcontact.declaration.geometry import STEP
-from tolcontact.errors import GeometryFault, ModelError, OptionError
+from tolcontact.errors import GeometryFault, OptionError, shown
 from tolcontact.features import Features, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files import Shape
@@ -25,19 +23,19 @@ def features_from_pmi(part: Part) -> DeclaredPmi:
     The part has to come from a STEP file of AP242. Faces of one surface are one feature, and so are the two planes of a slot or
     a tab whose size or position is toleranced. A feature is named after the letter of its datum, else after its kind and the
     number of its first face, as in "cylinder 12". Features that the part has already stay as they are.
-    Raises ModelError if the file cannot be read, or states no PMI.
+    Raises OptionError if the file cannot be read, or states no PMI.
     """
     geometry = part.geometry
-    source = geometry.source if isinstance(geometry, Mesh) else None
-    if not (isinstance(source, str | Path) and Path(source).suffix.lower() in STEP):
-        raise ModelError(part.name, [f'part "{part.name}" is a {geometry}; only a STEP file of AP242 states PMI'])
+    name = f'part "{shown(part.name)}"'
+    if not (isinstance(geometry, Mesh) and geometry.is_step):
+        raise OptionError(f"{name} is a {geometry}; only a STEP file of AP242 states PMI")
     try:
-        pmi = read_pmi(source)
+        pmi = read_pmi(geometry.source)
         read = shape(geometry)
     except (OptionError, GeometryFault) as error:
-        raise ModelError(part.name, [f'part "{part.name}": {error}']) from error
+        raise OptionError(f"{name}: {error}") from error
     if pmi.is_empty:
-        raise ModelError(part.name, [f'part "{part.name}": its file states no tolerances, dimensions or datums as AP242 does'])
+        raise OptionError(f"{name}: its file states no tolerances, dimensions or datums as AP242 does")
     features, claims = declare_features(part, pmi, read)
     return DeclaredPmi(features, tuple(claim.result for claim in claims))
 
