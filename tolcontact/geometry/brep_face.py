@@ -87,14 +87,17 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
     """Return the faces of a part. Its mesh keeps them, since fitting surfaces takes time."""
     if DESCRIPTIONS not in mesh.metadata:
         on_surfaces = faces_on_surfaces(mesh)
-        known = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(on_surfaces)
+        stated_faces = mesh.metadata.get(STATED_FACES) or [UNKNOWN] * len(on_surfaces)
         faces = [
-            _description(number, surface, stated.measure or _measure(mesh, own, surface))
-            for number, (stated, (surface, own)) in enumerate(zip(known, on_surfaces, strict=True), start=1)
+            _description(number, surface, stated.measure or _measure(mesh, triangles, surface))
+            for number, (stated, (surface, triangles)) in enumerate(zip(stated_faces, on_surfaces, strict=True), start=1)
         ]
         if BREP in mesh.face_attributes:
             names = mesh.metadata.get(FACE_NAMES) or [""] * len(faces)
-            faces = [replace(face, name=name, copies=own.copies) for face, name, own in zip(faces, names, known, strict=True)]
+            faces = [
+                replace(face, name=name, copies=stated.copies)
+                for face, name, stated in zip(faces, names, stated_faces, strict=True)
+            ]
             wholes = _wholes(mesh, number_faces(mesh)[0], on_surfaces)
             faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
         mesh.metadata[DESCRIPTIONS] = tuple(faces)
@@ -109,8 +112,8 @@ def faces_on_surfaces(mesh: trimesh.Trimesh) -> Sequence[FaceOnSurface]:
         groups = np.split(order, np.searchsorted(number_of[order], np.arange(1, len(stated))))
         corners = np.asarray(mesh.triangles)
         surfaces = [
-            surface or (fit_surface(corners[own], FIT_TOLERANCE) if len(own) else None)
-            for own, surface in zip(groups, stated, strict=True)
+            surface or (fit_surface(corners[triangles], FIT_TOLERANCE) if len(triangles) else None)
+            for triangles, surface in zip(groups, stated, strict=True)
         ]
         mesh.metadata[ON_SURFACES] = tuple(zip(surfaces, groups, strict=True))
     return mesh.metadata[ON_SURFACES]  # type: ignore[no-any-return]
