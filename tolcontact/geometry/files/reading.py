@@ -118,7 +118,9 @@ def _load(texts: Mapping[Key, StepText | None], limits: reader.Limits) -> dict[K
         if coarsening > 1:
             for key, job in zip(keys, jobs, strict=True):
                 if not _is_too_fine(results[key]):
-                    log.warning('"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', job.path, job.chord)
+                    log.warning(
+                        '"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', job.path, job.chord
+                    )
         keys = [
             (path, chord) for path, chord in keys if chord is None and texts[path, chord] and _is_too_fine(results[path, chord])
         ]
