@@ -212,7 +212,6 @@ from tolcontact.declaration.feature_tolerance import (
     Position,
     Profile,
     Roundness,
-    Size,
     Straightness,
     Symmetry,
     TotalRunout,
@@ -223,6 +222,7 @@ from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import Tolerance
 
 __all__ = [

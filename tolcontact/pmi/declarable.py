@@ -3,7 +3,8 @@
 from typing import Any
 
 from tolcontact.declaration import feature_tolerance as declared
-from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance
+from tolcontact.declaration.size import Size
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
 
 _KINDS = {

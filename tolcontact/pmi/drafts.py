@@ -5,7 +5,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
