@@ -136,7 +136,7 @@ def _state(claim: Claim, draft: Draft) -> None:
                 raise Undeclared(
                     f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
                 )
-            draft.stated.append((claim, declarable.size(dimension, geometry.size)))
+            draft.stated.append((claim, declarable.size(dimension, geometry.size, is_inner=geometry.is_inner)))
         case tolerance:
             draft.stated.append((claim, declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))))
 
