@@ -45,6 +45,7 @@ from .declaration import (
     Tolerance as Tolerance,
     TotalRunout as TotalRunout,
     Variable as Variable,
+    degrees as degrees,
     three_two_one as three_two_one,
 )
 from .errors import (
