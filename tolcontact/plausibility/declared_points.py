@@ -15,7 +15,7 @@ from tolcontact.plausibility.trial_draws import TrialDraws
 
 FAR_SHARE = 0.25  # of a part's size: how far off its box a point may lie
 ON_SURFACE = 1e-4  # of a part's size
-AGAINST, ALONG = 0.5, 0.2  # cosines of the angle between a direction and the normal into the part
+OUTWARD, ALONG = 0.5, 0.2  # cosines of the angle between a direction and the normal into the part
 
 
 class DeclaredPoint(NamedTuple):
@@ -30,15 +30,13 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
     points = _declared_points(draws)
     for nominal in draws.program.nominal.parts:
         declared = points[nominal.part]
-        if not declared:
+        if not declared or _is_in_other_units(nominal, declared):
             continue
         positions = np.array([point.position for point in declared])
         size = float(nominal.mesh.scale)
         distances = _outside(positions, nominal.mesh.bounds)
         farthest = int(distances.argmax())
-        geometry = nominal.part.geometry
-        is_of_units = isinstance(geometry, Mesh) and probable_unit(positions, geometry, nominal.mesh)
-        if distances[farthest] <= FAR_SHARE * size or is_of_units:
+        if distances[farthest] <= FAR_SHARE * size:
             continue
         others = int((distances > FAR_SHARE * size).sum()) - 1
         yield (
@@ -53,7 +51,7 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each locator on its part's surface whose direction cannot be meant.
 
     These are directions along the surface that would point into the part if they were stated in the assembly frame, and
-    directions of one-sided locators that do not point into the part.
+    directions of one-sided locators that point out of the part.
     """
     for nominal in draws.program.nominal.parts:
         scheme = nominal.scheme
@@ -71,12 +69,22 @@ def unfit_directions(draws: TrialDraws) -> Iterator[str]:
                     f'{place}: the direction ({_row(direction)}) of locator "{locator.name}" lies along the surface of the '
                     f"part; directions are in the part's own frame: ({_row(R_WP.T @ direction)}) is this one of the assembly"
                 )
-            elif locator.one_sided and cosines.max() < AGAINST:
-                sense = "out of" if cosines.min() < -AGAINST else "along the surface of"
+            elif locator.one_sided and cosines.max() < -OUTWARD:
                 yield (
-                    f'{place}: the direction ({_row(direction)}) of the one-sided locator "{locator.name}" points {sense} the '
-                    "part, which it is to support; state the direction into the part"
+                    f'{place}: the direction ({_row(direction)}) of the one-sided locator "{locator.name}" points out of the '
+                    "part; it holds the part up along its direction, so state the one into the part"
                 )
+
+
+def parts_in_other_units(draws: TrialDraws) -> list[Part]:
+    """Return the parts of which a UnitsWarning says that their file is probably in other units."""
+    points, parts = _declared_points(draws), draws.program.nominal.parts
+    return [nominal.part for nominal in parts if _is_in_other_units(nominal, points[nominal.part])]
+
+
+def _is_in_other_units(nominal: NominalPart, declared: list[DeclaredPoint]) -> bool:
+    geometry, positions = nominal.part.geometry, np.array([point.position for point in declared])
+    return isinstance(geometry, Mesh) and bool(declared) and probable_unit(positions, geometry, nominal.mesh) is not None
 
 
 def _declared_points(draws: TrialDraws) -> "defaultdict[Part, list[DeclaredPoint]]":

@@ -9,6 +9,7 @@ from tolcontact.declaration import Size
 from tolcontact.declaration.values import is_length
 from tolcontact.discretization import NominalPart
 from tolcontact.errors import designation
+from tolcontact.plausibility.declared_points import parts_in_other_units
 from tolcontact.plausibility.designations import location_designation
 from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws
 
@@ -31,7 +32,10 @@ def rotations(draws: TrialDraws) -> Iterator[str]:
 
 def wide_tolerances(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each part with a zone that is wide beside it, or with locators too close together for theirs."""
+    in_other_units = parts_in_other_units(draws)
     for nominal in draws.program.nominal.parts:
+        if nominal.part in in_other_units:
+            continue
         place = location_designation(draws.program.nominal.assembly, nominal.part)
         size = float(np.ptp(nominal.mesh.bounds, axis=0).max())
         widths = _widths(nominal, place)

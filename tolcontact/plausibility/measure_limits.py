@@ -10,12 +10,15 @@ from tolcontact.declaration import Point
 from tolcontact.errors import designation
 from tolcontact.plausibility.trial_draws import TrialDraws, spread
 
-FAR_SIGMAS = 100.0  # limits this far from the nominal value cannot be exceeded
+FAR_SIGMAS = 100.0  # limits this far from the nominal value do not matter
+MIN_SHARE = 1e-6  # of that distance: smaller variation is rounding
 
 
 def measure_limits(draws: TrialDraws) -> Iterator[str]:
     """Yield a sentence for each measure whose limits exclude its nominal value, or lie too far from it to matter."""
     program = draws.program
+    is_floating = any(location.floating for location in program.nominal.assembly.locations)
+    pushed = math.inf if is_floating else sum(draws.pushes)
     for k, measure in enumerate(program.nominal.measures):
         nominal, limits = float(program.nominal_measures[k]), program.limits(k)
         if limits.are_open or not math.isfinite(nominal):
@@ -27,7 +30,7 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
             continue
         sigma = float(spread(draws.measured[:, k])) if len(draws.measured) else 0.0
         distance = min(side for side in (nominal - limits.lower, limits.upper - nominal) if math.isfinite(side))
-        if sigma > 0 and distance > FAR_SIGMAS * sigma:
+        if MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
             yield (
                 f"{place}: its {stated} are {distance / sigma:.2g} sigma away from its nominal value {_number(nominal)}; check "
                 "their units, and those of the tolerances"
