@@ -143,6 +143,12 @@ def _lay_out_group(contents: Contents, group: netCDF4.Group, values: Mapping[Arc
 
 def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, document: str) -> None:
     contents.add(group, terms.DECLARATION, document)
+    lines = [(number, line) for number, lines in enumerate(nominal.lines) for line in lines]
+    if lines:
+        group.createDimension(terms.MEASURE_LINE, len(lines))
+        group.createDimension(terms.LINE_END, 2)
+        contents.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
+        contents.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
     for part in nominal.parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")

@@ -41,30 +41,40 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
 
     Raises ModelError with a fault for each measurement that the faces do not have.
     """
-    numbers = {measure.name: number for number, measure in enumerate(nominal.measures)}
-    measurements: list[NominalMeasurement | None] = []
+    measurements: dict[str, NominalMeasurement | None] = {}
     faults = []
     for measure in nominal.measures:
+        measurements[measure.name] = None
         try:
-            is_declared = isinstance(measure.of, Measurement)
-            measurements.append(_with_numbers(measure.of, nominal, numbers) if is_declared else None)
+            if isinstance(measure.of, Measurement):
+                measurements[measure.name] = _with_numbers(measure.of, nominal, measurements)
         except GeometryFault as fault:
             faults.append(f"{designation('measure', measure)}: {fault}")
-            measurements.append(None)
     if faults:
         raise ModelError(nominal.assembly.name, faults)
-    return tuple(measurements)
+    return tuple(measurements.values())
 
 
-def _with_numbers(measurement: Any, nominal: Nominal, numbers: Mapping[str, int]) -> NominalMeasurement:
-    if isinstance(measurement, Combination):
-        operands = [
-            numbers[operand] if isinstance(operand, str) else _with_numbers(operand, nominal, numbers)
-            for operand in measurement.operands
-        ]
-        lines = [operand.lines for operand in operands if isinstance(operand, NominalMeasurement)]
-        return Combined(np.concatenate([NO_LINES, *lines]), measurement.kind, operands)
-    return BUILDERS[type(measurement)](measurement, nominal)
+def _with_numbers(measurement: Any, nominal: Nominal, earlier: Mapping[str, NominalMeasurement | None]) -> NominalMeasurement:
+    """Return a measurement; it may refer to the earlier measures by name."""
+    if not isinstance(measurement, Combination):
+        return BUILDERS[type(measurement)](measurement, nominal)
+    numbers = {name: number for number, name in enumerate(earlier)}
+    operands = [
+        numbers[operand] if isinstance(operand, str) else _with_numbers(operand, nominal, earlier)
+        for operand in measurement.operands
+    ]
+    lines = [_lines(nominal, operand, earlier) if isinstance(operand, int) else operand.lines for operand in operands]
+    return Combined(np.concatenate(lines), measurement.kind, operands)
+
+
+def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeasurement | None]) -> np.ndarray:
+    """Return the lines (line, 2, 3) that show a measure: of points one from the first to the last, which may be the same."""
+    measure = nominal.measures[number]
+    if (measurement := measurements[measure.name]) is not None:
+        return measurement.lines
+    ends = [nominal.position(point) for point in measure.points]
+    return np.array([[ends[0], ends[-1]]]) if ends else NO_LINES
 
 
 def _gap(gap: Gap, nominal: Nominal) -> Heights:

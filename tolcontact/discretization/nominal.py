@@ -236,6 +236,11 @@ class Nominal:
         return self.assembly.parts.index(part)
 
     @property
+    def lines(self) -> list[np.ndarray]:
+        """The lines (line, 2, 3) [mm] that show each measurement; none for measures of points and expressions."""
+        return [np.zeros((0, 2, 3)) if measurement is None else measurement.lines for measurement in self.measurements]
+
+    @property
     def meshes(self) -> Meshes:
         """The mesh of each part, in its own frame."""
         return {part.part: part.mesh for part in self.parts}
