@@ -119,10 +119,24 @@ class NominalMeasurement:
 
 
 @dataclass(frozen=True, eq=False)
+class Crossing:
+    """An edge (end, 3) [mm] of a first face that crosses one of a second face, seen along its outward normal.
+
+    sense   1 or -1, so that sense times the cross product of the edges points outward from the second face
+    """
+
+    first: MeasuredFace
+    second: MeasuredFace
+    edges: tuple[np.ndarray, np.ndarray]
+    sense: float
+
+
+@dataclass(frozen=True, eq=False)
 class Heights(NominalMeasurement):
-    """The least height of stations over walls."""
+    """The least height of stations over walls, and of edges over edges that they cross."""
 
     stations: Sequence[tuple[Station, Wall]]
+    crossings: Sequence[Crossing] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
+from scipy.optimize import lsq_linear
 from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.declaration import Angle, AxisDistance, Clearance, Combination, Face, Flush, Gap, Measurement
@@ -11,6 +12,7 @@ from tolcontact.discretization.measured_geometry import (
     Axis,
     AxisPair,
     Combined,
+    Crossing,
     DirectionPair,
     Heights,
     MeasuredFace,
@@ -24,15 +26,14 @@ from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault, ModelError, designation
 from tolcontact.geometry.analytic_surfaces import Cylinder
-from tolcontact.geometry.curvature import distinct, is_flat
+from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.faces import patch
-from tolcontact.geometry.overlap import overlap_corners
+from tolcontact.geometry.overlap import crossing_edges
 
 MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
 FACING = -0.5  # largest cosine between the outward normals of planes that face each other
-POINT_TOLERANCE = 1e-9  # of a face's size: corners that are no farther apart are one
 NO_LINES = np.zeros((0, 2, 3))
 
 
@@ -97,7 +98,7 @@ def _clearance(clearance: Clearance, nominal: Nominal) -> NominalMeasurement:
         return RoundClearance(np.array([[P_m, P_r]]), first, second, RoundPoints.of(points))
     if all(_is_outer_cylinder(face) for face in (first, second)):
         axes = first.axis, second.axis
-        return AxisPair(_nearest_line(*axes), *axes, is_between_surfaces=True)
+        return AxisPair(_nearest_places(first.axis.ends, second.axis.ends)[None], *axes, is_between_surfaces=True)
     kinds = " and ".join(_kind(face) for face in (first, second))
     raise GeometryFault(
         f"the clearance of {kinds} is not known; expected two planes, a ball or a shaft beside a wall that it may touch, or "
@@ -110,23 +111,26 @@ def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
         raise GeometryFault(
             f"its planes {first.face} and {second.face} do not face each other; choose planes with material behind both"
         )
-    stations = []
+    stations: list[tuple[Station, Wall]] = []
     for moving, reference in ((first, second), (second, first)):
         corners = np.asarray(moving.surface.mesh.vertices)[np.unique(rim(np.asarray(moving.surface.mesh.faces)))]
-        if moving is first:
-            corners = np.concatenate([corners, overlap_corners(first.surface, second.surface)])
-        corners = distinct(corners, POINT_TOLERANCE * moving.surface.mesh.scale)
         _, _, is_over = reference.surface.project(corners)
-        corners = _outline(corners[is_over], moving.plane.axis)
-        wall = Wall(reference.part, reference.plane, 1.0, reference.deviation)
-        stations += [(Station(moving.part, corner, moving.deviation, moving.plane.axis), wall) for corner in corners]
-    if not stations:
+        outward, wall = moving.plane.axis, Wall(reference.part, reference.plane, 1.0, reference.deviation)
+        corners = _outline(corners[is_over], outward)
+        stations += [(Station(moving.part, corner, moving.deviation, outward), wall) for corner in corners]
+    crossings = []
+    for edges in zip(*crossing_edges(first.surface, second.surface), strict=True):
+        p, q = (end - start for start, end in edges)
+        crossings.append(Crossing(first, second, edges, float(np.sign(np.cross(p, q) @ second.plane.axis))))
+    lines = [[station.position, wall.foot(station.position)] for station, wall in stations]
+    lines += [list(_nearest_places(*crossing.edges)) for crossing in crossings]
+    if not lines:
         raise GeometryFault(
             f"its planes {first.face} and {second.face} lie nowhere over each other; choose faces that overlap, or measure the "
             "gap of a point with tc.Gap"
         )
-    station, wall = min(stations, key=lambda pair: float(pair[1].surface.distance(pair[0].position[None])[0][0]))
-    return Heights(np.array([[station.position, wall.foot(station.position)]]), stations)
+    shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
+    return Heights(np.array([shortest]), stations, crossings)
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -152,7 +156,7 @@ def _axis_distance(distance: AxisDistance, nominal: Nominal) -> AxisPair:
     if distance.along is not None:
         foot = second.middle + ((first.middle - second.middle) @ second.direction) * second.direction
         return AxisPair(np.concatenate([lines, [[first.middle, foot]]]), first, second, along=np.array(distance.along))
-    return AxisPair(np.concatenate([lines, _nearest_line(first, second)]), first, second)
+    return AxisPair(np.concatenate([lines, [_nearest_places(first.ends, second.ends)]]), first, second)
 
 
 def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -210,18 +214,11 @@ def _kind(face: MeasuredFace) -> str:
     return f"{face.face} ({' and '.join(kinds) or ('plane' if is_flat(face.surface) else 'general surface')})"
 
 
-def _nearest_line(first: Axis, second: Axis) -> np.ndarray:
-    """Return the line (1, 2, 3) between the nearest places of two axes, each between its ends."""
-    p, q = first.ends[1] - first.ends[0], second.ends[1] - second.ends[0]
-    gap = second.middle - first.middle
-    shares, *_ = np.linalg.lstsq(np.column_stack([p, -q]), gap, rcond=MIN_SINE)
-    for _ in range(100):
-        shares = shares.clip(-0.5, 0.5)
-        t = (q @ (shares[0] * p - gap)) / max(float(q @ q), 1e-300)
-        t = min(max(float(t), -0.5), 0.5)
-        s = min(max(float(p @ (gap + t * q)) / max(float(p @ p), 1e-300), -0.5), 0.5)
-        shares = np.array([s, t])
-    return np.array([[first.middle + shares[0] * p, second.middle + shares[1] * q]])
+def _nearest_places(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the nearest places (2, 3) of two segments, given by their ends (2, 3); of parallel ones, any that are nearest."""
+    p, q = first[1] - first[0], second[1] - second[0]
+    nearest = lsq_linear(np.column_stack([p, -q]), second[0] - first[0], bounds=(0, 1))
+    return np.array([first[0] + nearest.x[0] * p, second[0] + nearest.x[1] * q])
 
 
 Builder = Callable[[Any, Nominal], NominalMeasurement]

@@ -9,6 +9,7 @@ import casadi as ca
 from tolcontact.discretization.measured_geometry import (
     AxisPair,
     Combined,
+    Crossing,
     DirectionPair,
     Heights,
     NominalMeasurement,
@@ -50,7 +51,18 @@ def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
 
 
 def _least_height(heights: Heights, observed: Observed) -> ca.SX:
-    return least(_height(station, wall, observed) for station, wall in heights.stations)
+    over_walls = [_height(station, wall, observed) for station, wall in heights.stations]
+    return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
+
+
+def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
+    """Return the height of an edge over one that it crosses: the distance of their lines along their common normal [mm]."""
+    first, second = (
+        [observed.pose(face.part, face.deviation).apply(ca.DM(end)) for end in edge]
+        for face, edge in zip((crossing.first, crossing.second), crossing.edges, strict=True)
+    )
+    n = crossing.sense * ca.cross(first[1] - first[0], second[1] - second[0])
+    return ca.dot(n, first[0] - second[0]) / ca.norm_2(n)
 
 
 def least(values: Any) -> ca.SX:
