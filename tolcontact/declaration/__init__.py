@@ -61,8 +61,10 @@ location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm ins
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
 locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
 
-`locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
-`fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.
+`locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
+a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
+that is not located must be `fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are
+rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
 have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
@@ -219,7 +221,7 @@ from tolcontact.declaration.feature_tolerance import (
 )
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
-from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
+from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
@@ -247,6 +249,7 @@ __all__ = [
     "Inside",
     "Largest",
     "LineProfile",
+    "Location",
     "Locator",
     "Measure",
     "Mesh",

@@ -102,16 +102,17 @@ class Assembly(Pictured):
         scheme: ThreeTwoOne | Sequence[Locator],
         *,
         tolerance: Any = None,
-        on: Part | None = None,
+        on: Part | Feature | None = None,
         floating: bool = False,
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
+        On a feature of another part, it also follows the deviations of that feature.
         `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], a Tolerance, or a frozen
         scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
-        _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
+        _expect(f'locate "{part.name}": on', on, Part | Feature | None, "a part, a feature of it, or None for the ground")
         scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
         for locator in scheme if isinstance(scheme, tuple) else ():
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
@@ -216,7 +217,7 @@ class Assembly(Pictured):
             yield from self._feature_faults(part)
         for location in self.locations:
             yield from _located("part", location.part, location.faults(), location.declared_at)
-            mentioned = location.part, location.on, *location.mentioned
+            mentioned = location.part, location.parent, *location.mentioned
             yield from self._unknown_parts(f'locators of "{location.part.name}"', location.declared_at, *mentioned)
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
@@ -275,7 +276,7 @@ class Assembly(Pictured):
                 return
             chain.append(support)
             location = self.location_of(support)
-            support = location.on if location else None
+            support = location.parent if location else None
 
     def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:
@@ -311,7 +312,7 @@ def has_supports(assembly: Assembly, part: Part) -> bool:
 def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
     """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself."""
     location = assembly.location_of(part)
-    supports = movers(assembly, location.on) if location and location.on else ()
+    supports = movers(assembly, location.parent) if location and location.parent else ()
     touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or has_supports(assembly, part)
     return (*supports, part) if touches and is_free(assembly, part) else supports
 

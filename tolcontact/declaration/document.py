@@ -25,6 +25,7 @@ from tolcontact.declaration.face_entry import (
     Document,
     Wrapped,
     Writing,
+    feature_named,
     floats,
     indices_of,
     text_type,
@@ -67,6 +68,21 @@ def _file(name: str, place: Place) -> Path:
     if place.sources.folder is None:
         raise place.error("an archive names no files; expected that of a part with a mesh, or with a box")
     return place.sources.folder / name
+
+
+def _ground_entries(location: Location, writing: Writing) -> Document:
+    feature = {"on_feature": location.on.name} if isinstance(location.on, Feature) else {}
+    return {"on": location.parent and location.parent.name, **feature}
+
+
+def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
+    """Return the part that locators are on, or the feature of it; None for the ground."""
+    part = Optional(CODECS[Part]).decode(entries.get("on"), place["on"])
+    if "on_feature" not in entries:
+        return part  # type: ignore[no-any-return]
+    if part is None:
+        raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
+    return feature_named(entries["on_feature"], replace(place["on_feature"], part=part))
 
 
 def _distribution_entries(thing: Any, writing: Writing) -> Document:
@@ -178,6 +194,7 @@ METHOD = Record(
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
+GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
     {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
@@ -189,7 +206,7 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
+    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
