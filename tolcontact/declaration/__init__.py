@@ -198,7 +198,7 @@ assembly without running any code of the script. Functions of poses are kept as 
 contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
-from tolcontact.declaration.assembly import Assembly, has_supports, is_free, movers
+from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
@@ -223,6 +223,7 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.tolerance import Tolerance

@@ -1,4 +1,4 @@
-"""The assembly: it collects declarations in the order of a script, and knows which parts contact may move."""
+"""The assembly: it collects declarations in the order of a script."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -20,6 +20,7 @@ from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -135,6 +136,29 @@ class Assembly(Pictured):
             _expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         sides = face_of(moving), face_of(reference)
         return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line()))
+
+    def fasten(
+        self,
+        name: str,
+        fastener: Part | Face | Feature | Size | float,
+        *,
+        through: Sequence[Face | Feature],
+        into: Face | Feature | None = None,
+        seat: Face | Feature | None = None,
+        pushed: Any = None,
+    ) -> Part:
+        """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
+
+        fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
+        through    the holes that it passes through, from its head on
+        into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
+        seat       the plane under its head
+        pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
+
+        Raises ModelError if the fastener does not fit into the nominal assembly.
+        """
+        part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed)
+        return part
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
@@ -289,32 +313,6 @@ class Assembly(Pictured):
         declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
         rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
-
-
-def is_free(assembly: Assembly, part: Part) -> bool:
-    """Return True if contact may move the part.
-
-    Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators.
-    """
-    if part.fixed is not None:
-        return not part.fixed
-    location = assembly.location_of(part)
-    floats = location is not None and location.floating
-    return floats or any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
-
-
-def has_supports(assembly: Assembly, part: Part) -> bool:
-    """Return True if a locator of the part is one-sided."""
-    location = assembly.location_of(part)
-    return location is not None and isinstance(location.scheme, tuple) and any(pin.one_sided for pin in location.scheme)
-
-
-def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
-    """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself."""
-    location = assembly.location_of(part)
-    supports = movers(assembly, location.parent) if location and location.parent else ()
-    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or has_supports(assembly, part)
-    return (*supports, part) if touches and is_free(assembly, part) else supports
 
 
 def _expect(label: str, value: Any, kind: Any, expected: str) -> None:
