@@ -10,7 +10,8 @@ Lengths are in mm, angles in rad, forces in N. Points, faces and locators are gi
 
 `part(name, shape, at=..., rotation=...)` places a shape in the nominal assembly: the point p of its own frame lies at
 `rotation * p + at`, where `rotation` is a rotation vector. A shape is a `tc.Box(x, y, z)`, which reaches from the origin of
-its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
+its frame to (x, y, z), a `tc.Pin(diameter, length)` about the z axis, from -length to 0, or a `tc.Mesh(source)`, a triangle
+surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
 `trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.geometry`).
 
 >>> base = clamp.part("base", tc.Box(100, 50, 10), fixed=True)
@@ -220,7 +221,7 @@ from tolcontact.declaration.feature_tolerance import (
     TotalRunout,
 )
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.mobility import has_supports, is_free, movers
@@ -247,6 +248,7 @@ __all__ = [
     "Flatness",
     "Force",
     "GeometricTolerance",
+    "Geometry",
     "Inside",
     "Largest",
     "LineProfile",
@@ -260,6 +262,7 @@ __all__ = [
     "Pattern",
     "Perpendicularity",
     "Picked",
+    "Pin",
     "Point",
     "Population",
     "Position",

@@ -14,7 +14,7 @@ from tolcontact.declaration.contributor import (
 )
 from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
@@ -86,14 +86,14 @@ class Assembly(Pictured):
     def part(
         self,
         name: str,
-        geometry: Box | Mesh,
+        geometry: Geometry,
         *,
         at: Any = (0, 0, 0),
         rotation: Any = (0, 0, 0),
         fixed: bool | None = None,
     ) -> Part:
         """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
-        _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
+        _expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
 

@@ -32,7 +32,7 @@ from tolcontact.declaration.face_entry import (
 )
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import UNITS, Box, Mesh
+from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
@@ -168,8 +168,9 @@ TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
-    "a box, or a file",
+    "a box, a pin, or a file",
     Record(Box, "box=x+y+z", mark="box"),
+    Record(Pin, "pin=diameter+length head?", mark="pin"),
     Record(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
         chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Locator, Mesh, Part, Size
+from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Locator, Part, Pin, Size
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
@@ -15,7 +15,7 @@ from tolcontact.fasteners.checks import check_types, reference_faults
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
 from tolcontact.fasteners.placed_faces import PlacedCylinder, meshes_of, placed_cylinder, placed_plane, placement
 from tolcontact.geometry.faces import face_area
-from tolcontact.geometry.fastener_shape import HEAD_WIDTH, fastener_shape
+from tolcontact.geometry.pin_shape import HEAD_WIDTH
 
 DIGITS = 12  # of the place of a made part: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature
@@ -98,9 +98,9 @@ def _made_part(assembly: Assembly, name: str, size: Size | float, fit: Fit) -> P
     """Declare the part of a fastener that is known by its diameter: its origin is under its head, and z points to the head."""
     x, y = fit.axis.across
     rotation = Rotation.from_matrix(np.column_stack([x, y, fit.axis.head])).as_rotvec()
-    shape = fastener_shape(2 * fit.radius, fit.reach[1] - fit.reach[0], has_head=fit.seat is not None)
+    shape = Pin(2 * fit.radius, round(fit.reach[1] - fit.reach[0], DIGITS), fit.seat is not None)
     at, turn = (np.round(vector, DIGITS) + 0.0 for vector in (fit.axis.origin, rotation))
-    part = assembly.part(name, Mesh(shape, units="mm"), at=at, rotation=turn)
+    part = assembly.part(name, shape, at=at, rotation=turn)
     if isinstance(size, Size):
         part.feature("shank", _shank_face(part, fit), size)
     return part

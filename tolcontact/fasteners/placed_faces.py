@@ -7,7 +7,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Box, Cylinder as CylinderSelection, Face, Mesh, Part
+from tolcontact.declaration import Cylinder as CylinderSelection, Face, Geometry, Part
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.brep_face import describe_faces
@@ -135,6 +135,6 @@ def meshes_of(face: Face) -> Meshes:
 
 
 @lru_cache(SHAPES)
-def shape_of(geometry: Box | Mesh) -> Shape:
+def shape_of(geometry: Geometry) -> Shape:
     """Return the triangles of a geometry, which are read once for several fasteners."""
     return shape(geometry)
