@@ -45,6 +45,7 @@ from .declaration import (
     Part as Part,
     Pattern as Pattern,
     Perpendicularity as Perpendicularity,
+    Pin as Pin,
     Point as Point,
     Position as Position,
     Profile as Profile,

@@ -25,13 +25,14 @@ from tolcontact.declaration.face_entry import (
     Document,
     Wrapped,
     Writing,
+    feature_named,
     floats,
     indices_of,
     text_type,
 )
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import UNITS, Box, Mesh
+from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
@@ -70,6 +71,21 @@ def _file(name: str, place: Place) -> Path:
     if place.sources.folder is None:
         raise place.error("an archive names no files; expected that of a part with a mesh, or with a box")
     return place.sources.folder / name
+
+
+def _ground_entries(location: Location, writing: Writing) -> Document:
+    feature = {"on_feature": location.on.name} if isinstance(location.on, Feature) else {}
+    return {"on": location.parent and location.parent.name, **feature}
+
+
+def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
+    """Return the part that locators are on, or the feature of it; None for the ground."""
+    part = Optional(CODECS[Part]).decode(entries.get("on"), place["on"])
+    if "on_feature" not in entries:
+        return part  # type: ignore[no-any-return]
+    if part is None:
+        raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
+    return feature_named(entries["on_feature"], replace(place["on_feature"], part=part))
 
 
 def _distribution_entries(thing: Any, writing: Writing) -> Document:
@@ -154,8 +170,9 @@ TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
-    "a box, or a file",
+    "a box, a pin, or a file",
     Record(Box, "box=x+y+z", mark="box"),
+    Record(Pin, "pin=diameter+length head?", mark="pin"),
     Record(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
         chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],
@@ -180,6 +197,7 @@ METHOD = Record(
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
+GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
     {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
@@ -191,7 +209,7 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
+    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
