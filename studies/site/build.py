@@ -44,7 +44,6 @@ def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
     plotter = tc.plot.assembly(results, opacity=0.6)
     plotter.camera.zoom(1.3)
     picture = Image.fromarray(plotter.screenshot(None, return_img=True, window_size=PICTURE))
-    picture = Image.fromarray(plotter.screenshot(None, return_img=True, window_size=PICTURE))
     picture.save(folder / f"{path.stem}.webp", quality=70)
     plotter.close()
     summary = results.tolcontact.summary()
