@@ -274,7 +274,7 @@ from tolcontact.declaration.measurement import (
     Minimum,
     Sum,
     stations,
-)  # fmt: skip
+)
 from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles

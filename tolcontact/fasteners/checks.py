@@ -66,7 +66,7 @@ def _push_faults(assembly: Assembly, holes: Mapping[str, Face], pushed: Any) -> 
     force = vector(pushed)
     if not (is_finite(force) and any(force)):
         yield f"pushed is {pushed!r}; expected a force (x, y, z) in N that is not zero"
-    if INTO in holes:
+    elif INTO in holes:
         yield f"pushed has no effect on a fastener that the hole in {INTO} holds; leave it out, or push a part"
     elif assembly.method is None or assembly.method.objective != "seating":
         yield (

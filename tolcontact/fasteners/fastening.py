@@ -13,11 +13,11 @@ from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
 from tolcontact.fasteners.checks import check_types, reference_faults
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
-from tolcontact.fasteners.placed_faces import PlacedCylinder, meshes_of, placed_cylinder, placed_plane, placement
+from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placed_cylinder, placed_plane, placement
 from tolcontact.geometry.faces import face_area
 from tolcontact.geometry.pin_shape import HEAD_WIDTH
 
-DIGITS = 12  # of the place of a made part: what is beyond is rounding
+DIGITS = 12  # of places [mm]: what is beyond is rounding
 SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature
 
 
@@ -129,7 +129,7 @@ def _locate(assembly: Assembly, name: str, part: Part, fit: Fit) -> None:
         assembly.locate(part, list(_press_locators(part, fit)), on=ground)
     elif fit.seat is not None:
         ground = _feature_of(fit.seat.face, f"{name} seat")
-        assembly.locate(part, list(_seat_locators(part, fit)), on=ground, floating=True)
+        assembly.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
     else:
         first = next(iter(fit.holes.values()))
         end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
@@ -147,26 +147,26 @@ def _press_locators(part: Part, fit: Fit) -> Iterator[Locator]:
     yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius * x, y)
 
 
-def _seat_locators(part: Part, fit: Fit) -> Iterator[Locator]:
-    """Yield three locators under the head, which keep it flat on its seat."""
-    assert fit.seat is not None
+def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:
+    """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor leans."""
     x, y = fit.axis.across
-    middle, arm = fit.axis.at(fit.axis.station(fit.seat.point)), HEAD_WIDTH * fit.radius
+    middle, arm = fit.axis.at(fit.axis.station(seat.point)), HEAD_WIDTH * fit.radius
     for number in range(3):
         angle = 2 * math.pi * number / 3
         foot = middle + arm * (math.cos(angle) * x + math.sin(angle) * y)
-        yield _locator(part, f"seat {number + 1}", foot, fit.axis.head)
+        for name, direction in (("seat", fit.axis.head), ("clamp", -fit.axis.head)):
+            yield _locator(part, f"{name} {number + 1}", foot, direction, one_sided=True)
 
 
-def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray) -> Locator:
+def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray, *, one_sided: bool = False) -> Locator:
     R, _ = placement(part)
-    return Locator(name, _in_part(part, point), direction @ R, 0.0)
+    return Locator(name, _in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
 
 
 def _in_part(part: Part, point: np.ndarray) -> np.ndarray:
     """Return a point (3,) of the nominal assembly in the frame of a part."""
     R, t = placement(part)
-    return np.asarray((point - t) @ R)
+    return np.round((point - t) @ R, DIGITS) + 0.0
 
 
 def _feature_of(face: Face, name: str) -> Feature:

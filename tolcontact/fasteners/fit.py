@@ -37,10 +37,11 @@ class Fit:
 
     def faults(self) -> Iterator[str]:
         """Yield why the shank does not stand in its holes, or its head on the seat."""
-        for label, hole in self.holes.items():
-            yield from self._hole_faults(label, hole)
         if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > MAX_LEAN:
             yield f"{SEAT}: face {self.seat.face} is not square to the axis of the holes; expected the plane under the head"
+            return
+        for label, hole in self.holes.items():
+            yield from self._hole_faults(label, hole)
 
     def _hole_faults(self, label: str, hole: PlacedCylinder) -> Iterator[str]:
         clearance, offset, (low, high) = hole.radius - self.radius, hole.offset(self.axis), hole.extent(self.axis)
