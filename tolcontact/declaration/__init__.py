@@ -172,7 +172,7 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
 | `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
-| `tc.AxisDistance(..., across="z")` | at the middle of the first axis: in the plane across a direction; `along="x"` one component |
+| `tc.AxisDistance(..., across="z")` | across a direction, at the middle of the first axis; `along="x"`: one component |
 | `tc.Angle(face, face)` | angle of planes or axes, from 0 on; with `about="y"` its sign, positive if turned counterclockwise |
 | `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
 | `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
