@@ -19,7 +19,7 @@ def summary(
     archive: Archive,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Print only shares outside of limits, and capability.")] = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Print only shares out of specification, and capability.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)

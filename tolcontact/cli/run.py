@@ -75,7 +75,7 @@ def run(
     scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate a model with and without contact, and print the statistics of its measures.
+    """Simulate a model with and without contact, and print the statistics of its measurements.
 
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.

@@ -87,7 +87,7 @@ without naming it.
 >>> top = cover.feature("top", cover.face("+z"), tc.Parallelism(0.05, "A"), tc.Profile(0.2, "A"))
 >>> width = cover.feature("width", cover.face("+x"), cover.face("-x"), tc.Size(60, 0.1, -0.05))
 >>> print(top)
-feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
+feature top of cover: cover +z; parallelism 0.05 A; profile 0.2 A
 >>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
 
 `part.pattern("H", face, face, ..., tolerances...)` declares several like features with common tolerances, such as holes.

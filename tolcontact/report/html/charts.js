@@ -23,7 +23,7 @@ function chart(title, into = byId("charts")) {
 }
 
 const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
-const STATES = ["raw", "corrected"];
+const STATES = data.states;
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
 const limits = (measure) => measure.limits.filter((limit) => limit !== null).map((limit) => ({

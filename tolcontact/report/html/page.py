@@ -15,13 +15,14 @@ from tolcontact.declaration import Assembly
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
-from tolcontact.report.figures import grouped, limits_text
+from tolcontact.report.figures import grouped
 from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
+from tolcontact.report.results_table import result_columns, result_rows
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import contact_lines, measure_rows, notes, overview_cells, pair_columns, pair_rows
-from tolcontact.vocabulary import STATES
+from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
+from tolcontact.vocabulary import STATE_WORDS
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
@@ -64,7 +65,7 @@ def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
         "title": summary.attrs["title"],
         "realizations": grouped(summary.attrs["realizations"]),
         "begun": grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
-        "overview": _overview(summary),
+        "results": _results(summary),
         "details": _details(summary),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
         "pairs": {"columns": pair_columns(summary), "rows": pair_rows(summary)} if summary.sizes["pair"] else None,
@@ -128,13 +129,15 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
 
 def summary_table(summary: xr.Dataset) -> str:
     """Return the overview of a summary as a table outside of a page."""
-    return _template("overview").render(overview=_overview(summary))
+    return _template("overview").render(results=_results(summary))
 
 
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
+    data |= {"states": STATE_WORDS}
     return _template(kind).render(
+        states=STATE_WORDS,
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
         generator=markupsafe.Markup(GENERATOR),
@@ -170,15 +173,8 @@ def _plain_json(data: Any, **_: Any) -> str:
     return json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def _overview(summary: xr.Dataset) -> list[dict[str, Any]]:
-    rows = []
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        units, limits = str(measure["measure_units"].values), limits_text(measure)
-        for state in STATES:
-            cells = overview_cells(measure["statistic_value"].sel(state=state))
-            rows.append({"measure": str(name), "units": units, "limits": limits, "state": state, "cells": cells})
-    return rows
+def _results(summary: xr.Dataset) -> dict[str, Any]:
+    return {"columns": result_columns(summary), "rows": result_rows(summary)}
 
 
 def _details(summary: xr.Dataset) -> list[dict[str, Any]]:

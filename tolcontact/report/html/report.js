@@ -31,9 +31,9 @@ function drive(viewer) {
     const own = Array.from(gaps.values.subarray((k * 2 + seen) * pairs, (k * 2 + seen + 1) * pairs));
     const values = data.charts.map((chart, m) => {
       const at = (s) => figure(measured.values[(k * 2 + s) * data.charts.length + m]);
-      return `${chart.name}: raw ${at(RAW)}, corrected ${at(CORRECTED)} ${chart.units}`;
+      return `${chart.name}: ${STATES[RAW]} ${at(RAW)}, ${STATES[CORRECTED]} ${at(CORRECTED)} ${chart.units}`;
     });
-    const deepest = pairs ? `smallest gap, ${seen ? "corrected" : "raw"}: ${figure(Math.min(...own))} mm` : "no contact pairs";
+    const deepest = pairs ? `smallest gap, ${STATES[seen]}: ${figure(Math.min(...own))} mm` : "no contact pairs";
     byId("said").textContent = [
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
@@ -79,7 +79,7 @@ function histogram(measure) {
   });
   const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
   shown.shapes = limits(measure);
-  Plotly.newPlot(chart(`Histogram of ${measure.name}, raw and corrected`), traces, shown, SETTINGS);
+  Plotly.newPlot(chart(`Histogram of ${measure.name}, ${STATES.join(" and ")}`), traces, shown, SETTINGS);
 }
 
 function settling(measure) {
@@ -119,7 +119,7 @@ function contributions(of) {
   Object.assign(shown, { barmode: "group", bargap: 0.25, height: 140 + 34 * groups.length });
   shown.margin.l = 12;
   shown.yaxis.automargin = true;
-  const box = chart(`Contributions to the variance of ${of.measure}, raw and corrected`, byId("shares"));
+  const box = chart(`Contributions to the variance of ${of.measure}, ${STATES.join(" and ")}`, byId("shares"));
   box.style.height = `${shown.height}px`;
   Plotly.newPlot(box, traces, shown, SETTINGS);
 }
