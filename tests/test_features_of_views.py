@@ -227,8 +227,6 @@ def test_odd_names_of_features_are_texts(tmp_path, open_page):  # noqa: F811
     page = open_page(tmp_path / "odd.html")
     buttons, headings = page.locator("#toleranced button"), page.locator("#toleranced h3")
     for k, name in enumerate(names):
-        assert (
-            buttons.nth(k).inner_text() == f"feature {name}\nflatness 0.1" and headings.nth(k).inner_text() == f"part {name}"
-        )
+        assert buttons.nth(k).inner_text() == f"feature {name}\nflatness 0.1" and headings.nth(k).inner_text() == f"part {name}"
         buttons.nth(k).click()
         assert page.locator("#said").inner_text() == f"part {name}\nfeature {name}\nflatness 0.1"

@@ -42,6 +42,7 @@ from .declaration import (
     Size as Size,
     Straightness as Straightness,
     Symmetry as Symmetry,
+    TitleBlock as TitleBlock,
     Tolerance as Tolerance,
     TotalRunout as TotalRunout,
     Variable as Variable,

@@ -223,6 +223,7 @@ from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 
 __all__ = [
@@ -265,6 +266,7 @@ __all__ = [
     "Straightness",
     "Symmetry",
     "ThreeTwoOne",
+    "TitleBlock",
     "Tolerance",
     "TotalRunout",
     "Triangles",

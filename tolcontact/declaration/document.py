@@ -29,13 +29,14 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
+from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, GeometricTolerance, Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
@@ -178,6 +179,7 @@ METHOD = Record(
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
+TITLE_BLOCK = Record(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
     {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
@@ -210,6 +212,7 @@ RECORDS = {
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
+    ("title_block", TITLE_BLOCK.wire | None, None),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
@@ -220,7 +223,16 @@ def to_document(
     """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
     writing = Writing(triangles, tapes, folder)
     lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
-    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **lists}
+    titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
+    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **lists}
+
+
+def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
+    """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
+    try:
+        return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
+    except EntryError as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
@@ -262,7 +274,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
-    assembly = Assembly(struct.name, method=method).replaced(**things)
+    title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
+    assembly = Assembly(struct.name, method=method, title_block=title_block).replaced(**things)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly
