@@ -4,6 +4,8 @@ import math
 
 import xarray as xr
 
+from tolcontact.vocabulary import ROUNDED
+
 MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
 NO_INTERVAL = "[-]"
@@ -26,6 +28,11 @@ def plain(value: float, scale: float | None = None) -> str:
     allowed = NOISE * (scale or abs(value))
     decimals = next((d for d in range(MAX_DECIMALS + 1) if abs(round(value, d) - value) <= allowed), None)
     return f"{value:.6g}" if decimals is None else f"{_rounded(value, decimals):.{decimals}f}"
+
+
+def settled(penetration: float) -> float:
+    """Return a penetration [mm], or 0 where it is rounding."""
+    return penetration if penetration > ROUNDED else 0.0
 
 
 def limits_text(measure: xr.Dataset) -> str:

@@ -26,6 +26,20 @@ const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove:
 const STATES = data.states;
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
-const limits = (measure) => measure.limits.filter((limit) => limit !== null).map((limit) => ({
-  type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: "#d01c1c", width: 2 },
-}));
+/** Lines at the limits of a measurement, each with its value above it; a limit far outside widens the axis. */
+function showLimits(shown, measure) {
+  const names = ["lower limit", "upper limit"];
+  const known = measure.limits.map((limit, k) => ({ limit, name: names[k] })).filter((each) => each.limit !== null);
+  shown.shapes = known.map(({ limit }) => ({
+    type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: "#d01c1c", width: 2 },
+  }));
+  shown.annotations = known.map(({ limit, name }) => ({
+    x: limit, y: 1, yref: "paper", yanchor: "bottom", xanchor: name === names[0] ? "right" : "left", showarrow: false,
+    text: `${name} ${figure(limit)}`, font: { color: "#d01c1c", size: 11 },
+  }));
+}
+
+/** Charts are drawn in the colours of the page, but printed in black. */
+const ink = (colour) => document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, { "font.color": colour }));
+window.addEventListener("beforeprint", () => ink("#1a1c1f"));
+window.addEventListener("afterprint", () => ink(getComputedStyle(document.body).color));

@@ -2,6 +2,7 @@
 // The report: fields and single realizations in the scene, and charts with plotly.
 
 const OF_CONTACT = ["touching", "reaction"];
+const MOST_PORTRAITS = 40;
 
 function drive(viewer) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
@@ -62,7 +63,9 @@ function drive(viewer) {
 
 // --- charts ----------------------------------------------------------------------------------------------------------
 
-function histogram(measure) {
+const placeOf = (number, name) => document.querySelector(`[data-measure="${number}"] .${name}`);
+
+function histogram(measure, into) {
   if (!measure.edges.length) return;
   const name = escaped(measure.name), width = measure.edges[1] - measure.edges[0];
   const middles = measure.edges.slice(0, -1).map((edge) => edge + width / 2);
@@ -77,12 +80,43 @@ function histogram(measure) {
     const y = x.map((value) => (total * width * Math.exp(-(((value - mean) / sigma) ** 2) / 2)) / (sigma * Math.sqrt(2 * Math.PI)));
     traces.push({ type: "scatter", mode: "lines", name: `normal, ${STATES[s]}`, x, y, line: { color: COLOURS[s], dash: "dot" }, hoverinfo: "skip" });
   });
-  const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
-  shown.shapes = limits(measure);
-  Plotly.newPlot(chart(`Histogram of ${measure.name}, ${STATES.join(" and ")}`), traces, shown, SETTINGS);
+  const shown = layout("", `${name} [${escaped(measure.units)}]`, "realizations");
+  Object.assign(shown, { margin: { ...shown.margin, t: 76 }, legend: { orientation: "h", y: 1.08, yanchor: "bottom", x: 0 } });
+  showLimits(shown, measure);
+  Plotly.newPlot(chart(`Histogram of ${measure.name}, ${STATES.join(" and ")}`, into), traces, shown, SETTINGS);
 }
 
-function settling(measure) {
+/** Linear shares of the contributors of a measurement, the largest above. */
+function contributors(measure, into) {
+  const bars = measure.contributors.toReversed();
+  if (!bars.length) return into.remove();
+  const of = (k) => bars.map((bar) => bar.share[k]);
+  const [share, low, high] = [0, 1, 2].map(of);
+  const traces = [{
+    type: "bar", orientation: "h", y: bars.map((bar) => escaped(bar.name)), x: share.map((x) => Math.max(x, 0)), marker: { color: COLOURS[1] },
+    error_x: { type: "data", symmetric: false, array: high.map((x, k) => x - share[k]), arrayminus: low.map((x, k) => Math.max(share[k], 0) - Math.max(x, 0)), thickness: 1 },
+    hovertemplate: "%{y}: %{x:.1f} %<extra></extra>",
+  }];
+  const shown = layout("Contributors, with contact", "% of variance", "");
+  Object.assign(shown, { showlegend: false, bargap: 0.3 });
+  Object.assign(shown.margin, { l: 12, t: 36 });
+  Object.assign(shown.yaxis, { automargin: true, type: "category" });
+  shown.xaxis.rangemode = "nonnegative";
+  Plotly.newPlot(chart(`Contributors to the variance of ${measure.name}`, into), traces, shown, SETTINGS);
+}
+
+/** The place of a measurement on the assembly. */
+function portrait(viewer, measure, into) {
+  const marks = data.scene.measures.find((mark) => mark.name === measure.name);
+  if (!marks) return;
+  const image = document.createElement("img");
+  image.alt = `The points of ${measure.name} on the assembly`;
+  image.src = viewer.portrait(marks);
+  into.append(image);
+  into.hidden = false;
+}
+
+function settling(measure, into) {
   const name = escaped(measure.name);
   const traces = measure.states.flatMap((own, s) => {
     const { shape, values } = unpacked(own.settling);
@@ -94,7 +128,7 @@ function settling(measure) {
   });
   const shown = layout(`${name}: mean with its 95 % interval`, "realizations", escaped(measure.units));
   shown.xaxis.type = "log";
-  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
+  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`, into), traces, shown, SETTINGS);
 }
 
 /** Shares of variance by contributor: total Sobol' indices of both states, with intervals, and linear percentages. */
@@ -151,17 +185,21 @@ function relations() {
   draw();
 }
 
-for (const measure of data.charts) {
-  histogram(measure);
-  settling(measure);
-}
-data.contributions.forEach(contributions);
-relations();
+// Pictures come first: charts take the room that these leave.
 try {
   window.viewer = new Viewer(data.scene);
+  data.charts.slice(0, MOST_PORTRAITS).forEach((measure, number) => portrait(window.viewer, measure, placeOf(number, "portrait")));
   control(window.viewer);
   drive(window.viewer);
 } catch (error) {
   byId("scene").replaceWith(`The assembly cannot be drawn here: ${error.message}`);
   console.warn(error);
 }
+data.charts.forEach((measure, number) => {
+  histogram(measure, placeOf(number, "histogram"));
+  contributors(measure, placeOf(number, "contributors"));
+  const fold = placeOf(number, "convergence");
+  fold.addEventListener("toggle", () => settling(measure, fold), { once: true });
+});
+data.contributions.forEach(contributions);
+relations();

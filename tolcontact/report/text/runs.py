@@ -12,7 +12,7 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.analysis_tables import analysis_report
-from tolcontact.report.figures import grouped, number, percent
+from tolcontact.report.figures import grouped, number, percent, settled
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
     OTHER_DRAWS,
@@ -96,7 +96,7 @@ def change_rows(measure: xr.Dataset) -> list[list[str]]:
 
 
 def _depth(run: xr.Dataset, state: str) -> str:
-    return f"{float(run['penetration'].sel(state=state)):.3g}"
+    return f"{settled(float(run['penetration'].sel(state=state))):.3g}"
 
 
 def comparison_text(comparison: xr.Dataset) -> Group:

@@ -9,7 +9,7 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
-from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, share
+from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
 from tolcontact.report.results_table import overview_columns, overview_rows, verdict_lines
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
@@ -178,7 +178,7 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
         yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
     if doubtful := by_status["doubtful"]:
         yield f"doubtful: {doubtful} of {count} answers lie too far from the pose without contact to be certified"
-    raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
+    raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
@@ -194,7 +194,7 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
-        yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
+        yield f"largest penetration between surfaces: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit:
             share = percent(summary["penetrating_share"].values)
             yield f"penetration between surfaces above {NOTICED_SHARE:.0%} of the smallest tolerance: {share} of realizations"
