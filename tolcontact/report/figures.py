@@ -4,7 +4,7 @@ import math
 
 import xarray as xr
 
-from tolcontact.vocabulary import ROUNDED
+from tolcontact.limits import GAP_ACCURACY
 
 MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
@@ -32,7 +32,7 @@ def plain(value: float, scale: float | None = None) -> str:
 
 def settled(penetration: float) -> float:
     """Return a penetration [mm], or 0 where it is rounding."""
-    return penetration if penetration > ROUNDED else 0.0
+    return penetration if penetration > GAP_ACCURACY else 0.0
 
 
 def limits_text(measure: xr.Dataset) -> str:

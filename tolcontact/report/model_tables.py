@@ -48,7 +48,13 @@ def model_tables(results: xr.DataTree) -> list[ModelTable]:
         tables = [make(document, results) for make in makers]
     except (LookupError, TypeError, ValueError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
-    return [table for table in tables if table.rows]
+    return [_filled(table) for table in tables if table.rows]
+
+
+def _filled(table: ModelTable) -> ModelTable:
+    """Return a table without columns that are empty in all rows."""
+    kept = [k for k in range(len(table.columns)) if any(row[k] not in (None, "") for row in table.rows)]
+    return ModelTable(table.title, [table.columns[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
 
 
 def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
@@ -127,12 +133,16 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
         nominal = plain(float(root[terms.MEASURE_NOMINAL.name].values[k]), scale)
         rows.append(
             [
-                measure["name"], _end(measure["of"]) if "of" in measure else "expression of the poses", _end(measure.get("to")), along, str(measure["units"]),
+                measure["name"], _of(measure), _end(measure.get("to")), along, str(measure["units"]),
                 *(float(text) if text else None for text in (nominal, plain(lower, scale), plain(upper, scale))),
             ]
         )  # fmt: skip
     columns = [terms.MEASUREMENT, "of", "to", "along", "units", "nominal", "lower limit", "upper limit"]
     return ModelTable("Measurements", columns, rows)
+
+
+def _of(measure: Entry) -> str:
+    return _end(measure["of"]) if "of" in measure else "expression of the poses"
 
 
 def _end(point: Entry | None) -> str:

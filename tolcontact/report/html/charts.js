@@ -35,11 +35,19 @@ function showLimits(shown, measure) {
   }));
   shown.annotations = known.map(({ limit, name }) => ({
     x: limit, y: 1, yref: "paper", yanchor: "bottom", xanchor: name === names[0] ? "right" : "left", showarrow: false,
-    text: `${name} ${figure(limit)}`, font: { color: "#d01c1c", size: 11 },
+    text: `${name} ${figure(limit)}`, font: { color: "#e5484d", size: 11 },
   }));
 }
 
-/** Charts are drawn in the colours of the page, but printed in black. */
-const ink = (colour) => document.querySelectorAll(".js-plotly-plot").forEach((box) => Plotly.relayout(box, { "font.color": colour }));
-window.addEventListener("beforeprint", () => ink("#1a1c1f"));
-window.addEventListener("afterprint", () => ink(getComputedStyle(document.body).color));
+/** Charts are drawn in the colours and the widths of the window, but printed in black, as wide as paper; settings are unfolded. */
+const PAPER = [[".pictures .histogram", 520, 220], [".pictures .contributors", 520, 165], ["", 690, 300]]; // parent, px, px
+function relayout(isPrinted) {
+  const ink = isPrinted ? "#1a1c1f" : getComputedStyle(document.body).color;
+  document.querySelectorAll(".js-plotly-plot").forEach((box) => {
+    const [, width, height] = PAPER.find(([parent]) => !parent || box.closest(parent));
+    Plotly.relayout(box, { "font.color": ink, autosize: !isPrinted, width: isPrinted ? width : null, height: isPrinted ? height : null });
+  });
+  document.querySelectorAll("details.printed").forEach((fold) => { fold.open = isPrinted; });
+}
+window.addEventListener("beforeprint", () => relayout(true));
+window.addEventListener("afterprint", () => relayout(false));

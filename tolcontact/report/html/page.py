@@ -27,7 +27,12 @@ from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines
 from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
 from tolcontact.statistics.verdict import VERDICT_RULE
 from tolcontact.vocabulary import (
-    CONTRIBUTORS, ESTIMATES_NOTE, GLOSSARY, SIMULATION_SETTINGS, STATE_WORDS, reaction_words,
+    CONTRIBUTORS,
+    ESTIMATES_NOTE,
+    GLOSSARY,
+    SIMULATION_SETTINGS,
+    STATE_WORDS,
+    reaction_words,
 )  # fmt: skip
 
 HERE = Path(__file__).parent

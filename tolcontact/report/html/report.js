@@ -83,6 +83,9 @@ function histogram(measure, into) {
   const shown = layout("", `${name} [${escaped(measure.units)}]`, "realizations");
   Object.assign(shown, { margin: { ...shown.margin, t: 76 }, legend: { orientation: "h", y: 1.08, yanchor: "bottom", x: 0 } });
   showLimits(shown, measure);
+  // A state that does not vary is one high bar, which would hide the shape of the other.
+  const highest = (s) => Math.max(...measure.states[s].counts), varying = [RAW, CORRECTED].filter((s) => measure.sixSigma[s] > 0);
+  if (varying.length === 1) shown.yaxis.range = [0, 1.1 * highest(varying[0])];
   Plotly.newPlot(chart(`Histogram of ${measure.name}, ${STATES.join(" and ")}`, into), traces, shown, SETTINGS);
 }
 
