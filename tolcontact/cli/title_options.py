@@ -15,6 +15,7 @@ Author = Annotated[str | None, typer.Option(help="Author of the report.", rich_h
 Revision = Annotated[str | None, typer.Option(help="Revision of the model or of its drawing.", rich_help_panel="Title block")]
 Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
 Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
+ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
 
 
 def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
