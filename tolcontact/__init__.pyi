@@ -46,6 +46,7 @@ from .declaration import (
     Tolerance as Tolerance,
     TotalRunout as TotalRunout,
     Variable as Variable,
+    degrees as degrees,
     three_two_one as three_two_one,
 )
 from .errors import (
@@ -54,6 +55,7 @@ from .errors import (
     ContactWarning as ContactWarning,
     FaceWarning as FaceWarning,
     ModelError as ModelError,
+    NominalWarning as NominalWarning,
     OptionError as OptionError,
     ScriptError as ScriptError,
     TolcontactError as TolcontactError,

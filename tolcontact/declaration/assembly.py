@@ -12,12 +12,12 @@ from tolcontact.declaration.contributor import (
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
@@ -111,8 +111,8 @@ class Assembly(Pictured):
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
-        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], a Tolerance, or a frozen
-        scipy.stats distribution.
+        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
+        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
         _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
@@ -151,7 +151,7 @@ class Assembly(Pictured):
         *,
         to: Point | None = None,
         along: Any = None,
-        tolerance: float | None = None,
+        tolerance: Any = None,
         limits: Sequence[float | None] | None = None,
         absolute: bool | None = None,
         units: str = "mm",
@@ -190,7 +190,8 @@ class Assembly(Pictured):
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
-        widths += [float(m.width) for m in self.measures if m.width is not None and m.units == "mm"]
+        measures = [measure for measure in self.measures if measure.units == "mm" and not any(measure.faults())]
+        widths += [float(measure.width) for measure in measures if measure.width is not None]
         return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
     def omissions(self) -> Iterator[str]:

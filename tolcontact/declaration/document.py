@@ -29,13 +29,14 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
+from tolcontact.declaration.size import MOVES, Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
@@ -128,14 +129,14 @@ DISTRIBUTION = Inline(
     _distribution,
 )
 ZONE = Record(
-    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | None), distribution=DISTRIBUTION,
-    shift=FLOAT, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
+    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | str | None), shift=FLOAT,
+    distribution=DISTRIBUTION, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
 )  # fmt: skip
-WIDTH = Plain(NOT_NEGATIVE, read=lambda width, place: place.checked(Tolerance(width)))
-CODECS[Tolerance] = Choice("Tolerance", "a width in mm, or named values", ZONE, WIDTH)
+WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
+CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
 SIZE = Record(
-    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), lower=Plain(float | None),
-    moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
+    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), upper=Plain(float | str),
+    lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
@@ -201,7 +202,7 @@ RECORDS = {
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
             {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
-        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | None),
+        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
     "forces": Record(Force, "at name vector declared_at"),

@@ -25,7 +25,7 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 
 | tolerance | applies to | controls |
 |---|---|---|
-| `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
+| `tc.Size(8, 0.05, -0.02)`, `tc.Size(8, "H7")` | cylinder, sphere, two planes | diameter or distance, as shaped; limits |
 | `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
 | `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
 | `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |

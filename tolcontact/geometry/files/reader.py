@@ -138,6 +138,7 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
         )
     if code < 0:
         name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
-        return f"crashed its reader process (signal {-code}{name}): it is damaged, or the CAD kernel cannot mesh it; export it again"
+        end = f"it crashed its reader process (signal {-code}{name})"
+        return f"cannot be read: {end}; it is damaged, or beyond the CAD kernel; export it again"
     message = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
     return f"was not read: its reader process ended with exit code {code} ({clipped(message) or 'no message'}); export it again"

@@ -97,7 +97,10 @@ function contributors(measure, into) {
   const [share, low, high] = [0, 1, 2].map(of);
   const traces = [{
     type: "bar", orientation: "h", y: bars.map((bar) => escaped(bar.name)), x: share.map((x) => Math.max(x, 0)), marker: { color: COLOURS[1] },
-    error_x: { type: "data", symmetric: false, array: high.map((x, k) => x - share[k]), arrayminus: low.map((x, k) => Math.max(share[k], 0) - Math.max(x, 0)), thickness: 1 },
+    error_x: {
+      type: "data", symmetric: false, thickness: 1,
+      array: high.map((x, k) => x - share[k]), arrayminus: low.map((x, k) => Math.max(share[k], 0) - Math.max(x, 0)),
+    },
     hovertemplate: "%{y}: %{x:.1f} %<extra></extra>",
   }];
   const shown = layout("Contributors, with contact", "% of variance", "");
