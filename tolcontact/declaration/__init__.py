@@ -64,11 +64,11 @@ pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 >>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
 >>> location = clamp.locate(plate, scheme, tolerance=0.6)
 >>> print(location)
-location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, range 0.6 mm
+location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, full width 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
-locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
+locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
 >>> print(tc.Tolerance("+0.4/-0.2"))
-normal, range 0.6 mm, shifted by 0.1 mm
+normal, full width 0.6 mm, shifted by 0.1 mm
 
 `locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
 `fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.

@@ -16,6 +16,12 @@ DIGITS_OF_COUNTS = 2  # of a number of realizations that would decide
 STATISTICS = (terms.MEAN, terms.STANDARD_DEVIATION, terms.PPK, terms.BELOW, terms.ABOVE)
 
 
+COLUMNS = (
+    terms.MEASUREMENT, "verdict", "nominal", "lower limit", "upper limit", "contact", "mean", "sigma", terms.PPK,
+)  # fmt: skip
+SIDES = ("below", "above")
+
+
 class StateFigures(NamedTuple):
     """The figures of a measurement in one state, as (estimate, lower, upper) of `STATISTICS`, and as texts."""
 
@@ -64,13 +70,9 @@ def with_units(values: np.ndarray, units: str) -> str:
     return share_in(values, units).replace(" [", f" {units} [")
 
 
-def result_columns(summary: xr.Dataset) -> list[str]:
-    """Return the headings of the table: what is declared, then `STATISTICS`."""
-    units = share_units(summary)
-    return [
-        terms.MEASUREMENT, "verdict", "nominal", "lower limit", "upper limit", "contact", "mean", "sigma", terms.PPK,
-        f"{terms.OUT_OF_SPECIFICATION}, below, {units}", f"above, {units}",
-    ]  # fmt: skip
+def share_heading(summary: xr.Dataset) -> str:
+    """Return the heading above the last two columns of the table, `SIDES`."""
+    return f"{terms.OUT_OF_SPECIFICATION}, {share_units(summary)}"
 
 
 def result_rows(summary: xr.Dataset) -> list[ResultRow]:

@@ -22,7 +22,7 @@ from tolcontact.report.html.analyses import contributions_of, tables_of
 from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
 from tolcontact.report.model_tables import model_tables
-from tolcontact.report.results_table import result_columns, result_rows
+from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
 from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
 from tolcontact.statistics.verdict import VERDICT_RULE
@@ -199,7 +199,7 @@ def _plain_json(data: Any, **_: Any) -> str:
 
 
 def _results(summary: xr.Dataset) -> dict[str, Any]:
-    return {"columns": result_columns(summary), "rows": result_rows(summary)}
+    return {"columns": COLUMNS, "shares": share_heading(summary), "sides": SIDES, "rows": result_rows(summary)}
 
 
 def _pairs(summary: xr.Dataset) -> dict[str, Any]:
