@@ -10,7 +10,8 @@ Lengths are in mm, angles in rad, forces in N. Points, faces and locators are gi
 
 `part(name, shape, at=..., rotation=...)` places a shape in the nominal assembly: the point p of its own frame lies at
 `rotation * p + at`, where `rotation` is a rotation vector. A shape is a `tc.Box(x, y, z)`, which reaches from the origin of
-its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
+its frame to (x, y, z), a `tc.Pin(diameter, length)` about the z axis, from -length to 0, or a `tc.Mesh(source)`, a triangle
+surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
 `trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.geometry`).
 
 >>> base = clamp.part("base", tc.Box(100, 50, 10), fixed=True)
@@ -70,8 +71,10 @@ locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
 >>> print(tc.Tolerance("+0.4/-0.2"))
 normal, full width 0.6 mm, shifted by 0.1 mm
 
-`locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
-`fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.
+`locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
+a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
+that is not located must be `fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are
+rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
 have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
@@ -160,7 +163,32 @@ above the nominal value; `tolerance="+0.2/-0.1"` states them on both sides of it
 ...     return poses.rotation(plate)[2, 0]
 >>> slope = clamp.measure("slope", tilt, units="rad")
 
-The function receives poses with the methods `position(point)`, `rotation(part)` and `translation(part)`.
+The function receives poses with `position(point)`, `rotation(part)` and `translation(part)`.
+Measurements of faces are declared as objects. Their units follow from their kind: mm, and rad for angles.
+
+| measurement | value |
+|---|---|
+| `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
+| `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
+| `tc.AxisDistance(..., across="z")` | at the middle of the first axis: in the plane across a direction; `along="x"` one component |
+| `tc.Angle(face, face)` | angle of planes or axes, from 0 on; with `about="y"` its sign, positive if turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
+| `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
+
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
+at the point's nominal foot. The stations of a seam are points along it. Gap and flush are measured perpendicular to the faces
+of the second part, which carry the directions as they tilt.
+
+>>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
+>>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
+>>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
+sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
+derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
 
 ## The model's method, and faults
 
@@ -208,7 +236,7 @@ assembly without running any code of the script. Functions of poses are kept as 
 contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
-from tolcontact.declaration.assembly import Assembly, has_supports, is_free, movers
+from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
@@ -229,9 +257,25 @@ from tolcontact.declaration.feature_tolerance import (
     TotalRunout,
 )
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import Box, Mesh
-from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
+from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
+from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import (
+    Angle,
+    AxisDistance,
+    Clearance,
+    Combination,
+    Difference,
+    Flush,
+    Gap,
+    Maximum,
+    Mean,
+    Measurement,
+    Minimum,
+    Sum,
+    stations,
+)  # fmt: skip
+from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -241,35 +285,49 @@ from tolcontact.declaration.values import degrees
 
 __all__ = [
     "OUTSIDE",
+    "Angle",
     "Angularity",
     "Assembly",
+    "AxisDistance",
     "Box",
     "Brep",
     "CircularRunout",
+    "Clearance",
     "Coaxiality",
+    "Combination",
     "ContactPair",
     "Correlation",
     "Cylinder",
     "Cylindricity",
     "DatumTargets",
+    "Difference",
     "Face",
     "Facing",
     "Feature",
     "Flatness",
+    "Flush",
     "Force",
+    "Gap",
     "GeometricTolerance",
+    "Geometry",
     "Inside",
     "Largest",
     "LineProfile",
+    "Location",
     "Locator",
+    "Maximum",
+    "Mean",
     "Measure",
+    "Measurement",
     "Mesh",
+    "Minimum",
     "Near",
     "Parallelism",
     "Part",
     "Pattern",
     "Perpendicularity",
     "Picked",
+    "Pin",
     "Point",
     "Population",
     "Position",
@@ -277,6 +335,7 @@ __all__ = [
     "Roundness",
     "Size",
     "Straightness",
+    "Sum",
     "Symmetry",
     "ThreeTwoOne",
     "TitleBlock",
@@ -288,5 +347,6 @@ __all__ = [
     "has_supports",
     "is_free",
     "movers",
+    "stations",
     "three_two_one",
 ]

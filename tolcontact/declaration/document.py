@@ -25,15 +25,18 @@ from tolcontact.declaration.face_entry import (
     Document,
     Wrapped,
     Writing,
+    feature_named,
     floats,
     indices_of,
     text_type,
 )
 from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import UNITS, Box, Mesh
+from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
@@ -71,6 +74,21 @@ def _file(name: str, place: Place) -> Path:
     return place.sources.folder / name
 
 
+def _ground_entries(location: Location, writing: Writing) -> Document:
+    feature = {"on_feature": location.on.name} if isinstance(location.on, Feature) else {}
+    return {"on": location.parent and location.parent.name, **feature}
+
+
+def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
+    """Return the part that locators are on, or the feature of it; None for the ground."""
+    part = Optional(CODECS[Part]).decode(entries.get("on"), place["on"])
+    if "on_feature" not in entries:
+        return part  # type: ignore[no-any-return]
+    if part is None:
+        raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
+    return feature_named(entries["on_feature"], replace(place["on_feature"], part=part))
+
+
 def _distribution_entries(thing: Any, writing: Writing) -> Document:
     if isinstance(thing.distribution, str):
         return {"distribution": thing.distribution}
@@ -98,16 +116,16 @@ def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
 
 
 def _measured_entries(measure: Measure, writing: Writing) -> Document:
-    if isinstance(measure.of, Point):
-        return {"of": POINT.encode(measure.of, writing)}
-    return {"tape": writing.tapes[measure.name]}
+    if measure.is_expression:
+        return {"tape": writing.tapes[measure.name]}
+    return {"of": MEASURED.encode(measure.of, writing)}
 
 
-def _measured(entries: Mapping[str, Any], place: Place) -> Point | Tape:
+def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement | Tape:
     if len(entries) != 1:
-        raise place.error('expected either "of", a point, or "tape", the steps of an expression')
+        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
     if "of" in entries:
-        return POINT.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
+        return MEASURED.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
     return tape_of(entries["tape"], place["tape"])
 
 
@@ -122,7 +140,6 @@ def _tolerance_record(cls: Any) -> Record:
 
 
 ARGUMENTS, KEYWORDS = Plain(tuple[float, ...]), Plain(Mapping[str, float])
-POINT = CODECS[Point] = Record(Point, "part on? end? position?")
 DISTRIBUTION = Inline(
     {"distribution": text_type(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
     _distribution_entries,
@@ -154,8 +171,9 @@ TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
-    "a box, or a file",
+    "a box, a pin, or a file",
     Record(Box, "box=x+y+z", mark="box"),
+    Record(Pin, "pin=diameter+length head?", mark="pin"),
     Record(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
         chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],
@@ -181,6 +199,7 @@ METHOD = Record(
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
 TITLE_BLOCK = Record(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
+GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
     {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
@@ -192,7 +211,7 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
+    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
@@ -200,7 +219,7 @@ RECORDS = {
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
-            {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
+            {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
         ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
