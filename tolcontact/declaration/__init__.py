@@ -65,11 +65,11 @@ pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 >>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
 >>> location = clamp.locate(plate, scheme, tolerance=0.6)
 >>> print(location)
-location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, range 0.6 mm
+location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, full width 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
-locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
+locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
 >>> print(tc.Tolerance("+0.4/-0.2"))
-normal, range 0.6 mm, shifted by 0.1 mm
+normal, full width 0.6 mm, shifted by 0.1 mm
 
 `locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
 a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
@@ -102,7 +102,7 @@ without naming it. The limits of a size may be a tolerance class of ISO 286-1, w
 >>> top = cover.feature("top", cover.face("+z"), tc.Parallelism(0.05, "A"), tc.Profile(0.2, "A"))
 >>> width = cover.feature("width", cover.face("+x"), cover.face("-x"), tc.Size(60, 0.1, -0.05))
 >>> print(top)
-feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
+feature top of cover: cover +z; parallelism 0.05 A; profile 0.2 A
 >>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
 
 `part.pattern("H", face, face, ..., tolerances...)` declares several like features with common tolerances, such as holes.
@@ -279,6 +279,7 @@ from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
@@ -337,6 +338,7 @@ __all__ = [
     "Sum",
     "Symmetry",
     "ThreeTwoOne",
+    "TitleBlock",
     "Tolerance",
     "TotalRunout",
     "Triangles",
