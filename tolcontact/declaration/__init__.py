@@ -91,7 +91,7 @@ z)` or at an end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 s
 without naming it. The limits of a size may be a tolerance class of ISO 286-1, with capital letters for holes and slots.
 
 >>> tc.Size(8, "H7"), tc.Size(8, "g6")
-(size 8 +0.015 +0 mm, size 8 -0.005 -0.014 mm)
+(size 8 H7 +0.015 +0 mm, size 8 g6 -0.005 -0.014 mm)
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
