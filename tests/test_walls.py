@@ -61,8 +61,8 @@ APART = {
 ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features", "pmi",
-    "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report",
-    "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "discretization", "variation", "mechanics", "compilation", "plausibility", "contact", "simulation", "statistics", "archive",
+    "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -30,6 +30,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | draw | `tolcontact.variation` | distributions of deviations, zones of features, seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |
+| nominal assembly | `tolcontact.plausibility` | warnings of what is probably a mistake |
 | resolve contact | `tolcontact.contact` | linearized or exact resolution, statuses, what a certificate covers, limits |
 | simulate | `tolcontact.simulation` | blocks, threads, reproducibility |
 | summarize | `tolcontact.statistics` | estimates and their intervals, displacement fields |
@@ -60,7 +61,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `FaceWarning`, `UnitsWarning` |
+| warnings | `ContactWarning`, `FaceWarning`, `NominalWarning`, `UnitsWarning` |
 
 `tolcontact.testing` has assertions for tests of your own models.
 """

@@ -54,6 +54,7 @@ from .errors import (
     ContactWarning as ContactWarning,
     FaceWarning as FaceWarning,
     ModelError as ModelError,
+    NominalWarning as NominalWarning,
     OptionError as OptionError,
     ScriptError as ScriptError,
     TolcontactError as TolcontactError,

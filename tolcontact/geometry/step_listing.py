@@ -18,7 +18,7 @@ from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, p
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
-from tolcontact.geometry.files.reader import ReadTimeout
+from tolcontact.geometry.files.reader import UnfinishedRead
 from tolcontact.readable import Readable
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
@@ -185,7 +185,7 @@ def _listed_product(path: str | Path) -> Product:
     try:
         product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
     except OptionError as error:
-        if not isinstance(error.__cause__, ReadTimeout):
+        if not isinstance(error.__cause__, UnfinishedRead):
             raise
         product = _product(path)  # the chord of a very large file is coarser
     if product.missing_faces:
