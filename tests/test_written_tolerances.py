@@ -79,6 +79,12 @@ def test_unequal_limits_shift_the_mean(distribution):
     assert np.array_equal(same["measured"], arrays["measured"])
 
 
+def test_worst_cases_are_the_limits():
+    """All of A1, A2 and A3 at a limit lift the middle of the block to that limit."""
+    worst = tc.worst_case(block("+0.4/-0.2"), samples=64).worst.sel(state="raw", measure="height")
+    assert worst.values == pytest.approx([-0.2, 0.4], abs=1e-9)
+
+
 def test_equal_limits_are_the_full_width():
     assert str(block("±0.1")) == str(block(0.2)) == str(block("+0.1/-0.1")) == str(block((-0.1, 0.1)))
 
