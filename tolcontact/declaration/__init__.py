@@ -162,6 +162,38 @@ above the nominal value; `tolerance="+0.2/-0.1"` states them on both sides of it
 
 The function receives poses with the methods `position(point)`, `rotation(part)` and `translation(part)`.
 
+Measurements of faces are declared as objects. Their units follow from their kind: mm, and rad for angles.
+
+| measurement | value |
+|---|---|
+| `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
+| `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
+| `tc.AxisDistance(..., across="z")` | distance of two axes in the plane across a direction, at the middle of the first axis |
+| `tc.AxisDistance(..., along="x")` | component along a direction, from the middle of the first axis square to the second |
+| `tc.Angle(face, face)` | angle between planes or axes, from 0 on; at most a right angle nominally |
+| `tc.Angle(..., about="y")` | angle about a direction, with its sign: positive if the second face is turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or measures by name |
+| `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
+
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind counts as its tangent
+plane at the point's nominal foot. The stations of a seam are points along it: `tc.stations(start, end, count)`. Gap and flush
+are measured perpendicular to the faces of the second part, which carry the directions as they tilt.
+
+>>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
+>>> taper = clamp.measure("taper", tc.Difference(tc.Maximum(*gaps), tc.Minimum(*gaps)))
+>>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
+>>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+>>> print(lean)
+measure lean: angle of plate -z and base +z about (0, 1, 0), tolerance 0.01 rad
+
+A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
+sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
+derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
+
 ## The model's method, and faults
 
 A model can state the method that it needs (see `tolcontact.contact`): `tc.Assembly("cells",
@@ -232,6 +264,21 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import (
+    Angle,
+    AxisDistance,
+    Clearance,
+    Combination,
+    Difference,
+    Flush,
+    Gap,
+    Maximum,
+    Mean,
+    Measurement,
+    Minimum,
+    Sum,
+    stations,
+)
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
@@ -240,29 +287,40 @@ from tolcontact.declaration.values import degrees
 
 __all__ = [
     "OUTSIDE",
+    "Angle",
     "Angularity",
     "Assembly",
+    "AxisDistance",
     "Box",
     "Brep",
     "CircularRunout",
+    "Clearance",
     "Coaxiality",
+    "Combination",
     "ContactPair",
     "Correlation",
     "Cylinder",
     "Cylindricity",
     "DatumTargets",
+    "Difference",
     "Face",
     "Facing",
     "Feature",
     "Flatness",
+    "Flush",
     "Force",
+    "Gap",
     "GeometricTolerance",
     "Inside",
     "Largest",
     "LineProfile",
     "Locator",
+    "Maximum",
+    "Mean",
     "Measure",
+    "Measurement",
     "Mesh",
+    "Minimum",
     "Near",
     "Parallelism",
     "Part",
@@ -276,6 +334,7 @@ __all__ = [
     "Roundness",
     "Size",
     "Straightness",
+    "Sum",
     "Symmetry",
     "ThreeTwoOne",
     "Tolerance",
@@ -286,5 +345,6 @@ __all__ = [
     "has_supports",
     "is_free",
     "movers",
+    "stations",
     "three_two_one",
 ]

@@ -16,6 +16,7 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import tolerance as _tolerance
@@ -143,17 +144,22 @@ class Assembly(Pictured):
     def measure(
         self,
         name: str,
-        of: Point | Callable[[Any], Any],
+        of: Point | Measurement | Callable[[Any], Any],
         *,
         to: Point | None = None,
         along: Any = None,
         tolerance: Any = None,
         limits: Sequence[float | None] | None = None,
         absolute: bool | None = None,
-        units: str = "mm",
+        units: str | None = None,
     ) -> Measure:
-        """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
+        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
+
+        `units` are those of an expression, by default mm. A measurement has its own.
+        """
         axis = None if along is None else direction(along)
+        if units is None:
+            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
         return self._add("measures", Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute))
 
@@ -168,6 +174,10 @@ class Assembly(Pictured):
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
         return self._add("populations", _population(source, columns, script_line()))
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {measure.name: measure.units for measure in self.measures}
 
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
@@ -222,7 +232,7 @@ class Assembly(Pictured):
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
             *(("force", force, (force.at.part,)) for force in self.forces),
-            *(("measure", measure, [point.part for point in measure.points]) for measure in self.measures),
+            *(("measure", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -231,6 +241,8 @@ class Assembly(Pictured):
             yield from _located(kind, thing, thing.faults())
             yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
         yield from key_faults("variable", [variable.name for variable in self.variables])
+        for number, measure in enumerate(self.measures):
+            yield from _located("measure", measure, measure.reference_faults(self.measures[:number]))
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
         letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]

@@ -34,6 +34,8 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
@@ -97,16 +99,16 @@ def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
 
 
 def _measured_entries(measure: Measure, writing: Writing) -> Document:
-    if isinstance(measure.of, Point):
-        return {"of": POINT.encode(measure.of, writing)}
-    return {"tape": writing.tapes[measure.name]}
+    if measure.is_expression:
+        return {"tape": writing.tapes[measure.name]}
+    return {"of": MEASURED.encode(measure.of, writing)}
 
 
-def _measured(entries: Mapping[str, Any], place: Place) -> Point | Tape:
+def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement | Tape:
     if len(entries) != 1:
-        raise place.error('expected either "of", a point, or "tape", the steps of an expression')
+        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
     if "of" in entries:
-        return POINT.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
+        return MEASURED.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
     return tape_of(entries["tape"], place["tape"])
 
 
@@ -121,7 +123,6 @@ def _tolerance_record(cls: Any) -> Record:
 
 
 ARGUMENTS, KEYWORDS = Plain(tuple[float, ...]), Plain(Mapping[str, float])
-POINT = CODECS[Point] = Record(Point, "part on? end? position?")
 DISTRIBUTION = Inline(
     {"distribution": text_type(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
     _distribution_entries,
@@ -198,7 +199,7 @@ RECORDS = {
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
-            {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
+            {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
         ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),

@@ -7,11 +7,12 @@ with a number, or the name of a CasADi operation with the positions of earlier r
 
 import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tolcontact.declaration.part import Point
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
 from tolcontact.declaration.values import Vector, is_finite, is_length, is_line
 from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
@@ -25,6 +26,7 @@ class Measure(Readable):
         of one Point                its displacement from its nominal place, along `along` [mm]; its coordinate, if `absolute`
         of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush); its deviation
                                     from the nominal distance, if `absolute` is False
+        of a Measurement            its value, such as a gap, an angle or the least of several measures [mm, rad]
         of a function               the CasADi expression that the function returns for the symbolic poses
 
     `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits around the
@@ -32,7 +34,7 @@ class Measure(Readable):
     """
 
     name: str
-    of: Point | Callable[[Any], Any] | tuple[Any, ...]
+    of: Point | Measurement | Callable[[Any], Any] | tuple[Any, ...]
     to: Point | None = None
     along: Vector | None = None
     tolerance: float | Deviations | None = None  # a text or another pair only if it is no tolerance
@@ -53,8 +55,20 @@ class Measure(Readable):
         return tuple(point for point in (self.of, self.to) if isinstance(point, Point))
 
     @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts that are measured; none for an expression."""
+        return self.of.parts if isinstance(self.of, Measurement) else tuple(point.part for point in self.points)
+
+    @property
+    def is_expression(self) -> bool:
+        """Whether the measure is a user's own expression of the poses."""
+        return not isinstance(self.of, Point | Measurement)
+
+    @property
     def quantity(self) -> str:
-        """The quantity that is measured: a displacement, a coordinate, a distance, its deviation, or an expression."""
+        """The quantity: a displacement, a coordinate, a distance, its deviation, a kind of measurement, or an expression."""
+        if isinstance(self.of, Measurement):
+            return self.of.kind
         if not isinstance(self.of, Point):
             return "expression"
         if self.to is None:
@@ -82,15 +96,7 @@ class Measure(Readable):
     def faults(self) -> Iterator[str]:
         for point in self.points:
             yield from point.faults()
-        if isinstance(self.of, Point):
-            if self.along is None:
-                yield 'a measured point needs a direction; give along="z", or a vector'
-            elif not is_finite(self.along):
-                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
-        elif not callable(self.of) and not isinstance(self.of, tuple):
-            yield f"it measures a {type(self.of).__name__}; expected part.point(x, y, z) or a function of the poses"
-        elif self.along is not None or self.to is not None:
-            yield "a function of the poses defines its measure by itself; leave out to and along"
+        yield from self._subject_faults()
         if not (self.units and is_line(self.units)):
             yield (
                 f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number, '
@@ -102,7 +108,27 @@ class Measure(Readable):
         if not isinstance(self.absolute, bool | None):
             yield f"absolute is {self.absolute!r}; expected True or False"
         elif self.absolute is not None and not isinstance(self.of, Point):
-            yield "absolute is for measures of points; a function of the poses has its own value, so leave it out"
+            yield f"absolute is for measures of points; a {self._noun} has its own value, so leave it out"
+
+    def _subject_faults(self) -> Iterator[str]:
+        if isinstance(self.of, Point):
+            if self.along is None:
+                yield 'a measured point needs a direction; give along="z", or a vector'
+            elif not is_finite(self.along):
+                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+        elif not (isinstance(self.of, Measurement | tuple) or callable(self.of)):
+            yield (
+                f"it measures a {type(self.of).__name__}; expected part.point(x, y, z), a measurement such as tc.Gap(...), "
+                "or a function of the poses"
+            )
+        elif self.along is not None or self.to is not None:
+            yield f"a {self._noun} defines its measure by itself; leave out to and along"
+        if isinstance(self.of, Measurement):
+            yield from self.of.faults()
+
+    @property
+    def _noun(self) -> str:
+        return "measurement" if isinstance(self.of, Measurement) else "function of the poses"
 
     def _limits_faults(self) -> Iterator[str]:
         width = self.tolerance.width if isinstance(self.tolerance, Deviations) else self.tolerance
@@ -125,12 +151,26 @@ class Measure(Readable):
         if not limits or not all(map(is_length, limits)) or (len(limits) == 2 and not limits[0] < limits[1]):
             yield fault
 
+    def reference_faults(self, earlier: "Sequence[Measure]") -> Iterator[str]:
+        """Yield faults of a measurement's units and references: it may only refer to the earlier measures."""
+        if not isinstance(self.of, Measurement):
+            return
+        units = {measure.name: measure.units for measure in earlier}
+        for name in dict.fromkeys(self.of.names):
+            if name not in units:
+                yield f'unknown measure "{name}"; those declared before it are: {", ".join(units) or "none"}'
+        own = self.of.units_among(units)
+        if len(own) > 1:
+            yield f"it combines measurements in {' and '.join(sorted(own))}; expected the same units"
+        elif own and own != {self.units}:
+            yield f"units is {self.units!r}, but its measurement is in {min(own)}; leave units out"
+
     def __str__(self) -> str:
         along = "" if self.along is None else " along ({:g}, {:g}, {:g})".format(*self.along)
         if self.to is not None:
             subject = f"distance {self.of} to {self.to}{along}"
         else:
-            subject = f"{self.of}{along}" if isinstance(self.of, Point) else "expression of the poses"
+            subject = "expression of the poses" if self.is_expression else f"{self.of}{along}"
         if isinstance(self.of, Point) and self.absolute is not None:
             subject = f"{self.quantity}, {subject}"
         return f"measure {self.name}: {subject}{self._limit_text}"
