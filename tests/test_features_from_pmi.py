@@ -233,6 +233,30 @@ def sizes(file):
     file.size(file.aspect(*CORNERS, UNDER), 12.0, (-0.1, 0.1))
 
 
+def fits(file):
+    file.fit(file.aspect(*HOLE), 8.1, "h", "6", "hole")
+    file.fit(file.aspect(*HOLE), 8.1, "V", "7")
+    file.fit(file.aspect(*HOLE), 8.1, "sliding", "")
+
+
+@pytest.mark.parametrize(
+    ("letters", "grade", "variance", "size"),
+    [("G", "6", "hole", "8.1 +0.014 +0.005"), ("H7", "", "hole", "8.1 +0.015 +0"), ("JS", "7", "", "8.1 +0.0075 -0.0075")],
+)
+def test_a_fit_has_the_limits_of_its_class(letters, grade, variance, size, tmp_path):
+    def annotate(file):
+        file.fit(file.aspect(*HOLE), 8.1, letters, grade, variance)
+
+    (feature,) = cover(annotate, tmp_path).features_from_pmi().features
+    assert str(feature.tolerances[0]) == f"size {size} mm"
+
+
+def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
+    """A shape is modelled at 8.1, and its drawing says 8.09 H7."""
+    (feature,) = cover(lambda file: file.fit(file.aspect(*HOLE), 8.09, "H", "7"), tmp_path).features_from_pmi().features
+    assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
+
+
 NO_SIZE = "sizes of features are those of cylinders, spheres and two opposed planes, and it is a plane"
 REASONS = {
     "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
@@ -258,6 +282,14 @@ REASONS = {
         ["position: a bonus (material 'M') needs the tolerance of a size; add tc.Size(...)"],
     ),
     "the same zone twice": (twice, ["position 0.6 controls nothing that others do not; leave one of them out"]),
+    "fits": (
+        fits,
+        [
+            "its fit h6 hole is for a shaft, and the feature is a hole",
+            "ISO 286-1 does not define V7 for 8.1 mm: it is for sizes above 14 mm, up to 500 mm",
+            "its fit sliding is no tolerance class of ISO 286-1",
+        ],
+    ),
     "sizes": (
         sizes,
         [

@@ -47,10 +47,12 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
+| declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Feature`, `Pattern`, `DatumTargets`, `Variable` |
+| measure faces | `Gap`, `Flush`, `Clearance`, `AxisDistance`, `Angle`, `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
+| | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |

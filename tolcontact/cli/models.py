@@ -77,8 +77,8 @@ def check(
         _open_view(assembly, program.nominal, (), temporary_page(model))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
-        size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
-        typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
+        size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
+        typer.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):
         typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
     show_warnings(doubts)

@@ -18,6 +18,12 @@ its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source i
 >>> plate
 part plate: box 60 x 40 x 8 mm at (20, 5, 10)
 
+`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z. A rotation about an oblique axis is a vector along it:
+(30, 0, 30) turns by 42.4 degrees about the bisector of x and z.
+
+>>> tc.degrees(90), tc.degrees(0, 0, 180)
+(1.5707963267948966, (0.0, 0.0, 3.141592653589793))
+
 Names of parts, pairs, forces and measures also name groups and labels of the archive. They start with a letter, digit or
 underscore, hold no "/" and no control character, and differ from each other.
 
@@ -52,7 +58,8 @@ point, direction)` declares them one by one.
 
 A tolerance is the full width of its zone: 0.6 means -0.3 to +0.3. The tolerance of `locate(..., tolerance=...)` applies to
 every locator that does not have its own. By default the deviation is normal with 6 sigma equal to the width;
-`tolcontact.variation` lists the other distributions.
+`tolcontact.variation` lists the other distributions. Limits may be written as on a drawing, "±0.3" or "+0.4/-0.2", or as a
+pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 
 >>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
 >>> location = clamp.locate(plate, scheme, tolerance=0.6)
@@ -60,6 +67,8 @@ every locator that does not have its own. By default the deviation is normal wit
 location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, range 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
 locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
+>>> print(tc.Tolerance("+0.4/-0.2"))
+normal, range 0.6 mm, shifted by 0.1 mm
 
 `locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
 `fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.
@@ -79,7 +88,10 @@ moves it as the objective requires: with "active points" or "all points" only as
 opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and can be used in place of a
 face. The same deviation moves everything that touches the feature, is located by it, or is measured at `feature.point(x, y,
 z)` or at an end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 schemes that choose the triangles of the feature
-without naming it.
+without naming it. The limits of a size may be a tolerance class of ISO 286-1, with capital letters for holes and slots.
+
+>>> tc.Size(8, "H7"), tc.Size(8, "g6")
+(size 8 +0.015 +0 mm, size 8 -0.005 -0.014 mm)
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
@@ -140,7 +152,7 @@ A measure is the displacement of a point along a direction, the distance of two 
 of the symbolic poses that returns a CasADi expression. With `absolute=True` a displacement becomes the coordinate of the
 point; with `absolute=False` a distance becomes its difference from the nominal distance. `limits=(lower, upper)` are the
 allowed values of the measure, with None for an open side. `tolerance` is short for limits at half the tolerance below and
-above the nominal value.
+above the nominal value; `tolerance="+0.2/-0.1"` states them on both sides of it.
 
 >>> height = clamp.measure("height", plate.point(0, 0, 8), along="z", tolerance=0.5)
 >>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z", limits=(None, 0.2))
@@ -149,6 +161,38 @@ above the nominal value.
 >>> slope = clamp.measure("slope", tilt, units="rad")
 
 The function receives poses with the methods `position(point)`, `rotation(part)` and `translation(part)`.
+
+Measurements of faces are declared as objects. Their units follow from their kind: mm, and rad for angles.
+
+| measurement | value |
+|---|---|
+| `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
+| `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
+| `tc.AxisDistance(..., across="z")` | distance of two axes in the plane across a direction, at the middle of the first axis |
+| `tc.AxisDistance(..., along="x")` | component along a direction, from the middle of the first axis square to the second |
+| `tc.Angle(face, face)` | angle between planes or axes, from 0 on; at most a right angle nominally |
+| `tc.Angle(..., about="y")` | angle about a direction, with its sign: positive if the second face is turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or measures by name |
+| `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
+
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind counts as its tangent
+plane at the point's nominal foot. The stations of a seam are points along it: `tc.stations(start, end, count)`. Gap and flush
+are measured perpendicular to the faces of the second part, which carry the directions as they tilt.
+
+>>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
+>>> taper = clamp.measure("taper", tc.Difference(tc.Maximum(*gaps), tc.Minimum(*gaps)))
+>>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
+>>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+>>> print(lean)
+measure lean: angle of plate -z and base +z about (0, 1, 0), tolerance 0.01 rad
+
+A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
+sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
+derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
 
 ## The model's method, and faults
 
@@ -212,7 +256,6 @@ from tolcontact.declaration.feature_tolerance import (
     Position,
     Profile,
     Roundness,
-    Size,
     Straightness,
     Symmetry,
     TotalRunout,
@@ -221,35 +264,63 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import (
+    Angle,
+    AxisDistance,
+    Clearance,
+    Combination,
+    Difference,
+    Flush,
+    Gap,
+    Maximum,
+    Mean,
+    Measurement,
+    Minimum,
+    Sum,
+    stations,
+)
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.values import degrees
 
 __all__ = [
     "OUTSIDE",
+    "Angle",
     "Angularity",
     "Assembly",
+    "AxisDistance",
     "Box",
     "Brep",
     "CircularRunout",
+    "Clearance",
     "Coaxiality",
+    "Combination",
     "ContactPair",
     "Correlation",
     "Cylinder",
     "Cylindricity",
     "DatumTargets",
+    "Difference",
     "Face",
     "Facing",
     "Feature",
     "Flatness",
+    "Flush",
     "Force",
+    "Gap",
     "GeometricTolerance",
     "Inside",
     "Largest",
     "LineProfile",
     "Locator",
+    "Maximum",
+    "Mean",
     "Measure",
+    "Measurement",
     "Mesh",
+    "Minimum",
     "Near",
     "Parallelism",
     "Part",
@@ -263,14 +334,17 @@ __all__ = [
     "Roundness",
     "Size",
     "Straightness",
+    "Sum",
     "Symmetry",
     "ThreeTwoOne",
     "Tolerance",
     "TotalRunout",
     "Triangles",
     "Variable",
+    "degrees",
     "has_supports",
     "is_free",
     "movers",
+    "stations",
     "three_two_one",
 ]

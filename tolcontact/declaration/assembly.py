@@ -12,12 +12,13 @@ from tolcontact.declaration.contributor import (
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
 from tolcontact.method import Method
@@ -107,8 +108,8 @@ class Assembly(Pictured):
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
-        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], a Tolerance, or a frozen
-        scipy.stats distribution.
+        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
+        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
         _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
@@ -143,17 +144,22 @@ class Assembly(Pictured):
     def measure(
         self,
         name: str,
-        of: Point | Callable[[Any], Any],
+        of: Point | Measurement | Callable[[Any], Any],
         *,
         to: Point | None = None,
         along: Any = None,
-        tolerance: float | None = None,
+        tolerance: Any = None,
         limits: Sequence[float | None] | None = None,
         absolute: bool | None = None,
-        units: str = "mm",
+        units: str | None = None,
     ) -> Measure:
-        """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
+        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
+
+        `units` are those of an expression, by default mm. A measurement has its own.
+        """
         axis = None if along is None else direction(along)
+        if units is None:
+            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
         return self._add("measures", Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute))
 
@@ -168,6 +174,10 @@ class Assembly(Pictured):
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
         return self._add("populations", _population(source, columns, script_line()))
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {measure.name: measure.units for measure in self.measures}
 
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
@@ -186,7 +196,8 @@ class Assembly(Pictured):
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
-        widths += [float(m.width) for m in self.measures if m.width is not None and m.units == "mm"]
+        measures = [measure for measure in self.measures if measure.units == "mm" and not any(measure.faults())]
+        widths += [float(measure.width) for measure in measures if measure.width is not None]
         return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
     def omissions(self) -> Iterator[str]:
@@ -221,7 +232,7 @@ class Assembly(Pictured):
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
             *(("force", force, (force.at.part,)) for force in self.forces),
-            *(("measure", measure, [point.part for point in measure.points]) for measure in self.measures),
+            *(("measure", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -230,6 +241,8 @@ class Assembly(Pictured):
             yield from _located(kind, thing, thing.faults())
             yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
         yield from key_faults("variable", [variable.name for variable in self.variables])
+        for number, measure in enumerate(self.measures):
+            yield from _located("measure", measure, measure.reference_faults(self.measures[:number]))
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
         letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]

@@ -29,13 +29,16 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
+from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
+from tolcontact.declaration.size import MOVES, Size
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
@@ -96,16 +99,16 @@ def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
 
 
 def _measured_entries(measure: Measure, writing: Writing) -> Document:
-    if isinstance(measure.of, Point):
-        return {"of": POINT.encode(measure.of, writing)}
-    return {"tape": writing.tapes[measure.name]}
+    if measure.is_expression:
+        return {"tape": writing.tapes[measure.name]}
+    return {"of": MEASURED.encode(measure.of, writing)}
 
 
-def _measured(entries: Mapping[str, Any], place: Place) -> Point | Tape:
+def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement | Tape:
     if len(entries) != 1:
-        raise place.error('expected either "of", a point, or "tape", the steps of an expression')
+        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
     if "of" in entries:
-        return POINT.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
+        return MEASURED.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
     return tape_of(entries["tape"], place["tape"])
 
 
@@ -120,21 +123,20 @@ def _tolerance_record(cls: Any) -> Record:
 
 
 ARGUMENTS, KEYWORDS = Plain(tuple[float, ...]), Plain(Mapping[str, float])
-POINT = CODECS[Point] = Record(Point, "part on? end? position?")
 DISTRIBUTION = Inline(
     {"distribution": text_type(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
     _distribution_entries,
     _distribution,
 )
 ZONE = Record(
-    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | None), distribution=DISTRIBUTION,
-    shift=FLOAT, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
+    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | str | None), shift=FLOAT,
+    distribution=DISTRIBUTION, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
 )  # fmt: skip
-WIDTH = Plain(NOT_NEGATIVE, read=lambda width, place: place.checked(Tolerance(width)))
-CODECS[Tolerance] = Choice("Tolerance", "a width in mm, or named values", ZONE, WIDTH)
+WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
+CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
 SIZE = Record(
-    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), lower=Plain(float | None),
-    moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
+    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), upper=Plain(float | str),
+    lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
@@ -197,9 +199,9 @@ RECORDS = {
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
-            {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
+            {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
-        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | None),
+        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
     "forces": Record(Force, "at name vector declared_at"),

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, DatumTargets, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
+from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
 from tolcontact.discretization.unit_check import warn_of_units
@@ -76,7 +77,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     warn_of_partial_surfaces(assembly, meshes)
-    return Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
+    nominal = Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
+    return replace(nominal, measurements=nominal_measurements(nominal))
 
 
 def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:

@@ -126,13 +126,16 @@ class Viewer {
     const group = new THREE.Group();
     const shape = new THREE.SphereGeometry(0.008 * this.size, 16, 12);
     const material = new THREE.MeshBasicMaterial({ color: "#c2410c", depthTest: false });
+    const stroke = new THREE.LineBasicMaterial({ color: "#c2410c", depthTest: false });
     for (const measure of this.data.measures) {
       for (const at of measure.points) {
         const ball = new THREE.Mesh(shape, material);
         ball.position.set(...at);
         group.add(ball);
       }
-      group.add(this.label(measure.name, measure.points[0]));
+      const ends = measure.lines.flat().map((at) => new THREE.Vector3(...at));
+      group.add(new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ends), stroke));
+      group.add(this.label(measure.name, measure.at));
     }
     this.scene.add(group);
     return group;
