@@ -73,7 +73,7 @@ Resolution = Annotated[
 ]
 Objective = Annotated[
     str | None,
-    typer.Option(help=f"Quantity that the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
+    typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
 
 
