@@ -476,6 +476,10 @@ def faults_of(build):
     return str(refused.value)
 
 
+def nested(depth, measurement):
+    return tc.Sum(nested(depth - 1, measurement), measurement) if depth else measurement
+
+
 BAD = {
     "unknown measure": (lambda m, a, b: m("x", tc.Minimum("earlier", "later")), 'unknown measure "later"; those declared'),
     "a cycle": (
@@ -504,6 +508,7 @@ BAD = {
     "no face": (lambda m, a, b: m("x", tc.Clearance(a.face("+z"), b.point(0, 0, 0))), "second is a Point; expected part.face"),
     "no station": (lambda m, a, b: m("x", tc.Gap(a.face("+z"), b.face(ROUND))), "station is a Face; expected part.point"),
     "no measurement": (lambda m, a, b: m("x", tc.Minimum("earlier", 3)), "int is no measurement"),
+    "nested": (lambda m, a, b: m("x", nested(9, tc.Gap(a.point(0, 0, 0), b.face(ROUND)))), "nested more than 8 deep"),
     "no triangles": (lambda m, a, b: m("x", tc.Gap(a.point(0, 0, 0), b.face("+x"))), "no triangle"),
     "everywhere": (lambda m, a, b: m("x", tc.Angle(a.face(), b.face(ROUND))), "more than one surface"),
     "beside": (

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tolcontact.declaration import Face
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault
-from tolcontact.features import AxisFeature, FaceDeviation, FeatureOfSize, PlaneFeature, feature_geometry
+from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, FeatureOfSize, PlaneFeature, feature_geometry
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.surface import Surface
@@ -33,10 +34,15 @@ class MeasuredFace:
         feet, normals, _ = self.surface.project(near[None])
         return Wall(self.part, Plane(feet[0], normals[0]), 1.0, self.deviation)
 
+    @cached_property
+    def geometry(self) -> FeatureGeometry:
+        """The kind of the face, with its numbers. Raises GeometryFault if it spans several surfaces."""
+        return feature_geometry([self.surface])
+
     @property
     def plane(self) -> Plane:
         """The plane of a flat face, with its outward normal. Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if not isinstance(geometry, PlaneFeature):
             raise GeometryFault(f"its face {self.face} is {geometry.in_words}; expected a plane")
         return Plane(geometry.centre, geometry.normal)
@@ -44,7 +50,7 @@ class MeasuredFace:
     @property
     def axis(self) -> "Axis":
         """The axis of a cylinder or cone, or the centre of a sphere. Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if isinstance(geometry, AxisFeature):
             direction = geometry.axis
         elif isinstance(geometry, FeatureOfSize) and not isinstance(geometry, PlaneFeature):
@@ -58,7 +64,7 @@ class MeasuredFace:
     @property
     def direction(self) -> np.ndarray:
         """The normal of a plane, or the direction of an axis (3,). Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if isinstance(geometry, PlaneFeature):
             return geometry.normal
         if isinstance(geometry, AxisFeature):
