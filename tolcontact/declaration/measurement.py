@@ -137,9 +137,10 @@ class _OfTwoFaces(Measurement):
 class Clearance(_OfTwoFaces):
     """The least distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least at the corners of the region in which they face each other nominally: corners of either face over
-    the other's plane, and places where their rims cross. Of a ball or a shaft beside walls it is the least gap of contact (see
-    tolcontact.discretization), of two outer cylinders the distance of their axes less both radii.
+    Of planes it is the least height, perpendicular to the second face, in the region in which they overlap at the present pose;
+    in the region in which they overlap nominally if there is none, or if their rims have more than 2500 pairs of edges. Of a
+    ball or a shaft beside walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
+    distance of their axes, each as long as its face, less both radii.
     """
 
     kind = "clearance"

@@ -12,6 +12,7 @@ from tolcontact.errors import GeometryFault
 from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, FeatureOfSize, PlaneFeature, feature_geometry
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.edges import rim
 from tolcontact.geometry.surface import Surface
 
 
@@ -143,6 +144,31 @@ class Heights(NominalMeasurement):
 
     stations: Sequence[tuple[Station, Wall]]
     crossings: Sequence[Crossing] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The rim of a plane face: its corners (corner, 3) [mm], and the edges (edge, 2) between them by number."""
+
+    vertices: np.ndarray
+    edges: np.ndarray
+
+    @classmethod
+    def of(cls, surface: Surface) -> "Outline":
+        """Return the rim of a face."""
+        used, edges = np.unique(rim(np.asarray(surface.mesh.faces)), return_inverse=True)
+        return cls(np.asarray(surface.mesh.vertices)[used], edges.reshape(-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneClearance(NominalMeasurement):
+    """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
+
+    first: MeasuredFace
+    second: MeasuredFace
+    planes: tuple[Plane, Plane]
+    outlines: tuple[Outline, Outline]
+    heights: Heights
 
 
 @dataclass(frozen=True, eq=False)

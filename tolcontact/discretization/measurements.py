@@ -17,6 +17,8 @@ from tolcontact.discretization.measured_geometry import (
     Heights,
     MeasuredFace,
     NominalMeasurement,
+    Outline,
+    PlaneClearance,
     RoundClearance,
     Station,
     Wall,
@@ -34,6 +36,7 @@ from tolcontact.geometry.overlap import crossing_edges
 MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
 FACING = -0.5  # largest cosine between the outward normals of planes that face each other
+MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
 
 
@@ -131,7 +134,8 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
     )
 
 
-def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
+def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights | PlaneClearance:
+    """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
     if not first.plane.axis @ second.plane.axis < FACING:
         raise GeometryFault(
             f"its planes {first.face} and {second.face} do not face each other; choose planes with material behind both"
@@ -155,7 +159,13 @@ def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
             "gap of a point with tc.Gap"
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
-    return Heights(np.array([shortest]), stations, crossings)
+    heights, outlines = (
+        Heights(np.array([shortest]), stations, crossings),
+        (Outline.of(first.surface), Outline.of(second.surface)),
+    )
+    if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
+        return heights
+    return PlaneClearance(heights.lines, first, second, (first.plane, second.plane), outlines, heights)
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
