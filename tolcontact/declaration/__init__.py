@@ -172,9 +172,11 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
 | `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
-| `tc.AxisDistance(..., across="z")` | across a direction, at the middle of the first axis; `along="x"`: one component |
-| `tc.Angle(face, face)` | angle of planes or axes, from 0 on; with `about="y"` its sign, positive if turned counterclockwise |
-| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
+| `tc.AxisDistance(..., across="z")` | their distance in the plane across a direction, through the middle of the first axis |
+| `tc.AxisDistance(..., along="x")` | component of the perpendicular from the middle of the first axis to the second one |
+| `tc.Angle(face, face)` | angle between planes or axes, from 0 on; at most a right angle nominally |
+| `tc.Angle(..., about="y")` | angle about a direction, with its sign: positive if the second face is turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or measures by name |
 | `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
 
 A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
