@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
 from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
@@ -25,7 +25,7 @@ class Part(Readable):
     """
 
     name: str
-    geometry: Box | Mesh
+    geometry: Geometry
     at: Vector = (0.0, 0.0, 0.0)
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Box, Mesh
+from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import rim
@@ -56,7 +56,7 @@ State = tuple[str, int, int, int, float | None, reader.Limits]
 _cache: dict[State | None, Content] = {}
 
 
-def read_files(geometries: Iterable[Box | Mesh], limits: reader.Limits = reader.DEFAULT_LIMITS) -> Contents:
+def read_files(geometries: Iterable[Geometry], limits: reader.Limits = reader.DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
     files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
