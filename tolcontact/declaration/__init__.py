@@ -19,8 +19,7 @@ surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
 >>> plate
 part plate: box 60 x 40 x 8 mm at (20, 5, 10)
 
-`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z. A rotation about an oblique axis is a vector along it:
-(30, 0, 30) turns by 42.4 degrees about the bisector of x and z.
+`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z.
 
 >>> tc.degrees(90), tc.degrees(0, 0, 180)
 (1.5707963267948966, (0.0, 0.0, 3.141592653589793))
