@@ -67,8 +67,6 @@ pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, full width 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
 locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
->>> print(tc.Tolerance("+0.4/-0.2"))
-normal, full width 0.6 mm, shifted by 0.1 mm
 
 `locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
 a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
