@@ -183,6 +183,7 @@ of the second part, which carry the directions as they tilt.
 >>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
 >>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
 >>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+
 A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
 sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
 derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
