@@ -94,7 +94,7 @@ z)` or at an end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 s
 without naming it. The limits of a size may be a tolerance class of ISO 286-1, with capital letters for holes and slots.
 
 >>> tc.Size(8, "H7"), tc.Size(8, "g6")
-(size 8 +0.015 +0 mm, size 8 -0.005 -0.014 mm)
+(size 8 H7 +0.015 +0 mm, size 8 g6 -0.005 -0.014 mm)
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
@@ -219,9 +219,9 @@ A model script is a Python file with a function `assembly()` that returns the de
 under a main guard it runs by itself, with the options of `tolcontact run`; the files in `models/` are such scripts.
 
 The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
-"model.json")` writes them. What a script would leave out may be left out, files of shapes are named from the folder of the
-JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON schema follows from the classes of
-this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
+"model.json")` writes them. What a script would leave out may be left out, tolerances may be written as texts, files of shapes
+are named from the folder of the JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON
+schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
 measures, pairs 100 000 contact points, names 500 characters, expressions 100 000 steps, and a draw of a distribution takes at
