@@ -13,6 +13,7 @@ from tolcontact.archive.variables import Contents, define, labels_of_rows, units
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.vocabulary import ArchiveVariable
 
@@ -34,6 +35,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             "history": f"{now()} created",
             "versions": versions(),
             **run_settings(program, run),
+            **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
     _write_labels(contents, file, nominal)
@@ -277,4 +279,11 @@ def _write_sample(contents: Contents, group: netCDF4.Group, program: Program, *,
     contents.add(group, terms.ONE_SIDED, locators.one_sided)
     contents.add(group, terms.LOCATOR_POINT, locators.points)
     contents.add(group, terms.LOCATOR_DIRECTION, locators.directions)
-    contents.add(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
+    contents.add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
+    if any(locators.grounds):
+        contents.add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
+
+
+def _numbers(nominal: Nominal, faces: Sequence[FaceDeviation | None]) -> list[int]:
+    """Return the numbers of faces of features from 0, -1 for None."""
+    return [-1 if face is None else nominal.faces.index(face) for face in faces]

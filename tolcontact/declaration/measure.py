@@ -5,6 +5,7 @@ rows (operation, operands...): "input" with an index into the pose entries of al
 with a number, or the name of a CasADi operation with the positions of earlier rows. The last row is the value.
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
 from tolcontact.declaration.values import Vector, is_finite, is_length, is_line
+from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
 
 
@@ -27,19 +29,25 @@ class Measure(Readable):
         of a Measurement            its value, such as a gap, an angle or the least of several measures [mm, rad]
         of a function               the CasADi expression that the function returns for the symbolic poses
 
-    `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits at half
-    of it below and above the nominal value.
+    `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits around the
+    nominal value: at half of a number below and above it, or at deviations such as "±0.1", "+0.1/-0.05" or (-0.05, 0.1).
     """
 
     name: str
     of: Point | Measurement | Callable[[Any], Any] | tuple[Any, ...]
     to: Point | None = None
     along: Vector | None = None
-    tolerance: float | None = None
+    tolerance: float | Deviations | None = None  # a text or another pair only if it is no tolerance
     units: str = "mm"
     declared_at: str = ""
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+
+    def __post_init__(self) -> None:
+        with contextlib.suppress(TextFault):  # faults() reports it
+            value = written(self.tolerance, units=self.units)
+            is_symmetric = isinstance(value, Deviations) and not value.middle
+            object.__setattr__(self, "tolerance", value.width if is_symmetric else value)
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -71,7 +79,7 @@ class Measure(Readable):
     def width(self) -> float | None:
         """The width of the allowed zone; None if a side is open."""
         if self.limits is None:
-            return self.tolerance
+            return self.tolerance.width if isinstance(self.tolerance, Deviations) else self.tolerance
         lower, upper = self.limits
         return None if lower is None or upper is None else float(upper - lower)
 
@@ -80,6 +88,8 @@ class Measure(Readable):
         if self.limits is not None:
             lower, upper = self.limits
             return -math.inf if lower is None else lower, math.inf if upper is None else upper
+        if isinstance(self.tolerance, Deviations):
+            return nominal + self.tolerance.lower, nominal + self.tolerance.upper
         half = math.inf if self.tolerance is None else self.tolerance / 2
         return nominal - half, nominal + half
 
@@ -94,12 +104,7 @@ class Measure(Readable):
             )
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
-        if self.tolerance is not None and not (
-            isinstance(self.tolerance, int | float) and math.isfinite(self.tolerance) and self.tolerance > 0
-        ):
-            yield f"tolerance is {self.tolerance!r}; expected the full width of the allowed zone, above 0"
-        if self.limits is not None:
-            yield from self._limits_faults()
+        yield from self._limits_faults()
         if not isinstance(self.absolute, bool | None):
             yield f"absolute is {self.absolute!r}; expected True or False"
         elif self.absolute is not None and not isinstance(self.of, Point):
@@ -126,6 +131,13 @@ class Measure(Readable):
         return "measurement" if isinstance(self.of, Measurement) else "function of the poses"
 
     def _limits_faults(self) -> Iterator[str]:
+        width = self.tolerance.width if isinstance(self.tolerance, Deviations) else self.tolerance
+        if fault := text_fault(self.tolerance, units=self.units):
+            yield f"tolerance is {fault}"
+        elif width is not None and not (is_length(width) and width > 0):
+            yield f"tolerance is {self.tolerance!r}; expected the full width of the allowed zone, above 0"
+        if self.limits is None:
+            return
         if self.tolerance is not None:
             yield "it has both a tolerance and limits; give one of them"
         fault = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
@@ -163,6 +175,8 @@ class Measure(Readable):
     @property
     def _limit_text(self) -> str:
         if self.limits is None:
+            if isinstance(self.tolerance, Deviations):
+                return f", tolerance {self.tolerance} {self.units}"
             return "" if self.tolerance is None else f", tolerance {self.tolerance:g} {self.units}"
         lower, upper = self.limits
         if lower is None or upper is None:

@@ -270,6 +270,11 @@ class Features:
         nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
         return None if nominal is None else self._used(nominal, nominal.face_with(position), placement)
 
+    def middle_of(self, feature: Feature, placement: Placement) -> FaceDeviation | None:
+        """Return how the middle of a feature deviates, which no size moves; None if the feature could not be added."""
+        nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
+        return None if nominal is None else self._used(nominal, None, placement)
+
     def _used(self, nominal: NominalFeature, number: int | None, placement: Placement) -> FaceDeviation:
         """Return the deviation of a face: the same object for all that uses it."""
         key = (nominal.feature, number)

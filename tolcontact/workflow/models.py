@@ -16,6 +16,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.errors import ModelError, OptionError
 from tolcontact.method import Method
+from tolcontact.plausibility import warn_of_nominal
 from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
 from tolcontact.variation.measured_population import measured_population
@@ -31,10 +32,13 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
     """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
 
     `method` replaces the model's own; a mapping, such as {"resolution": "exact"}, replaces single choices.
+    A NominalWarning names what is probably a mistake in the nominal assembly (see tolcontact.plausibility).
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
     assembly = assembly_of(model)
-    return compile_program(discretize(assembly), solver, method_of(assembly, method))
+    program = compile_program(discretize(assembly), solver, method_of(assembly, method))
+    warn_of_nominal(program)
+    return program
 
 
 def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:
