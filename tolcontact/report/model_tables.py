@@ -142,7 +142,19 @@ def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
 
 
 def _of(measure: Entry) -> str:
-    return _end(measure["of"]) if "of" in measure else "expression of the poses"
+    if "of" not in measure:
+        return "expression of the poses"
+    return f"{measure['of']['kind']} of {', '.join(_named(measure['of']))}" if "kind" in measure["of"] else _end(measure["of"])
+
+
+def _named(entry: Any) -> list[str]:
+    """Return the parts of the faces and points of a measurement, or the names of its measures, each once."""
+    if isinstance(entry, str):
+        return [entry]
+    if "part" in entry:
+        return [str(entry["part"])]
+    operands = entry.get("measurements", [value for value in entry.values() if isinstance(value, dict)])
+    return list(dict.fromkeys(name for operand in operands for name in _named(operand)))
 
 
 def _end(point: Entry | None) -> str:

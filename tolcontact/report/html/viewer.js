@@ -154,7 +154,7 @@ class Viewer {
       mark.position.copy(point);
       group.add(mark);
     }
-    const lines = points.length === 2 ? [points] : [];
+    const lines = measure.lines.map((line) => line.map((at) => new THREE.Vector3(...at)));
     if (measure.along) {
       const end = points[0].clone().addScaledVector(new THREE.Vector3(...measure.along).normalize(), 0.16 * this.size);
       lines.push([points[0], end]);
