@@ -177,18 +177,16 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
 | `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
 
-A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
-at the point's nominal foot. The stations of a seam are points along it. Gap and flush are measured perpendicular to the faces
-of the second part, which carry the directions as they tilt.
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus, or as its tangent plane at the point's
+nominal foot. The stations of a seam are points along it. Gap and flush are perpendicular to the second part's faces.
 
->>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
->>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)]
 >>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
 >>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
 >>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
-A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
-sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
-derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
+
+A measurement may lie within one part if features with tolerances are measured. Minima, clearances, and angles and distances
+that are nominally 0 have a kink there: the analyses state no derivatives and no bound for them.
 
 ## The model's method, and faults
 
