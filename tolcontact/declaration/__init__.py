@@ -176,12 +176,10 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or measures by name |
 | `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
 
-A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
-at the point's nominal foot. The stations of a seam are points along it. Gap and flush are measured perpendicular to the faces
-of the second part, which carry the directions as they tilt.
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus, or as its tangent plane at the point's
+nominal foot. The stations of a seam are points along it. Gap and flush are perpendicular to the second part's faces.
 
->>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
->>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)]
 >>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
 >>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
 >>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)

@@ -102,7 +102,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         linear = float(shares["linear"])
         rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
     if not np.isfinite(dataset["linear"].values).any():
-        missed = ["no linear shares: it has a kink in the nominal assembly, or no slope there"]
+        missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
     columns = ["", "raw", "corrected, alone", "in total", "linear"]
