@@ -149,6 +149,11 @@ forces (see `tolcontact.mechanics`): they press parts onto their supports and ne
 >>> print(weight)
 force weight: (0, 0, -100) N at plate (30, 20, 4)
 
+## Fasteners
+
+`fasten(name, 10, through=[hole, ...], into=hole)` declares a bolt, screw, pin or dowel in the holes of several parts: its part,
+its location and its contact pairs (see `tolcontact.fasteners`).
+
 ## Measures
 
 A measure is the displacement of a point along a direction, the distance of two points along a direction (`to=`), or a function
@@ -290,68 +295,11 @@ from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
 
 __all__ = [
-    "OUTSIDE",
-    "Angle",
-    "Angularity",
-    "Assembly",
-    "AxisDistance",
-    "Box",
-    "Brep",
-    "CircularRunout",
-    "Clearance",
-    "Coaxiality",
-    "Combination",
-    "ContactPair",
-    "Correlation",
-    "Cylinder",
-    "Cylindricity",
-    "DatumTargets",
-    "Difference",
-    "Face",
-    "Facing",
-    "Feature",
-    "Flatness",
-    "Flush",
-    "Force",
-    "Gap",
-    "GeometricTolerance",
-    "Geometry",
-    "Inside",
-    "Largest",
-    "LineProfile",
-    "Location",
-    "Locator",
-    "Maximum",
-    "Mean",
-    "Measure",
-    "Measurement",
-    "Mesh",
-    "Minimum",
-    "Near",
-    "Parallelism",
-    "Part",
-    "Pattern",
-    "Perpendicularity",
-    "Picked",
-    "Pin",
-    "Point",
-    "Population",
-    "Position",
-    "Profile",
-    "Roundness",
-    "Size",
-    "Straightness",
-    "Sum",
-    "Symmetry",
-    "ThreeTwoOne",
-    "Tolerance",
-    "TotalRunout",
-    "Triangles",
-    "Variable",
-    "degrees",
-    "has_supports",
-    "is_free",
-    "movers",
-    "stations",
-    "three_two_one",
-]
+    "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
+    "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
+    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Gap", "GeometricTolerance", "Geometry", "Inside", "Largest",
+    "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum", "Near",
+    "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
+    "Roundness", "Size", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "Tolerance", "TotalRunout", "Triangles",
+    "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
+]  # fmt: skip
