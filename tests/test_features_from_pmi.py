@@ -53,17 +53,17 @@ def drawing(file: Annotated) -> None:
 
 
 DECLARED = [
-    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1 mm per 25 mm",
+    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1/25",
     "feature B of cover (datum B): cover B-rep face 6",
     "feature C of cover (datum C): cover B-rep face 1",
     "feature plane 2 of cover: cover B-rep face 2",
     "feature cylinder 13 of cover: cover B-rep face 13",
     "feature cylinder 15 of cover: cover B-rep face 15",
-    "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2M mm to A|B(M)|C",
-    "feature slot 12 of cover: cover B-rep face 12, cover B-rep face 14; size 8.1 +0.05 -0.05 mm; position 0.3 mm to A|B|C",
-    "feature plane 10 of cover: cover B-rep face 10; profile 0.4 mm to A|B|C",
-    "feature plane 7 of cover: cover B-rep face 7; profile 0.3 mm to E|D",
-    "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 mm to A|B|C; position 0.1 mm to A><|B><",
+    "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2 Ⓜ A B Ⓜ C",
+    "feature slot 12 of cover: cover B-rep face 12, cover B-rep face 14; size 8.1 +0.05 -0.05 mm; position 0.3 A B C",
+    "feature plane 10 of cover: cover B-rep face 10; profile 0.4 Ⓤ0.1 A B C",
+    "feature plane 7 of cover: cover B-rep face 7; profile 0.3 E D",
+    "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 A B C; position 0.1 A>< B><",
     "pattern D of cover (datum D): 2 members",
 ]  # fmt: skip
 TARGETS = "datum E: targets cover.plane 2 (60, 40, 8), cover.plane 2 (20, 70, 8), cover.plane 2 (100, 5, 8)"
@@ -341,7 +341,7 @@ def test_each_body_of_a_file_gets_its_features(tmp_path):
     assert [[str(feature) for feature in part.toleranced] for part in declared.parts] == [
         [
             "feature A of body 1 (datum A): body 1 B-rep face 1",
-            "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 mm to A",
+            "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 A",
         ],
         ["feature plane 1 of body 2: body 2 B-rep face 1; flatness 0.1 mm"],
     ]  # fmt: skip

@@ -48,7 +48,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `degrees` |
+| declare | `Assembly`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Feature`, `Pattern`, `DatumTargets`, `Variable` |

@@ -54,6 +54,7 @@ from .declaration import (
     Straightness as Straightness,
     Sum as Sum,
     Symmetry as Symmetry,
+    TitleBlock as TitleBlock,
     Tolerance as Tolerance,
     TotalRunout as TotalRunout,
     Variable as Variable,

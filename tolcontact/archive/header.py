@@ -35,6 +35,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             "history": f"{now()} created",
             "versions": versions(),
             **run_settings(program, run),
+            **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
     _write_labels(contents, file, nominal)

@@ -19,6 +19,7 @@ from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
 from tolcontact.later import FASTENER, LATER
@@ -48,7 +49,8 @@ class Assembly(Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
-    this model is resolved; a run may state another one. Raises TypeError for an argument of a wrong type.
+    this model is resolved; a run may state another one. `title_block` heads its reports. Raises TypeError for an argument of a
+    wrong type.
     """
 
     parts = Declared[Part]()
@@ -60,10 +62,12 @@ class Assembly(Pictured):
     correlations = Declared[Correlation]()
     populations = Declared[Population]()
 
-    def __init__(self, name: str, *, method: Method | None = None) -> None:
+    def __init__(self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None) -> None:
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
+        _expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
         self.name = name
         self.method = method
+        self.title_block = title_block
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     def _add(self, name: str, thing: T) -> T:
@@ -73,7 +77,7 @@ class Assembly(Pictured):
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
-        copy = Assembly(self.name, method=self.method)
+        copy = Assembly(self.name, method=self.method, title_block=self.title_block)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
@@ -240,6 +244,7 @@ class Assembly(Pictured):
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
         yield from text_faults("assembly", [self.name])
+        yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
                 yield f"it has {count} {name}; expected at most {most}"

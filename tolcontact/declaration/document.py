@@ -30,7 +30,7 @@ from tolcontact.declaration.face_entry import (
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES
+from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
@@ -40,6 +40,7 @@ from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
 from tolcontact.declaration.size import MOVES, Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
@@ -151,8 +152,8 @@ ZONE = Record(
 WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
 CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
 SIZE = Record(
-    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), upper=Plain(float | str),
-    lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
+    Size, "nominal upper lower cp cpk moves distribution tolerance_class?", kind="size", nominal=Plain(POSITIVE),
+    upper=Plain(float | str), lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
@@ -197,6 +198,7 @@ METHOD = Record(
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
+TITLE_BLOCK = Record(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
 GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
@@ -230,6 +232,7 @@ RECORDS = {
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
+    ("title_block", TITLE_BLOCK.wire | None, None),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
@@ -240,7 +243,16 @@ def to_document(
     """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
     writing = Writing(triangles, tapes, folder)
     lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
-    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **lists}
+    titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
+    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **lists}
+
+
+def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
+    """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
+    try:
+        return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
+    except EntryError as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
@@ -282,7 +294,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
-    assembly = Assembly(struct.name, method=method).replaced(**things)
+    title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
+    assembly = Assembly(struct.name, method=method, title_block=title_block).replaced(**things)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly

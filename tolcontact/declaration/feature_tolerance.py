@@ -14,6 +14,7 @@ RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
 TRANSLATIONS = ("translation", "polar")  # rules without tilts
 BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
+SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
 AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
@@ -149,6 +150,17 @@ class GeometricTolerance(Readable):
             yield f'cp is given with the rule "{self.rule}"; it goes with normal components'
 
     def __str__(self) -> str:
+        """Return the tolerance with the symbols of a drawing."""
+        diameter, material = "⌀" if self.zone == "round" else "", f" {SYMBOLS[self.material]}" if self.material else ""
+        unit = f"/{'×'.join(f'{length:g}' for length in self._unit_lengths)}" if self._unit_lengths else ""
+        projected = "" if self.projected is None else f" Ⓟ{self.projected:g}"
+        unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
+        frame = f"{self.kind} {diameter}{self.width:g}{unit}{unequal}{material}{projected}{' Ⓣ' if self.tangent else ''}"
+        return " ".join([frame, *(re.sub(r"\(([ML])\)", lambda m: f" {SYMBOLS[m[1]]}", datum) for datum in self._compartments)])
+
+    @property
+    def archived_text(self) -> str:
+        """The tolerance without symbols, as archives describe the contributors of a feature."""
         round_ = "diameter " if self.zone == "round" else ""
         unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""

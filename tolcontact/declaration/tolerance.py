@@ -110,7 +110,7 @@ class Tolerance(Readable):
             spread = f"scipy.stats.{self.distribution.dist.name}"
         else:
             width = f"{self.range:g} mm" if is_length(self.range) else repr(self.range)
-            spread = f"{self.distribution}, range {width}"
+            spread = f"{self.distribution}, full width {width}"
         numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
         capability = "".join(f", {name} {value:g}" for name, value in numbers)
         return spread + capability + (f", shifted by {self.shift:g} mm" if is_length(self.shift) and self.shift else "")
