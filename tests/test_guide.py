@@ -14,8 +14,8 @@ from tolcontact.report import summary_text
 
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
-    "declaration", "geometry", "pmi", "features", "discretization", "variation", "mechanics", "compilation", "plausibility",
-    "contact", "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
+    "declaration", "geometry", "pmi", "features", "fasteners", "discretization", "variation", "mechanics", "compilation",
+    "plausibility", "contact", "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
 

@@ -169,3 +169,30 @@ def test_shafts_in_several_bores_rest_in_all_of_them(name, samples):
         ]
     )
     assert least.min() > -1e-8 and (np.abs(least) < 1e-7).all()  # each bore carries
+
+
+@pytest.mark.slow
+def test_a_bracket_sags_by_the_clearances_of_its_bolts():
+    """The lowest place of the weight at which both holes are within their clearances: a search over the shift along x."""
+    results = tc.run(cases.model("bracket"), samples=40, solver="daqp", fields="none", surfaces=0)
+    assert (results.status == Status.RESOLVED).all()
+    drawn = results["sample"].deviation
+
+    def of(label):
+        return drawn.sel(contributor=label).values
+
+    numbers = (1, 2)
+    sizes = [of(f"{part}.hole {k}.size") for part in ("wall", "bracket") for k in numbers]
+    room = [1.0 + (sizes[k] + sizes[k + 2]) / 2 - of(f"bolt {k + 1}.shank.size") for k in (0, 1)]
+    off = {axis: [of(f"wall.hole {k}.shift {axis}") - of(f"bracket.hole {k}.shift {axis}") for k in numbers] for axis in "xy"}
+    x = np.linspace(-1.5, 1.5, 6001)[:, None]
+    aside = [x - off["x"][k] for k in (0, 1)]
+    reach = [np.sqrt(np.where(np.abs(a) < r, r**2 - a**2, np.nan)) for a, r in zip(aside, room, strict=True)]
+    ends = np.array([off["y"][k] - reach[k] for k in (0, 1)])
+    lever = (10 + 45) / 90  # share of the weight on the right bolt
+    best = np.nanargmin((1 - lever) * ends[0] + lever * ends[1], axis=0)
+    sagged = ends[:, best, np.arange(ends.shape[2])].T
+    measured = results.measured.sel(state="corrected").values
+    # To first order in the turn, which is at most 0.02, and on a grid of 0.5 um.
+    assert np.abs(measured - sagged).max() < 0.01 < 0.1 * sagged.std()
+    assert -1.15 < measured.mean() < -0.95
