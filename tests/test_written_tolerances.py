@@ -79,6 +79,12 @@ def test_unequal_limits_shift_the_mean(distribution):
     assert np.array_equal(same["measured"], arrays["measured"])
 
 
+def test_worst_cases_are_the_limits():
+    """All of A1, A2 and A3 at a limit lift the middle of the block to that limit."""
+    worst = tc.worst_case(block("+0.4/-0.2"), samples=64).worst.sel(state="raw", measure="height")
+    assert worst.values == pytest.approx([-0.2, 0.4], abs=1e-9)
+
+
 def test_equal_limits_are_the_full_width():
     assert str(block("±0.1")) == str(block(0.2)) == str(block("+0.1/-0.1")) == str(block((-0.1, 0.1)))
 
@@ -92,9 +98,22 @@ def test_sizes_have_limits_as_drawings_write_them():
     written_sizes = [tc.Size(8.1, limits) for limits in ("+0.05/-0.02", "+0.05 -0.02", (-0.02, 0.05))]
     assert set(written_sizes) == {tc.Size(8.1, 0.05, -0.02)}
     assert tc.Size(8.1, "±0.05") == tc.Size(8.1, "0.05") == tc.Size(8.1, 0.05)
-    assert tc.Size(50, "H7") == tc.Size(50, 0.025, 0.0)
-    assert tc.Size(50, "g6") == tc.Size(50, -0.009, -0.025)
-    assert tc.Size(50, "js9", distribution="uniform") == tc.Size(50, 0.031, distribution="uniform")
+    assert tc.Size(50, "H7") == tc.Size(50, 0.025, 0.0, tolerance_class="H7")
+    assert tc.Size(50, " g6 ") == tc.Size(50, -0.009, -0.025, tolerance_class="g6")
+    assert tc.Size(50, "js9", distribution="uniform").tolerance == tc.Size(50, 0.031, distribution="uniform").tolerance
+
+
+@pytest.mark.parametrize(
+    ("model", "advice"),
+    [
+        (lambda: toleranced.ring_with("bore", tc.Size(10, "h7")), 'its tolerance class is h7, and it is a hole; write "H7"'),
+        (lambda: toleranced.block_with("width", tc.Size(50, "JS9")), 'is JS9, and it is no hole; write "js9"'),
+    ],
+)
+def test_classes_of_holes_are_for_holes(model, advice):
+    """Writing h7 for a hole is off by the whole width of the zone, and easily overlooked."""
+    (fault,) = tc.check(model())
+    assert advice in fault
 
 
 def test_a_bore_with_a_class_varies_about_the_middle_of_its_limits():
@@ -115,6 +134,8 @@ def test_a_bore_with_a_class_varies_about_the_middle_of_its_limits():
         (tc.Size(10, "0.1 inch"), "its unit is inch; expected mm"),
         (tc.Size("10", "H7"), "nominal is '10'; expected a number in mm"),
         (tc.Size(10, (0.1, -0.1)), "swap them"),
+        (tc.Size(10, 0.1, -0.1, tolerance_class="H7"), "'H7', which has other limits than +0.1 -0.1; leave it out"),
+        (tc.Size(10, 0.1, -0.1, tolerance_class="x"), "tolerance_class is 'x'; expected a number"),
         (tc.Size(10, True), "upper is True; expected a number in mm"),
     ],
 )
@@ -174,25 +195,28 @@ def test_units_of_a_measure_are_those_of_its_tolerance():
     model = tc.Assembly("a")
     part = model.part("block", tc.Box(1, 1, 1), fixed=True)
     model.measure("tilt", tilt, units="rad", tolerance="±0.01 rad")
+    model.measure("tilt in degrees", tilt, units="rad", tolerance="+1°/-0.5°")
     assert model.measures[0].tolerance == 0.02
+    assert model.measures[1].tolerance == pytest.approx((-np.pi / 360, np.pi / 180))
+    assert written("±0.5 deg", units="rad") == pytest.approx((-np.pi / 360, np.pi / 360))
     assert tc.check(model) == ()
 
 
 def test_models_as_data_take_the_same_texts(tmp_path):
-    tc.write_model(toleranced.block_with("width", tc.Size(50, "H7")), tmp_path / "block.json")
+    tc.write_model(toleranced.block_with("width", tc.Size(50, "h7")), tmp_path / "block.json")
     document = json.loads((tmp_path / "block.json").read_text())
     size = document["parts"][0]["features"][2]["tolerances"][0]
-    assert (size["upper"], size["lower"]) == (0.025, 0.0)
-    for key in ("lower", "cp", "cpk"):
+    assert (size["upper"], size["lower"], size["tolerance_class"]) == (0.0, -0.025, "h7")
+    for key in ("tolerance_class", "lower", "cp", "cpk"):
         del size[key]
-    size["upper"] = "H7"
+    size["upper"] = "h7"
     document["measures"][0]["tolerance"] = "+0.1/-0.05"
     document["measures"][1]["tolerance"] = [-0.1, 0.1]
     document["variables"] = [{"name": "heat", "tolerance": "+20/-10", "drives": {"block.width.size": 0.001}}]
     (tmp_path / "written.json").write_text(json.dumps(document))
     Draft202012Validator(json_schema()).validate(document)
     model = load_model(tmp_path / "written.json")
-    assert model.features[2].tolerances == (tc.Size(50, 0.025, 0.0),)
+    assert model.features[2].tolerances == (tc.Size(50, "h7"),)
     assert [measure.tolerance for measure in model.measures] == [(-0.05, 0.1), 0.2, None]
     assert model.variables[0].tolerance == tc.Tolerance(30.0, shift=5.0)
 

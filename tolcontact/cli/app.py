@@ -140,8 +140,10 @@ def show_warnings(records: Iterable[warnings.WarningMessage]) -> None:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     """Print a warning: in a terminal as wide as that, else on one line."""
+    if sys.stderr is None:
+        return
     text = f"warning: {shown(str(message))}"
     if sys.stderr.isatty():
         columns = max(shutil.get_terminal_size().columns, MIN_COLUMNS)
         text = textwrap.fill(text, columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-    typer.echo(text, err=True)
+    print(text, file=sys.stderr)  # a bar that is shown takes the place of this stream, and moves down

@@ -152,8 +152,8 @@ ZONE = Record(
 WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
 CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
 SIZE = Record(
-    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), upper=Plain(float | str),
-    lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
+    Size, "nominal upper lower cp cpk moves distribution tolerance_class?", kind="size", nominal=Plain(POSITIVE),
+    upper=Plain(float | str), lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())

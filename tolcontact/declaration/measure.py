@@ -142,7 +142,10 @@ class Measure(Readable):
             yield "it has both a tolerance and limits; give one of them"
         fault = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
         if not (isinstance(self.limits, tuple) and len(self.limits) == 2):
-            yield fault
+            is_text = isinstance(self.limits, str)
+            yield (
+                f"{fault}; around the nominal value they are a tolerance, as in tolerance={self.limits!r}" if is_text else fault
+            )
             return
         limits = [limit for limit in self.limits if limit is not None]
         if not limits or not all(map(is_length, limits)) or (len(limits) == 2 and not limits[0] < limits[1]):

@@ -133,9 +133,9 @@ class Part(Readable):
 
     def faults(self) -> Iterator[str]:
         yield from self.geometry.faults()
-        for label, value in (("at", self.at), ("rotation", self.rotation)):
+        for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
             if not is_finite(value):
-                yield f"{label} is not a vector of three finite numbers"
+                yield f"{label} is not a vector of three finite numbers; give it as in {label}={example}"
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)

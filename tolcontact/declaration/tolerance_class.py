@@ -213,6 +213,8 @@ def tolerance_class(text: str) -> ToleranceClass | None:
     if match is None:
         return None
     letters, grade = match.groups()
+    if letters.upper() == "IT":
+        raise UndefinedClass(f'it is a grade alone; add letters, as in "H{grade}" for a hole and "h{grade}" for a shaft')
     if letters.lower() not in LETTERS:
         known = ", ".join(LETTERS)
         raise UndefinedClass(f'ISO 286-1 has no letters "{letters}"; its letters are {known}, and their capitals for holes')

@@ -307,6 +307,11 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"
         )
+    if size.is_for_holes not in (None, geometry.is_inner):
+        own, other = (
+            ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
+        )
+        raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {own}; write "{other}"')
 
 
 def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:

@@ -112,6 +112,13 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
     return found
 
 
+class PartsOfFile(dict[str, Part]):
+    """The parts of a STEP file by their names."""
+
+    def __missing__(self, name: str) -> Part:
+        raise OptionError(f'no part "{shown(str(name))}" is declared of the file; its parts are: {_first(list(self))}')
+
+
 def parts_from(
     model: Assembly,
     path: str | Path,
@@ -119,7 +126,7 @@ def parts_from(
     *,
     fixed: bool | Sequence[str] | None = None,
     chord: float | None = None,
-) -> dict[str, Part]:
+) -> "PartsOfFile":
     """Declare bodies of a STEP file as parts of a model, each in its place, and return the parts by their names.
 
     All bodies are declared, or those in `names`. A part has the name of its body in the file, without characters that a
@@ -128,6 +135,8 @@ def parts_from(
     it lists the bodies that are fixed, as in fixed=["plate"]. `chord` [mm] is as of a Mesh.
     Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if `names` or `fixed` is one text.
     """
+    if not isinstance(model, Assembly):
+        raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.parts_from(model, "file.stp")')
     wanted = None if names is None else _names("names", names)
     fixed_names = [] if fixed is None or isinstance(fixed, bool) else _names("fixed", fixed)
     try:
@@ -136,18 +145,23 @@ def parts_from(
         raise ModelError(model.name, [str(error)]) from error
     by_name = {body.name: body for body in bodies}
     if missing := [name for name in (*(wanted or ()), *fixed_names) if name not in by_name]:
-        listed = ", ".join(f'"{body.name}"' for body in bodies[:MAX_LISTED]) + (", ..." if len(bodies) > MAX_LISTED else "")
+        listed = _first([body.name for body in bodies])
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
     declared = bodies if wanted is None else [by_name[name] for name in wanted]
     if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
         raise ModelError(model.name, [f'fixed has the body "{name}", which names has not; add it there' for name in undeclared])
-    parts = {}
+    parts = PartsOfFile()
     for body in declared:
         is_fixed = fixed if isinstance(fixed, bool) else body.name in fixed_names or None
         mesh = Mesh(path, body=body.number, chord=chord)
         part = model.part(part_name(body), mesh, at=body.at, rotation=body.rotation, fixed=is_fixed)
         parts[part.name] = part
     return parts
+
+
+def _first(names: Sequence[str]) -> str:
+    """Return the first names of a list for a message."""
+    return ", ".join(f'"{name}"' for name in names[:MAX_LISTED]) + (", ..." if len(names) > MAX_LISTED else "")
 
 
 def _names(option: str, value: Any) -> list[str]:

@@ -102,7 +102,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         linear = float(shares["linear"])
         rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
     if not np.isfinite(dataset["linear"].values).any():
-        missed = ["It has no linear shares: in the nominal assembly it is at a kink, or nothing changes it to first order."]
+        missed = ["no linear shares: it has a kink in the nominal assembly, or no slope there"]
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
     columns = ["", "raw", "corrected, alone", "in total", "linear"]
@@ -191,6 +191,8 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
     if beyond > GAP_ACCURACY:
         remarks.append(f"Up to {beyond:.2g} beyond the bound, which is of first order in the deviations.")
+    if not np.isfinite(dataset["bound"].values).all():
+        remarks.append("No bound: a kink in the nominal assembly, or contact alone would have to hold the part.")
     if float(dataset["unseen"].max()) > LARGE_UNSEEN:
         remarks.append("Searches ended at several values, so there may be worse ones; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
