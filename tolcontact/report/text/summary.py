@@ -31,8 +31,6 @@ from tolcontact.vocabulary import (
     STATE_WORDS,
     STATES,
     VARIANCE_RATIO,
-    WITH_CONTACT,
-    WITHOUT_CONTACT,
     WORD_OF_STATE,
     reaction_words,
 )
@@ -184,7 +182,7 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
-    yield f"largest penetration at contact points: {raw:.3g} mm {WITHOUT_CONTACT}, {corrected:.3g} mm {WITH_CONTACT}"
+    yield f"largest penetration at contact points: {raw:.3g} mm without, {corrected:.3g} mm with contact"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
 
