@@ -179,12 +179,12 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "worst",
-        "Print the least and the largest value of each measure that the drawings allow, and the deviations that give them.",
+        "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
         worst_case,
         terms.WORST_CASE,
-        "Number of random combinations; searches begin at the best of them.",
+        "Number of random combinations; a search for each extreme begins at one in 85 of them.",
         ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
-        lambda dataset: dataset[["worst", "bound", "random", "ends", "unseen"]].to_dataframe(),
+        lambda dataset: dataset[["worst", "bound", "random", "agreeing", "ends", "unseen"]].to_dataframe(),
     ),
     AnalysisCommand(
         "allocate",

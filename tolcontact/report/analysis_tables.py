@@ -15,7 +15,9 @@ from tolcontact.report.figures import grouped, number, percent, share
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
-LARGE_UNSEEN = 0.1  # share of unseen starts from which on a remark states that there may be worse ends
+FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
+EXTREMES = ("minimum", "maximum")  # on pages, for "least" and "largest" in archives
+CONTACT_OF = dict(zip(terms.STATES, ("without contact", "with contact"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -161,8 +163,10 @@ def _slopes(dataset: xr.Dataset) -> AnalysisTable:
 
 def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Found by searches over all that the drawings allow; `bound`: no pose free of penetration",
-        "lies beyond, to first order; `random`: the worst of random combinations.",
+        "Worst-case minimum and maximum over all combinations that the tolerances allow.",
+        "found: the worst combination that searches found; `searches` says how many of them met there.",
+        "linear: tolerances times sensitivities at the nominal assembly, as in a stack-up; with contact,",
+        "the farthest that parts can be without penetration, if contact or locators hold them.",
     ]
     counts = dataset["by_status"].values
     for status in terms.UNRESOLVED:
@@ -177,28 +181,31 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
 
 def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     """Yield both ends of a measure in both states, and the combinations that give the corrected ends."""
-    rows = []
+    rows, searches = [], int(dataset.attrs["searches"])
     for state in terms.STATES:
-        for end in terms.ENDS:
+        for end, word in zip(terms.ENDS, EXTREMES, strict=True):
             extreme = dataset.sel(state=state, end=end)
-            values = [float(extreme[word]) for word in ("worst", "bound", "random")]
-            cells = [f"{value:.6g}" if math.isfinite(value) else "none" for value in values]
-            rows.append([f"{state}, {end}", *cells, f"{100 * float(extreme['unseen']):.0f} %"])
+            found, linear = float(extreme["worst"]), float(extreme["bound"])
+            cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
+            if "agreeing" in dataset:  # older archives do not state it
+                cells.append(f"{int(extreme['agreeing'])} of {searches}")
+            rows.append([f"{word}, {CONTACT_OF[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
     if beyond > GAP_ACCURACY:
-        remarks.append(f"Up to {beyond:.2g} beyond the bound, which is of first order in the deviations.")
-    if float(dataset["unseen"].max()) > LARGE_UNSEEN:
-        remarks.append("Searches ended at several values, so there may be worse ones; more --samples find more.")
+        remarks.append(f"Found up to {beyond:.2g} beyond linear: sensitivities change when parts tilt that far.")
+    if "agreeing" in dataset and int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
+        remarks.append("Where few searches met, there may be worse combinations; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
-    yield AnalysisTable(title, ["", "found", "bound", "random", "unseen ends"], rows, remarks)
+    columns = ["", "found", "linear", "searches"][: len(rows[0])]
+    yield AnalysisTable(title, columns, rows, remarks)
     deviations = dataset["deviations"].isel(state=terms.CORRECTED).transpose("contributor", "end").values
     combination = [
         [str(label), *(f"{value:+.4g}" for value in values)]
         for label, values in zip(dataset["contributor"].values, deviations, strict=True)
         if np.abs(values).max() > 0
     ]
-    yield AnalysisTable("", ["corrected", *terms.ENDS], combination, is_detail=True)
+    yield AnalysisTable("", ["deviations, with contact", *EXTREMES], combination, is_detail=True)
 
 
 def _tails(dataset: xr.Dataset) -> AnalysisReport:
