@@ -19,12 +19,13 @@ from PIL import Image
 import tolcontact as tc
 from studies.verification.problems import PROBLEMS, Problem
 from studies.verification.verify import COLUMNS, row
-from tolcontact.report.html import summary_table
+from tolcontact.report.html import summary_table, write_page
 from tolcontact.report.html.page import HERE as REPORT
 
 HERE = Path(__file__).resolve().parent
 MODELS = HERE.parents[1] / "models"
 LINES = 10  # of a model
+PICTURE = (900, 600)  # pixels
 # The front of the guide, the chapters that it lists (but those among its own names), and the assertions.
 CHAPTERS = re.findall(r"\| `tolcontact\.(\w+)` \|", tc.__doc__ or "")
 REFERENCE = ("tolcontact", *(f"tolcontact.{name}" for name in [*CHAPTERS, "testing"] if name not in dir(tc)))
@@ -39,20 +40,23 @@ def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
     """Return the section of a model: its question, a picture, its first lines, and its answer."""
     text = path.read_text(encoding="utf-8")
     question, _, rest = (ast.get_docstring(ast.parse(text)) or "").partition("\n\n")
-    results = tc.run(path, samples=samples, seed=1, solver="daqp", surfaces=0, fields="none")
-    plotter = tc.plot.assembly(results, opacity=0.75)
-    Image.fromarray(plotter.screenshot(None, return_img=True, window_size=(900, 600))).quantize(128).save(
-        folder / f"{path.stem}.png"
-    )
+    results = tc.run(path, samples=samples, seed=1, solver="daqp")
+    plotter = tc.plot.assembly(results, opacity=0.6)
+    plotter.camera.zoom(1.3)
+    picture = Image.fromarray(plotter.screenshot(None, return_img=True, window_size=PICTURE))
+    picture.save(folder / f"{path.stem}.webp", quality=70)
     plotter.close()
+    summary = results.tolcontact.summary()
+    write_page(results, summary, folder / f"{path.stem}.html")
     body = text[text.index("def assembly(") :].splitlines()
     return {
         "name": path.stem,
         "question": question.replace("\n", " "),
         "text": rest.replace("\n", " "),
-        "picture": f"{path.stem}.png",
+        "picture": f"{path.stem}.webp",
+        "report": f"{path.stem}.html",
         "lines": "\n".join([*body[:LINES], "    ..."]),
-        "answer": markupsafe.Markup(summary_table(results.tolcontact.summary())),
+        "answer": markupsafe.Markup(summary_table(summary)),
     }
 
 

@@ -21,6 +21,7 @@ STATISTICS = {"mean": terms.FIELD_MEAN, "6 sigma": terms.FIELD_SIX_SIGMA}
 GREYS = ("#9fb3c8", "#c8b79f", "#a8c89f", "#c89fb8", "#b3a8d0", "#9fc8c0")
 INK, LOCATOR, FORCE, CONTACT, MEASURE = "#30363d", "#1f5fa8", "#7a3fb0", "#0a7d4f", "#d01c1c"
 SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"
+AMBIENT = 0.45  # share of light without a direction, so that faces in shadow keep their colour
 MIN_EDGE_ANGLE = 25.0  # degrees: sharper edges are drawn
 VIEWPOINT = (-1.0, -2.4, 1.5)  # the direction from the assembly to the viewer
 
@@ -55,7 +56,7 @@ def assembly(
         mesh = _mesh(body)
         if realization is not None:
             mesh.points = _moved(source, number, realization, state, body.vertices)
-        plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity)
+        plotter.add_mesh(mesh, color=GREYS[number % len(GREYS)], opacity=opacity, ambient=AMBIENT, diffuse=1 - AMBIENT)
         _add_edges(plotter, mesh)
     if marks:
         _add_marks(plotter, annotations, _size(bodies))
