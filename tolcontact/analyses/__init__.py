@@ -17,7 +17,7 @@ also a command, which prints tables, JSON or CSV.
 
 | argument | meaning |
 |---|---|
-| `model` | an assembly, the function that declares it, the path of its script, or a `tc.Program` (not for `relocate`) |
+| `model` | an assembly, a function that declares it, the path of a script or archive, or a `tc.Program` (not for `relocate`) |
 | `samples`, `seed` | number of realizations, at least 2 (see each analysis); the same seed gives the same draws |
 | `solver`, `method` | as for `tc.build`; a `tc.Program` has its own, so leave them out with it |
 | `client` | client of dask.distributed, whose workers simulate with the same results (see `tolcontact.simulation`) |

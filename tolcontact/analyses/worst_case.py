@@ -24,7 +24,7 @@ END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values close
 
 
 def worst_case(
-    model: Model | Program, *, samples: int = 1024, seed: int = 1, solver: str | None = None, method: Choice | None = None,
+    model: Model | Program, *, samples: int = 512, seed: int = 1, solver: str | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return the worst-case minimum and maximum of each measure over all that the tolerances allow.

@@ -15,6 +15,7 @@ from tolcontact.report.figures import grouped, number, percent, share
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
+AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
 FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
 EXTREMES = ("minimum", "maximum")  # on pages, for "least" and "largest" in archives
 CONTACT_OF = dict(zip(terms.STATES, ("without contact", "with contact"), strict=True))
@@ -236,21 +237,34 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     for group in dataset["group"].values:
         row = dataset.sel(group=group)
         widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
-        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}"])
+        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
     before, after = dataset["cost"].sum("group").values
     tables = [
         AnalysisTable("", ["required", *terms.STAGES], requirements),
-        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["range", *terms.STAGES, "factor"], ranges),
+        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
         *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
     ]
-    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals.\n"]
+    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
+    if "floor" in dataset.attrs:
+        notes.append("Tolerances may be a tenth (smallest allowed) to three times (largest allowed) of before.\n")
     met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
         text = share if f": {terms.PPM}" in str(name) else number
         notes.append(
-            f'"{name}" is not met by ranges from a tenth to three times the present ones; the best found: {text(values[1])}.\n'
+            f'"{name}" is not met by tolerances from a tenth to three times those before; the best found: {text(values[1])}.\n'
         )
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
+
+
+def _remark_on(row: xr.Dataset, attributes: dict) -> str:
+    """Return why a tolerance did not change further, if there is a reason; older archives do not state any."""
+    if "idle" not in row:
+        return ""
+    if int(row["idle"]):
+        return "no influence"
+    factor = float(row["factor"])
+    at_floor, at_ceiling = factor <= attributes["floor"] * AT_END, factor * AT_END >= attributes["ceiling"]
+    return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
 
 
 def _effects(effect: xr.DataArray) -> AnalysisTable:

@@ -141,6 +141,7 @@ ALLOCATION = AnalysisRecord(
         ),
         ArchiveVariable("met", (REQUIREMENT,), "i1", "1: kept in the fresh run after; 0: not, by any ranges found", "1"),
         ArchiveVariable("required", (REQUIREMENT,), "f8", "share outside of the limits at most, or Ppk at least", "1"),
+        ArchiveVariable("idle", (GROUP,), "i1", "1: no influence on any requirement, so the ranges stay; 0: not so", "1"),
         ArchiveVariable("effect", (MEASURE, OF_EFFECT, GROUP, INTERVAL), "f8", "change if zones were a tenth narrower"),
     ),
 )
