@@ -100,6 +100,11 @@ class Annotated:
             self.add(f"PLUS_MINUS_TOLERANCE(#{limits},#{number})")
         return number
 
+    def fit(self, aspect: int, nominal: float, letters: str, grade: str, variance: str = "", name: str = "diameter") -> None:
+        """A size with the class of a fit."""
+        fit = self.add(f"LIMITS_AND_FITS('{letters}','{variance}','{grade}','')")
+        self.add(f"PLUS_MINUS_TOLERANCE(#{fit},#{self.size(aspect, nominal, name=name)})")
+
     def write(self, path: Path) -> Path:
         records = "".join(f"#{number}={entity};\n" for number, entity in enumerate(self.lines, start=FIRST))
         end = self.text.rindex("ENDSEC;")

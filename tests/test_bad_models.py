@@ -164,7 +164,7 @@ def test_a_doubtful_size_is_a_warning_on_stderr(tmp_path):
     done = call(tmp_path, "check", write_model(tmp_path, {"measure": lid + GOOD["measure"]}))
     assert done.returncode == 0
     assert done.stderr.startswith('warning: part "lid"') and "4.49 mm across" in done.stderr and 'units="in"' in done.stderr
-    assert done.stdout.endswith("no faults found\n")
+    assert done.stdout.endswith("no faults found, 1 warning\n")
 
 
 def test_all_faults_of_a_model_are_reported_at_once(tmp_path):

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 import tolcontact as tc
 from tests import cases
+from tests.helpers import COMMAND, ROOT, run
 from tests.step_files import assembly, step_block
 from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
@@ -207,13 +208,63 @@ def test_names_that_no_part_may_have_are_changed(tmp_path):
 
 def test_the_command_line_lists_bodies_and_faces(file):
     listed = CliRunner().invoke(app, ["bodies", str(file)])
-    assert listed.stdout.splitlines()[:2] == ["lengths in the file: millimetre; here: mm", "whole"]
+    assert listed.stdout.splitlines()[:2] == [
+        "lengths in the file: millimetre; here: mm, along x, y, z of the assembly",
+        "whole",
+    ]
     bodies = json.loads(CliRunner().invoke(app, ["bodies", str(file), "--json"]).stdout)
     assert [body["name"] for body in bodies][-1] == "use 2" and bodies[-1]["at"] == [0, 0, 5]
     listed = CliRunner().invoke(app, ["faces", str(file), "--body", "use 2"]).stdout
     assert len(listed.splitlines()) == 6 and "1. plane, along (0, 0, -1), 25 mm2" in listed
     faces = json.loads(CliRunner().invoke(app, ["faces", str(file), "--body", "5", "--json"]).stdout)
     assert sum(face["area"] for face in faces) == pytest.approx(150)
+
+
+def test_some_bodies_of_a_file_are_fixed(file):
+    """A list of names fixes these; True or False applies to all."""
+    model = tc.Assembly("stack")
+    parts = tc.parts_from(model, file, fixed=["use 0"])
+    assert {name for name, part in parts.items() if part.fixed} == {"use 0"}
+    assert {part.fixed for name, part in parts.items() if name != "use 0"} == {None}
+    for fixed in (True, False, None):
+        assert {part.fixed for part in tc.parts_from(tc.Assembly("a"), file, fixed=fixed).values()} == {fixed}
+    assert {part.fixed for part in tc.parts_from(tc.Assembly("a"), file, fixed=[]).values()} == {None}
+    with pytest.raises(tc.ModelError, match='holds no body "plate"; it holds'):
+        tc.parts_from(tc.Assembly("a"), file, fixed=["plate"])
+    with pytest.raises(tc.ModelError, match='fixed has the body "use 0", which names has not; add it there'):
+        tc.parts_from(tc.Assembly("a"), file, ["use 1"], fixed=["use 0"])
+    for wrong in ("use 0", 3, {"use 0": True}, [1]):
+        with pytest.raises(TypeError, match="expected a list of the names of bodies, as in fixed="):
+            tc.parts_from(tc.Assembly("a"), file, fixed=wrong)
+    with pytest.raises(TypeError, match=r'names is \'use 0\'; expected a list .* as in names=\["use 0"\]'):
+        tc.parts_from(tc.Assembly("a"), file, "use 0")
+
+
+def test_check_and_bodies_state_sizes_along_the_same_axes(tmp_path):
+    """Nuts of as1 lie on their sides: 20 x 15 x 3 mm in the frame of their product, 3 x 15 x 20 mm in the assembly."""
+    source = ROOT / "studies" / "cad" / "as1-oc-214.stp"
+    model = tmp_path / "model.py"
+    model.write_text(
+        "import tolcontact as tc\n\ndef assembly():\n    model = tc.Assembly('as1')\n"
+        f"    parts = tc.parts_from(model, {str(source)!r}, fixed=True)\n"
+        "    model.measure('x', parts['nut_1'].point(0, 0, 0), along='x')\n    return model\n"
+    )
+    listed = CliRunner().invoke(app, ["bodies", str(source)]).stdout
+    checked = CliRunner().invoke(app, ["check", str(model)]).stdout
+    sizes = dict(re.findall(r"\d+\. (.*): (.*) mm, \d+ faces", listed))
+    assert sizes["nut_1"] == "3 x 15 x 20" and len(sizes) == 18
+    assert dict(re.findall(r"  part (.*): (.*) mm along x, y, z of the assembly, \d+ triangles", checked)) == sizes
+
+
+def test_a_wrong_body_has_a_message_that_lists_the_bodies(file):
+    for options, message in (
+        (["--body", "use 9"], "holds no body 'use 9'; it holds 5: 1. "),
+        (["--body", "99"], "holds no body 99; it holds 5: 1. "),
+        ([], '--body "..."'),
+    ):
+        finished = run([*COMMAND, "faces", str(file), *options])
+        assert finished.returncode == 2
+        assert message in finished.stderr and '"use 2"' in finished.stderr
 
 
 @pytest.mark.slow
@@ -280,7 +331,11 @@ def test_wrong_bodies_and_names_are_told_and_names_do_not_steer_a_terminal(file)
 
 def test_the_units_of_a_file_are_stated(file):
     assert all(body.units == "millimetre" for body in tc.bodies_in(file))
-    assert CliRunner().invoke(app, ["bodies", str(file)]).stdout.startswith("lengths in the file: millimetre; here: mm\n")
+    assert (
+        CliRunner()
+        .invoke(app, ["bodies", str(file)])
+        .stdout.startswith("lengths in the file: millimetre; here: mm, along x, y, z of the assembly\n")
+    )
     si = b"#1=(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(%s,.METRE.));\n"
     inch = b"#2=( CONVERSION_BASED_UNIT('INCH',#3) LENGTH_UNIT() NAMED_UNIT(#4) );\n"
     for text, units in (

@@ -89,7 +89,7 @@ def test_results_go_to_stdout_in_80_columns_and_summary_repeats_them(tmp_path):
     assert ran.returncode == told.returncode == 0
     assert ran.stdout.startswith(told.stdout)
     assert max(map(len, told.stdout.splitlines())) <= 80
-    for words in ("6 sigma", "variance", "outside", "touched by contact", "top [red]"):
+    for words in ("6 sigma", "variance", "out of specification", "touched by contact", "top [red]"):
         assert words in told.stdout
 
 
@@ -131,7 +131,7 @@ def test_the_summary_says_of_how_many_realizations_magnitudes_are(fields, said, 
 def test_limits_alone_are_printed(archive, tmp_path):
     done = call(tmp_path, "summary", archive, "--limits")
     assert done.returncode == 0 and "Ppk as normal" in done.stdout and "touched by contact" not in done.stdout
-    assert done.stdout.count("\noutside ") == 2
+    assert done.stdout.count("\nout of specification  ") == 2
     done = call(tmp_path, "summary", archive, "--limits", "--json")
     assert done.returncode == 2 and "--json and --limits" in done.stderr
 

@@ -53,17 +53,17 @@ def drawing(file: Annotated) -> None:
 
 
 DECLARED = [
-    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1 mm per 25 mm",
+    "feature A of cover (datum A): cover B-rep face 5; flatness 0.1/25",
     "feature B of cover (datum B): cover B-rep face 6",
     "feature C of cover (datum C): cover B-rep face 1",
     "feature plane 2 of cover: cover B-rep face 2",
     "feature cylinder 13 of cover: cover B-rep face 13",
     "feature cylinder 15 of cover: cover B-rep face 15",
-    "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2M mm to A|B(M)|C",
-    "feature slot 12 of cover: cover B-rep face 12, cover B-rep face 14; size 8.1 +0.05 -0.05 mm; position 0.3 mm to A|B|C",
-    "feature plane 10 of cover: cover B-rep face 10; profile 0.4 mm to A|B|C",
-    "feature plane 7 of cover: cover B-rep face 7; profile 0.3 mm to E|D",
-    "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 mm to A|B|C; position 0.1 mm to A><|B><",
+    "feature cylinder 11 of cover: cover B-rep face 11; size 8.1 +0.03 +0 mm; position 0.2 Ⓜ A B Ⓜ C",
+    "feature slot 12 of cover: cover B-rep face 12, cover B-rep face 14; size 8.1 +0.05 -0.05 mm; position 0.3 A B C",
+    "feature plane 10 of cover: cover B-rep face 10; profile 0.4 Ⓤ0.1 A B C",
+    "feature plane 7 of cover: cover B-rep face 7; profile 0.3 E D",
+    "pattern cylinders 3 of cover: 4 members; size 12 +0.1 -0.1 mm; position 0.5 A B C; position 0.1 A>< B><",
     "pattern D of cover (datum D): 2 members",
 ]  # fmt: skip
 TARGETS = "datum E: targets cover.plane 2 (60, 40, 8), cover.plane 2 (20, 70, 8), cover.plane 2 (100, 5, 8)"
@@ -233,6 +233,30 @@ def sizes(file):
     file.size(file.aspect(*CORNERS, UNDER), 12.0, (-0.1, 0.1))
 
 
+def fits(file):
+    file.fit(file.aspect(*HOLE), 8.1, "h", "6", "hole")
+    file.fit(file.aspect(*HOLE), 8.1, "V", "7")
+    file.fit(file.aspect(*HOLE), 8.1, "sliding", "")
+
+
+@pytest.mark.parametrize(
+    ("letters", "grade", "variance", "size"),
+    [("G", "6", "hole", "8.1 +0.014 +0.005"), ("H7", "", "hole", "8.1 +0.015 +0"), ("JS", "7", "", "8.1 +0.0075 -0.0075")],
+)
+def test_a_fit_has_the_limits_of_its_class(letters, grade, variance, size, tmp_path):
+    def annotate(file):
+        file.fit(file.aspect(*HOLE), 8.1, letters, grade, variance)
+
+    (feature,) = cover(annotate, tmp_path).features_from_pmi().features
+    assert str(feature.tolerances[0]) == f"size {size} mm"
+
+
+def test_limits_of_a_fit_are_about_the_nominal_size_of_the_drawing(tmp_path):
+    """A shape is modelled at 8.1, and its drawing says 8.09 H7."""
+    (feature,) = cover(lambda file: file.fit(file.aspect(*HOLE), 8.09, "H", "7"), tmp_path).features_from_pmi().features
+    assert str(feature.tolerances[0]) == "size 8.1 +0.005 -0.01 mm"
+
+
 NO_SIZE = "sizes of features are those of cylinders, spheres and two opposed planes, and it is a plane"
 REASONS = {
     "all over": (all_over, ["it is for all faces of the file; declare it for the faces that matter"]),
@@ -258,6 +282,14 @@ REASONS = {
         ["position: a bonus (material 'M') needs the tolerance of a size; add tc.Size(...)"],
     ),
     "the same zone twice": (twice, ["position 0.6 controls nothing that others do not; leave one of them out"]),
+    "fits": (
+        fits,
+        [
+            "its fit h6 hole is for a shaft, and the feature is a hole",
+            "ISO 286-1 does not define V7 for 8.1 mm: it is for sizes above 14 mm, up to 500 mm",
+            "its fit sliding is no tolerance class of ISO 286-1",
+        ],
+    ),
     "sizes": (
         sizes,
         [
@@ -309,7 +341,7 @@ def test_each_body_of_a_file_gets_its_features(tmp_path):
     assert [[str(feature) for feature in part.toleranced] for part in declared.parts] == [
         [
             "feature A of body 1 (datum A): body 1 B-rep face 1",
-            "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 mm to A",
+            "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 A",
         ],
         ["feature plane 1 of body 2: body 2 B-rep face 1; flatness 0.1 mm"],
     ]  # fmt: skip

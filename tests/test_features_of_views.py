@@ -120,7 +120,7 @@ def test_the_command_shows_an_incomplete_script(tmp_path):
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "page.html").read_text()
     (entry,) = data_of(page)["scene"]["toleranced"]
-    assert entry["features"][0]["tolerances"] == ["flatness 0.1 mm", "profile 0.2 mm"]
+    assert entry["features"][0]["tolerances"] == ["flatness 0.1", "profile 0.2"]
     assert "it is not located" in page and "faulty parts" not in page
 
 
@@ -189,7 +189,7 @@ def test_a_feature_is_found_on_its_faces(width, scheme, tmp_path, open_page):  #
     page.locator("#toleranced button", has_text="feature half").click()
     assert scene.blueness(*points) == pytest.approx(before) and not scene.pressed()
     page.locator("#toleranced button", has_text="feature bottom").click()
-    assert page.locator("#said").inner_text() == "part block\nfeature bottom\nparallelism 0.2 mm to A"
+    assert page.locator("#said").inner_text() == "part block\nfeature bottom\nparallelism 0.2 A"
     assert (scene.blueness(BOTTOM) > 1.1 * before[2:].max()).all()  # through what is before it
     page.locator("#toleranced button", has_text="pattern A").click()
     page.select_option("#across", "z")
@@ -208,7 +208,7 @@ def test_a_face_names_its_features(tmp_path, open_page):  # noqa: F811
     assert 'face("+x")' in said and said.endswith("\n\npattern A (datum A), member A 2")
     assert scene.pressed() == ["pattern A (datum A), 2 members"] and (scene.blueness(TOP) > 1.4 * before).all()
     assert (scene.blueness(END) < 0.5).all()  # the face that was clicked on has a colour of its own
-    assert scene.click(*NEAR_HALF).endswith("\n\nfeature half\nflatness 0.1 mm")
+    assert scene.click(*NEAR_HALF).endswith("\n\nfeature half\nflatness 0.1")
     assert "feature" not in scene.click(*FAR_HALF) and not scene.pressed()
     scene.click(*END)
     scene.page.mouse.click(scene.box["x"] + 5, scene.box["y"] + 5)
@@ -227,8 +227,6 @@ def test_odd_names_of_features_are_texts(tmp_path, open_page):  # noqa: F811
     page = open_page(tmp_path / "odd.html")
     buttons, headings = page.locator("#toleranced button"), page.locator("#toleranced h3")
     for k, name in enumerate(names):
-        assert (
-            buttons.nth(k).inner_text() == f"feature {name}\nflatness 0.1 mm" and headings.nth(k).inner_text() == f"part {name}"
-        )
+        assert buttons.nth(k).inner_text() == f"feature {name}\nflatness 0.1" and headings.nth(k).inner_text() == f"part {name}"
         buttons.nth(k).click()
-        assert page.locator("#said").inner_text() == f"part {name}\nfeature {name}\nflatness 0.1 mm"
+        assert page.locator("#said").inner_text() == f"part {name}\nfeature {name}\nflatness 0.1"

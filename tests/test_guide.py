@@ -14,8 +14,8 @@ from tolcontact.report import summary_text
 
 README = Path(__file__).parents[1] / "README.md"
 CHAPTERS = (
-    "declaration", "geometry", "pmi", "features", "discretization", "variation", "mechanics", "compilation", "contact",
-    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
+    "declaration", "geometry", "pmi", "features", "discretization", "variation", "mechanics", "compilation", "plausibility",
+    "contact", "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "cli",
 )  # fmt: skip
 PACKAGES = ("tolcontact", *(f"tolcontact.{chapter}" for chapter in CHAPTERS))
 
@@ -44,7 +44,7 @@ def test_front_names_every_public_name():
 def test_python_of_the_readme_runs_and_prints_its_table(tmp_path, monkeypatch, capsys):
     readme = README.read_text(encoding="utf-8")
     script, reading = re.findall(r"^```python\n(.*?)^```", readme, re.MULTILINE | re.DOTALL)
-    table = re.search(r"^```\n( +mean.*?)^```", readme, re.MULTILINE | re.DOTALL)[1]
+    table = re.search(r"^```\n( +out of.*?)^```", readme, re.MULTILINE | re.DOTALL)[1]
     monkeypatch.chdir(tmp_path)
     Path("ra1.py").write_text(script)
     with tc.run("ra1.py", samples=1000, seed=1, out="ra1.nc") as results:

@@ -46,13 +46,13 @@ def test_a_model_with_faults_shows_them():
 @pytest.mark.slow
 def test_results_show_figures_and_the_report(results):
     shown = results.tolcontact._repr_html_()
-    assert shown.index("<table>") < shown.index("<iframe") and len(scene_in(shown)["realizations"]["names"]) == 200
+    assert shown.index("<table class=") < shown.index("<iframe") and len(scene_in(shown)["realizations"]["names"]) == 200
 
 
 def test_a_summary_shows_tables_and_a_selection_of_it_what_xarray_shows(results):
     summary = results.tolcontact.summary()
     assert summary.identical(tc.summarize(results)) and isinstance(summary, xr.Dataset)
-    assert "touched by contact" in summary._repr_html_() and "<table>" in summary._repr_html_()
+    assert "touched by contact" in summary._repr_html_() and "<table class=" in summary._repr_html_()
     for selected in (summary.sel(measure="top"), summary[["touched"]], summary.isel(state=0)):
         assert "touched by contact" not in selected._repr_html_() and len(selected._repr_html_()) > 100
 

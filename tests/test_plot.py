@@ -6,6 +6,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
+from tolcontact import vocabulary as terms
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +22,7 @@ def test_a_histogram_has_all_realizations_and_the_limits(results):
         heights = np.array([patch.get_height() for patch in container])
         assert heights.sum() == pytest.approx(100) and len(heights) == 40
         assert np.average(edges + container[0].get_width() / 2, weights=heights) == pytest.approx(values.mean(), abs=0.1)
-        (curve,) = (line for line in axes.lines if line.get_label() == f"normal, {state}")
+        (curve,) = (line for line in axes.lines if line.get_label() == f"normal, {terms.WORD_OF_STATE[state]}")
         normal = stats.norm(values.mean(), values.std(ddof=1)).pdf(curve.get_xdata())
         assert curve.get_ydata() == pytest.approx(100 * container[0].get_width() * normal)
     limits = [line.get_xdata()[0] for line in axes.lines if line.get_label() == "_limit"]
@@ -30,7 +31,7 @@ def test_a_histogram_has_all_realizations_and_the_limits(results):
 
 def test_one_state_is_drawn_alone(results):
     axes = tc.plot.histogram(results, states=["corrected"])
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["corrected", "normal, corrected"]
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["with contact", "normal, with contact"]
 
 
 @pytest.mark.slow

@@ -201,7 +201,7 @@ def test_the_page_is_used(archive, page, width, open_page):
     opened.locator("#which").fill("7")
     said = opened.locator("#said").inner_text()
     row = int(re.match(r"realization (\d+) ", said)[1])
-    raw, corrected = re.search(r"raw (\S+), corrected (\S+) mm", said).groups()
+    raw, corrected = re.search(r"without contact (\S+), with contact (\S+) mm", said).groups()
     assert [float(raw), float(corrected)] == pytest.approx(measured[row], rel=1e-3)
     moved = picture(opened)
     opened.locator("input[name=state][value='0']").check()

@@ -6,8 +6,6 @@ import pytest
 import trimesh
 
 import tolcontact as tc
-from tolcontact.discretization import discretize
-from tolcontact.errors import UnitsWarning
 
 PLACES = [
     ((10, 10, 0), "z"),
@@ -30,8 +28,8 @@ def lid(path, units=None, places=PLACES):
 
 def warned(assembly) -> list[str]:
     with warnings.catch_warnings(record=True) as found:
-        warnings.simplefilter("always", UnitsWarning)
-        discretize(assembly)
+        warnings.simplefilter("always")
+        tc.build(assembly)
     return [str(one.message) for one in found]
 
 
@@ -62,8 +60,8 @@ def test_metres_of_a_glb_that_are_mm(tmp_path):
 def test_one_wrong_coordinate_is_no_matter_of_units(wrong, tmp_path):
     places = [PLACES[0], (wrong, "z"), *PLACES[2:]]
     (told,) = warned(lid(box(tmp_path / "lid.stl", 1.0), None, places))
-    assert 'its locator "L1" lies' in told and "tc.Mesh(" not in told
-    assert told.endswith("; check the coordinates ({:g}, {:g}, {:g}), which are in the part's own frame".format(*wrong))
+    assert 'locator "L1": its point ({:.4g}, {:.4g}, {:.4g}) lies'.format(*wrong) in told and "tc.Mesh(" not in told
+    assert told.startswith("[point]") and told.endswith("; check the coordinates, which are in the part's own frame [mm]")
 
 
 def test_coordinates_of_the_assembly_are_no_matter_of_units(tmp_path):

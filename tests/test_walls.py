@@ -43,7 +43,9 @@ LAZY = {
     "dask.array": ("simulation/lazy.py",),
     "distributed": ("simulation/cluster.py",),
     "pandas": ("declaration/contributor.py",),
+    "openpyxl": ("report/spreadsheet.py",),
     "tolcontact.kernel.step_bodies": ("geometry/files/worker.py",),  # in a process of its own
+    "tolcontact.fasteners": ("__init__.py",),  # when a script asks
     "tolcontact.pmi": ("__init__.py",),  # when a script asks
     "tolcontact.report.notebook": ("__init__.py",),  # when a notebook asks
 }
@@ -60,9 +62,9 @@ APART = {
 # From the top of the flow to its end; a room imports from rooms that stand before it.
 ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "realizations",
-    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features", "pmi",
-    "discretization", "variation", "mechanics", "compilation", "contact", "simulation", "statistics", "archive", "report",
-    "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
+    "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "plausibility", "contact", "simulation",
+    "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
+from tests.helpers import nightly
 from tests.test_json_models import load_model, written
 from tolcontact.discretization import discretize
 
@@ -76,3 +77,91 @@ def test_unions_and_whole_surfaces_come_with_json(tmp_path):
         (tmp_path / "wrong.json").write_text(text.replace('"any"', wrong))
         with pytest.raises(tc.TolcontactError, match='faces under the key "any"'):
             load_model(tmp_path / "wrong.json")
+
+
+def written_step(tmp_path, name):
+    """A STEP file of a block, a shaft or a plate with round faces that are split into halves, made by the CAD kernel."""
+    kernel = {
+        module: pytest.importorskip(f"OCP.{module}")
+        for module in ("gp", "BRepPrimAPI", "BRepAlgoAPI", "BRepBuilderAPI", "STEPControl", "ShapeUpgrade")
+    }
+    gp, primitives = kernel["gp"], kernel["BRepPrimAPI"]
+
+    def box(lower, upper):
+        return primitives.BRepPrimAPI_MakeBox(gp.gp_Pnt(*lower), gp.gp_Pnt(*upper)).Shape()
+
+    def cylinder(at, along, radius, height):
+        return primitives.BRepPrimAPI_MakeCylinder(gp.gp_Ax2(gp.gp_Pnt(*at), gp.gp_Dir(*along)), radius, height).Shape()
+
+    def without(shape, *tools):
+        for tool in tools:
+            shape = kernel["BRepAlgoAPI"].BRepAlgoAPI_Cut(shape, tool).Shape()
+        return shape
+
+    hole = cylinder((0, 0, -1), (0, 0, 1), 8, 90)
+    block, shaft = box((-20, -20, 0), (20, 20, 20)), cylinder((0, 0, 0), (0, 0, 1), 8, 40)
+    ring = without(cylinder((0, 0, -1), (0, 0, 1), 12, 30), cylinder((0, 0, -2), (0, 0, 1), 8, 40))
+    sectors = [box((2, 2, -9), (30, 30, 50)), box((-30, -30, -9), (-2, -2, 50))]
+    common = kernel["BRepAlgoAPI"].BRepAlgoAPI_Common
+    shapes = {
+        "halves": lambda: without(block, hole),
+        "thirds": lambda: without(block, hole),
+        "mirrored": lambda: without(block, hole),
+        "keyway": lambda: without(block, hole, box((-2, 5, -1), (2, 12, 30))),
+        "two keyways": lambda: without(block, hole, box((-2, -12, -1), (2, 12, 30))),
+        "four keyways": lambda: without(block, hole, box((-2, -12, -1), (2, 12, 30)), box((-12, -2, -1), (12, 2, 30))),
+        "splined shaft": lambda: without(shaft, box((-2, 6, -1), (2, 12, 50)), box((-2, -12, -1), (2, -6, 50))),
+        "cross hole": lambda: without(block, hole, cylinder((0, 0, 10), (1, 0, 0), 3, 40)),
+        "lugs": lambda: without(box((-20, -20, 0), (20, 20, 40)), box((-10, -30, 15), (30, 30, 25)), hole),
+        "curved slots": lambda: without(block, *(common(ring, sector).Shape() for sector in sectors)),
+    }
+    shape = shapes[name]()
+    angle = 120 if name == "thirds" else 180
+    divided = kernel["ShapeUpgrade"].ShapeUpgrade_ShapeDivideAngle(np.radians(angle), shape)
+    divided.Perform()
+    shape = divided.Result()
+    if name == "mirrored":
+        mirror = gp.gp_Trsf()
+        mirror.SetMirror(gp.gp_Ax2(gp.gp_Pnt(0, 0, 0), gp.gp_Dir(1, 0, 0)))
+        shape = kernel["BRepBuilderAPI"].BRepBuilderAPI_Transform(shape, mirror, True).Shape()
+    writer = kernel["STEPControl"].STEPControl_Writer()
+    writer.Transfer(shape, kernel["STEPControl"].STEPControl_AsIs)
+    path = tmp_path / f"{name}.stp"
+    writer.Write(str(path))
+    return path
+
+
+COMMON = ("two keyways", "lugs", "curved slots")  # of each kind one
+WHOLES = {  # radii of whole cylinders, and numbers of their faces
+    "halves": [(8, 2)],
+    "thirds": [(8, 3)],
+    "mirrored": [(8, 2)],
+    "keyway": [(8, 3)],
+    "two keyways": [(8, 3)],
+    "four keyways": [(8, 4)],
+    "splined shaft": [(8, 3)],
+    "cross hole": [(3, 2), (8, 2)],
+    "lugs": [(8, 2), (8, 2)],
+    "curved slots": [(8, 1), (8, 1), (12, 1), (12, 1)],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*COMMON, *nightly(*(name for name in WHOLES if name not in COMMON))])
+def test_faces_of_one_cylinder_are_whole_and_others_are_not(name, tmp_path):
+    path = written_step(tmp_path, name)
+    faces = [face for face in tc.faces_in(path) if face.kind == "cylinder"]
+    wholes = {face.whole or (face.number,) for face in faces}
+    radius = {face.number: face.radius for face in faces}
+    assert sorted((round(radius[whole[0]]), len(whole)) for whole in wholes) == WHOLES[name]
+    for whole in wholes:
+        model = tc.Assembly(name)
+        part = model.part("body", tc.Mesh(path), fixed=True)
+        part.feature("round", part.face(tc.Brep(whole[0])), tc.Size(2 * radius[whole[0]], 0.1))
+        model.measure("nothing", part.point(0, 0, 0), along="z")
+        with warnings.catch_warnings(record=True) as records:
+            warnings.simplefilter("always", tc.FaceWarning)
+            discretize(model)
+        texts = [str(record.message) for record in records if record.category is tc.FaceWarning]
+        assert len(texts) == (len(whole) > 1)
+        assert all(f"1 of the {len(whole)} faces of one cylinder" in text for text in texts)

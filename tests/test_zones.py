@@ -126,7 +126,7 @@ def test_capability_and_shifts():
     assert drawn.std() == pytest.approx(sigma, rel=0.02)
     assert (0.1 - drawn.mean()) / 3 / sigma == pytest.approx(1.0, abs=0.02)  # Cpk itself
     shifted = tc.Tolerance(0.6, "uniform", shift=0.25)
-    assert str(shifted) == "uniform, range 0.6 mm, shifted by 0.25 mm"
+    assert str(shifted) == "uniform, full width 0.6 mm, shifted by 0.25 mm"
     other = tc.Size(10, 0.1, -0.02, distribution=norm(0.03, 0.01))
     drawn = Draws(discretize(toleranced.ring_with("bore", other)))(seed=1, start=0, stop=SAMPLES)[:, -1]
     assert drawn.mean() == pytest.approx(0.03, abs=3e-4) and drawn.std() == pytest.approx(0.01, rel=0.02)
@@ -175,5 +175,5 @@ def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_do
     assert spreads[0] == spreads[1] and len(spreads[0]) == 3
     top = next(feature for feature in tangent.features if feature.name == "top")
     assert list(map(str, top.tolerances))[1:] == [
-        "parallelism 0.1 mm of the tangent plane to A", "flatness 0.02 mm per 25 x 25 mm", "straightness 0.01 mm per 10 mm",
+        "parallelism 0.1 Ⓣ A", "flatness 0.02/25×25", "straightness 0.01/10",
     ]  # fmt: skip

@@ -26,10 +26,12 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | read shapes | `tolcontact.geometry` | meshes, STEP files, faces and their surfaces |
 | read tolerances | `tolcontact.pmi` | tolerances, dimensions and datums that a STEP file states |
 | tolerances of a drawing | `tolcontact.features` | kinds of features and tolerances, datums |
+| fasten | `tolcontact.fasteners` | bolts, screws, pins and dowels in holes of several parts |
 | discretize | `tolcontact.discretization` | contact points, balls and shafts, warnings |
 | draw | `tolcontact.variation` | distributions of deviations, zones of features, seeds |
 | equations | `tolcontact.mechanics` | poses, gaps, the QP, what the corrected pose minimizes |
 | compile | `tolcontact.compilation` | QP solvers, their accuracy |
+| nominal assembly | `tolcontact.plausibility` | warnings of what is probably a mistake |
 | resolve contact | `tolcontact.contact` | linearized or exact resolution, statuses, what a certificate covers, limits |
 | simulate | `tolcontact.simulation` | blocks, threads, reproducibility |
 | summarize | `tolcontact.statistics` | estimates and their intervals, displacement fields |
@@ -46,10 +48,12 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 
 | purpose | `tc.` |
 |---|---|
-| declare | `Assembly`, `Box`, `Mesh`, `Locator`, `three_two_one`, `Tolerance` |
+| declare | `Assembly`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Feature`, `Pattern`, `DatumTargets`, `Variable` |
+| measure faces | `Gap`, `Flush`, `Clearance`, `AxisDistance`, `Angle`, `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
+| | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
 | returned by declarations | `Part`, `Face`, `Point`, `ContactPair`, `Force`, `Measure` |
@@ -60,7 +64,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
-| warnings | `ContactWarning`, `FaceWarning`, `UnitsWarning` |
+| warnings | `ContactWarning`, `FaceWarning`, `NominalWarning`, `UnitsWarning` |
 
 `tolcontact.testing` has assertions for tests of your own models.
 """
@@ -69,7 +73,7 @@ from importlib import import_module
 
 import lazy_loader
 
-from tolcontact.later import HTML, LATER, PMI
+from tolcontact.later import FASTENER, HTML, LATER, PMI
 
 
 def _notebook_html(thing: object) -> str:
@@ -82,6 +86,11 @@ def _features_from_pmi(part: object) -> object:
     return import_module("tolcontact.pmi").features_from_pmi(part)
 
 
-LATER[HTML], LATER[PMI] = _notebook_html, _features_from_pmi
+def _fasten(*arguments: object, **options: object) -> object:
+    """Return what `Assembly.fasten` declares. Shapes are read when a script first asks for it."""
+    return import_module("tolcontact.fasteners").fasten(*arguments, **options)
+
+
+LATER[HTML], LATER[PMI], LATER[FASTENER] = _notebook_html, _features_from_pmi, _fasten
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -85,5 +85,9 @@ class FaceWarning(UserWarning):
     """A face is a part of a curved surface that a STEP file splits."""
 
 
+class NominalWarning(UserWarning):
+    """Something in the nominal assembly is probably a mistake; the message begins with its kind, such as "[overlap]"."""
+
+
 class UnitsWarning(UserWarning):
     """A part has an implausible size, and no units were given for its file."""

@@ -5,4 +5,5 @@ from typing import Any
 
 HTML = "text/html"  # returns an object as HTML for a notebook
 PMI = "features from PMI"  # declares features of a part
-LATER: dict[str, Callable[[Any], Any]] = {}
+FASTENER = "fastener"  # declares what a fastener in holes consists of
+LATER: dict[str, Callable[..., Any]] = {}

@@ -1,4 +1,4 @@
-"""The picture of the README: the top of RA1's report, in a browser. Needs Chromium, playwright and pillow.
+"""The picture of the README: the top of RA1's report in a browser. Needs Chromium, playwright and pillow.
 
 python studies/report/picture.py
 """
@@ -16,8 +16,7 @@ import tolcontact as tc
 from tolcontact.report import write_page
 
 HERE = Path(__file__).parent
-WIDTH, HEIGHT = 1040, 752
-SMALLER = ".view { height: 420px !important } #controls fieldset:nth-of-type(n + 5) { display: none }"
+WIDTH, HEIGHT = 1080, 850
 
 
 def main() -> None:
@@ -32,7 +31,6 @@ def main() -> None:
         opened = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT}, color_scheme="light")
         opened.goto(page.as_uri())
         opened.wait_for_function("window.viewer !== undefined")
-        opened.add_style_tag(content=SMALLER)
         opened.wait_for_timeout(1000)
         taken = opened.screenshot()
         browser.close()

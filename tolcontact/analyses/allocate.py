@@ -74,11 +74,7 @@ def allocate(
         progress=progress,
     )  # fmt: skip
     program = analysis.program
-    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
-    if not requirements:
-        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
-    for requirement in requirements:
-        requirement.check(samples)
+    requirements = _requirements(require, program, samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
     trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
@@ -97,9 +93,8 @@ def allocate(
         "effect": _effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    return analysis.dataset(
-        values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, floor=MIN_FACTOR, ceiling=MAX_FACTOR
-    )
+    limits = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR}
+    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +109,16 @@ class Prices:
         return math.fsum(
             _cost(curve, factor) for curve, factor, free in zip(self.curves, np.exp(logs), self.is_free, strict=True) if free
         )
+
+
+def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
+    """Return what texts require. Raises OptionError if there are none, or for too few samples."""
+    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
+    if not requirements:
+        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
+    for requirement in requirements:
+        requirement.check(samples)
+    return requirements
 
 
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:

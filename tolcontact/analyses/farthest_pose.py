@@ -8,6 +8,9 @@ part, for instance a part that contact may lift without limit, the bound is infi
 The objective "all points" has the same quadratic term everywhere. There the optimality conditions join the program, with a
 binary number for each row that may carry or be open; HiGHS bounds that, too, when its time is up.
 
+A measure with a kink at the nominal assembly (a minimum, a clearance, an angle that is nominally 0) has no linear model, and
+no bound.
+
 To first order in deviations and motions. Pairs of round faces have no rows, which only widens the bounds.
 """
 
@@ -35,7 +38,11 @@ def farthest_poses(program: Program, region: Region, model: LinearModel) -> np.n
         for end, sense in enumerate(terms.SENSES):
             raw = _Problem(model, region, measure, sense, is_moved=False, reactions=None)
             moved = _Problem(model, region, measure, sense, is_moved=True, reactions=reactions)
-            bounds[measure, :, end] = [model.measures[measure] + sense * problem.bound() for problem in (raw, moved)]
+            unbounded = model.kinked[0, measure], model.kinked[:, measure].any()
+            bounds[measure, :, end] = [
+                sense * np.inf if is_unbounded else model.measures[measure] + sense * problem.bound()
+                for problem, is_unbounded in zip((raw, moved), unbounded, strict=True)
+            ]
     return bounds
 
 

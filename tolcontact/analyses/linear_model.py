@@ -8,6 +8,8 @@ from tolcontact import poses as pose
 from tolcontact.compilation import Program
 from tolcontact.mechanics import Group
 
+MAX_BEND = 0.1  # of the largest slope of a measure: if slopes ahead and behind differ by more, there is a kink
+MIN_SLOPE = 1e-6  # of a measure: smaller ones are rounding
 STEP = 1e-4  # mm, and rad times the length of a group: steps of central differences; what is odd in them cancels
 
 
@@ -20,6 +22,8 @@ class LinearModel:
     measures         (measure,) nominally
     by_deviations    (measure, contributor)
     by_motion        (measure, freedom)
+    kinked           (2, measure): whether the nominal assembly is at a kink of the measure, by deviations, by motions; there it
+                     has no derivatives
     gaps             (row,) nominally: of the contact points that can be the deepest, of pairs of flat faces
     gaps_by_deviations, gaps_by_motion   (row, contributor), (row, freedom)
     held             (row, freedom): motions that two-sided locators hold at 0, if the objective is seating
@@ -30,6 +34,7 @@ class LinearModel:
     measures: np.ndarray
     by_deviations: np.ndarray
     by_motion: np.ndarray
+    kinked: np.ndarray
     gaps: np.ndarray
     gaps_by_deviations: np.ndarray
     gaps_by_motion: np.ndarray
@@ -50,17 +55,31 @@ def linear_model(program: Program) -> LinearModel:
     by_deviations, by_motion = (
         [(ahead - behind).T / (2 * STEP) for ahead, behind in zip(*sides, strict=True)] for sides in (varied, moved)
     )
+    kinked = np.array([_kinks(*(ends[0] - measures for ends in sides)) for sides in (varied, moved)])
     return LinearModel(
-        measures, by_deviations[0], by_motion[0], gaps, by_deviations[1], by_motion[1], _held(program), _displacements(program),
-        sum(gaps is None for gaps in program.gaps),
+        measures, by_deviations[0], by_motion[0], kinked, gaps, by_deviations[1], by_motion[1], _held(program),
+        _displacements(program), sum(gaps is None for gaps in program.gaps),
     )  # fmt: skip
 
 
 def total_derivatives(program: Program) -> np.ndarray:
-    """Return derivatives (measure, contributor) of the raw measures at the nominal assembly; of causes with what they drive."""
-    by_deviations = linear_model(program).by_deviations
+    """Return derivatives (measure, contributor) of the raw measures at the nominal assembly; of causes with what they drive.
+
+    They are NaN for a measure with a kink there.
+    """
+    model = linear_model(program)
+    by_deviations = np.where(model.kinked[0][:, None], np.nan, model.by_deviations)
     matrix = program.draws.drive_matrix
     return by_deviations + by_deviations @ matrix.T if matrix.any() else by_deviations
+
+
+def _kinks(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
+    """Return whether each measure has a kink (measure,), from its changes (n, measure) by steps ahead and behind.
+
+    At a kink the slopes ahead and behind differ by more than a part of the largest slope.
+    """
+    largest = np.maximum(np.abs(ahead), np.abs(behind)).max(axis=0, initial=STEP * MIN_SLOPE)
+    return np.asarray((np.abs(ahead + behind) > MAX_BEND * largest).any(axis=0))
 
 
 def leverages(program: Program) -> np.ndarray:

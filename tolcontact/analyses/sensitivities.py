@@ -28,7 +28,8 @@ def sensitivities(
 ) -> xr.Dataset:  # fmt: skip
     """Return derivatives of each measure by each contributor that varies, from differences in each realization.
 
-        nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it
+        nominal      (measure, contributor)                    of the raw measure at the nominal assembly, as designers read it;
+                                                               NaN where the measure has a kink there
         leverage     (contributor)                             of a locator: the largest displacement of any point of its part,
                                                                for 1 mm; not a number for others
         sensitivity  (measure, state, contributor, interval)   mean over all realizations, with its 95 % interval
@@ -64,7 +65,7 @@ def sensitivities(
     slopes = (ahead + behind) / 2
     nominal = total_derivatives(program)[:, columns]
     carries_otherwise = (carrying[:, up] != carrying[:, :1]).any(axis=2) | (carrying[:, down] != carrying[:, :1]).any(axis=2)
-    changes = carries_otherwise | _has_kink(ahead, behind, np.abs(nominal))
+    changes = carries_otherwise | _has_kink(ahead, behind, np.nan_to_num(np.abs(nominal)))
     smooth = np.where(changes[:, :, None], np.nan, slopes[:, :, terms.CORRECTED])
     is_touched = status != terms.Status.UNTOUCHED
     values = {

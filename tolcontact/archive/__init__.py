@@ -76,7 +76,8 @@ Where a side of a pair is a feature (`face_of_moving`, `face_of_reference` not -
 (tau, rho) = `face_twist` @ `deviation` a point p goes to centre + tau + exp([rho]x) (p - centre), `face_centre`, and normals
 turn by exp([rho]x). Then subtract `face_height` @ `deviation` of the reference side, and that of the moving side times
 `facing`. For a locator that stands against a feature (`face_of_locator`), add to its deviation the height there, less its
-direction times the displacement. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
+direction times the displacement; for one on a feature of another part (`ground_of_locator`), add its direction times the
+displacement there. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
 `tc.open_archive(path)` checks everything but the rows and opens the file; `tc.model_of` rebuilds its model.
 

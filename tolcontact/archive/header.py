@@ -13,6 +13,7 @@ from tolcontact.archive.variables import Contents, define, labels_of_rows, units
 from tolcontact.compilation import Program
 from tolcontact.declaration import Mesh
 from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.features import FaceDeviation
 from tolcontact.geometry import known_surfaces, surface_arrays
 from tolcontact.vocabulary import ArchiveVariable
 
@@ -34,6 +35,7 @@ def write_header(file: netCDF4.Dataset, program: Program, run: Run, sums: Sequen
             "history": f"{now()} created",
             "versions": versions(),
             **run_settings(program, run),
+            **(nominal.assembly.title_block.attributes if nominal.assembly.title_block else {}),
         }
     )
     _write_labels(contents, file, nominal)
@@ -143,6 +145,12 @@ def _lay_out_group(contents: Contents, group: netCDF4.Group, values: Mapping[Arc
 
 def _write_model(contents: Contents, group: netCDF4.Group, nominal: Nominal, document: str) -> None:
     contents.add(group, terms.DECLARATION, document)
+    lines = [(number, line) for number, lines in enumerate(nominal.lines) for line in lines]
+    if lines:
+        group.createDimension(terms.MEASURE_LINE, len(lines))
+        group.createDimension(terms.LINE_END, 2)
+        contents.add(group, terms.MEASURE_OF_LINE, [number for number, _ in lines])
+        contents.add(group, terms.LINE_ENDS, np.array([line for _, line in lines]))
     for part in nominal.parts:
         if isinstance(part.part.geometry, Mesh):
             mesh = group.createGroup(f"mesh/{terms.group_of(part.name)}")
@@ -193,7 +201,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
     }
     if not pairs:
-        return parts
+        return parts | _face_values(nominal)
     locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
     values = parts | {
         terms.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
@@ -225,8 +233,7 @@ def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
     for number, face in enumerate(faces):
         twists[number][:, face.columns], heights[number, face.columns] = face.twist, face.height
     moving, reference = (
-        [-1 if face is None else faces.index(face) for face in side]
-        for side in zip(*(pair.deviating for pair in nominal.pairs), strict=True)
+        [-1 if pair.deviating[side] is None else faces.index(pair.deviating[side]) for pair in nominal.pairs] for side in (0, 1)
     )
     return {
         terms.FEATURE_OF_FACE: [face.name for face in faces],
@@ -236,7 +243,7 @@ def _face_values(nominal: Nominal) -> dict[ArchiveVariable, Any]:
         terms.FACE_HEIGHT: heights,
         terms.FACE_OF_MOVING: moving,
         terms.FACE_OF_REFERENCE: reference,
-        terms.FACING: np.concatenate([pair.facing for pair in nominal.pairs]),
+        terms.FACING: np.concatenate([np.zeros(0), *(pair.facing for pair in nominal.pairs)]),
     }
 
 
@@ -272,4 +279,11 @@ def _write_sample(contents: Contents, group: netCDF4.Group, program: Program, *,
     contents.add(group, terms.ONE_SIDED, locators.one_sided)
     contents.add(group, terms.LOCATOR_POINT, locators.points)
     contents.add(group, terms.LOCATOR_DIRECTION, locators.directions)
-    contents.add(group, terms.FACE_OF_LOCATOR, [-1 if face is None else nominal.faces.index(face) for face in locators.faces])
+    contents.add(group, terms.FACE_OF_LOCATOR, _numbers(nominal, locators.faces))
+    if any(locators.grounds):
+        contents.add(group, terms.GROUND_OF_LOCATOR, _numbers(nominal, locators.grounds))
+
+
+def _numbers(nominal: Nominal, faces: Sequence[FaceDeviation | None]) -> list[int]:
+    """Return the numbers of faces of features from 0, -1 for None."""
+    return [-1 if face is None else nominal.faces.index(face) for face in faces]

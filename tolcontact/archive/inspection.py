@@ -27,7 +27,15 @@ MEMORY = 1 << 30  # beside four times the file's own size
 MAX_DEFLATION = 1032  # zlib compresses data no further
 MAX_DECLARATION = 1 << 26  # bytes of a declared model
 MAX_TEXT = 1 << 20  # letters of an attribute
-SIZES = {terms.STATE: 2, terms.AXIS: 3, terms.BODY_AXIS: 3, terms.CORNER: 3, terms.COMPONENT: 4, terms.BOUND: 2}
+SIZES = {
+    terms.STATE: 2,
+    terms.AXIS: 3,
+    terms.BODY_AXIS: 3,
+    terms.CORNER: 3,
+    terms.COMPONENT: 4,
+    terms.BOUND: 2,
+    terms.LINE_END: 2,
+}
 GROUPS = ("model", "contact", "sample", "field")
 ADDED = ("surface",)  # groups that archives of format 1 may not have
 LABELS = (terms.PART, terms.PAIR, terms.MEASURE, terms.ROW_VARIABLE)

@@ -51,8 +51,9 @@ def check_same_model(file: netCDF4.Dataset, path: Path, program: Program) -> Non
 
 
 def _comparable(declared: str) -> Any:
-    """Return a declaration without the lines of the script that declare its items."""
-    return json.loads(declared, object_hook=lambda item: {key: item[key] for key in item if key != "declared_at"})
+    """Return a declaration without what does not affect results: the lines of the script, and the title block."""
+    ignored = ("declared_at", "title_block")
+    return json.loads(declared, object_hook=lambda item: {key: item[key] for key in item if key not in ignored})
 
 
 def _is_equal(stored: netCDF4.Variable, values: Any) -> bool:

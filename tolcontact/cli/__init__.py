@@ -7,7 +7,7 @@
     tolcontact run MODEL.py --samples 1000 --seed 1      simulate, and print the summary
     tolcontact run MODEL.py --out FILE.nc                simulate into an archive
     tolcontact summary FILE.nc [--json | --csv]          print the summary of an archive
-    tolcontact summary FILE.nc --limits                  only shares outside of limits, and capability
+    tolcontact summary FILE.nc --limits                  only shares out of specification, and capability
     tolcontact report FILE.nc [--out FILE.html]          write a page with the assembly in 3D, and charts
     tolcontact compare MODEL.py --solvers daqp,qpoases   compare solvers on the same draws
 

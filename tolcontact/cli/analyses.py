@@ -183,7 +183,7 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "tails",
-        "Print how often measures are outside their limits, or parts cannot be assembled, where that is rare.",
+        "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
         tails,
         terms.TAILS,
         "Approximate number of realizations for each event.",

@@ -2,7 +2,9 @@
 
 import inspect
 import io
+import shutil
 import sys
+import textwrap
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -16,6 +18,8 @@ from tolcontact.declaration import Assembly
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.version import __version__
+
+MIN_COLUMNS = 40  # of a terminal: warnings are wrapped to no fewer
 
 
 class Commands(TyperGroup):
@@ -73,7 +77,7 @@ Resolution = Annotated[
 ]
 Objective = Annotated[
     str | None,
-    typer.Option(help=f"Quantity that the corrected pose minimizes: {or_(OBJECTIVES)}. Default: the model's."),
+    typer.Option(help=f"Quantity that the pose with contact minimizes: {or_(OBJECTIVES)}. Default: the model's."),
 ]
 
 
@@ -137,5 +141,18 @@ def command_line(arguments: list[str] | None = None) -> None:
         sys.exit(2)
 
 
+def show_warnings(records: Iterable[warnings.WarningMessage]) -> None:
+    """Print recorded warnings."""
+    for record in records:
+        _show_warning(record.message)
+
+
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    typer.echo(f"warning: {shown(str(message))}", err=True)
+    """Print a warning: in a terminal as wide as that, else on one line."""
+    if sys.stderr is None:
+        return
+    text = f"warning: {shown(str(message))}"
+    if sys.stderr.isatty():
+        columns = max(shutil.get_terminal_size().columns, MIN_COLUMNS)
+        text = textwrap.fill(text, columns, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
+    print(text, file=sys.stderr)  # a bar that is shown takes the place of this stream, and moves down

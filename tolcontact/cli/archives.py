@@ -7,9 +7,11 @@ import typer
 
 from tolcontact.archive import open_archive
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
-from tolcontact.cli.output import check_page, console, print_data, print_summary
+from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
+from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title
+from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
-from tolcontact.report import capability_text, write_page
+from tolcontact.report import capability_text, write_page, write_spreadsheet
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 from tolcontact.workflow.run import summarize
 
@@ -19,7 +21,7 @@ def summary(
     archive: Archive,
     as_json: AsJson = False,
     as_csv: AsCsv = False,
-    limits: Annotated[bool, typer.Option("--limits", help="Print only shares outside of limits, and capability.")] = False,
+    limits: Annotated[bool, typer.Option("--limits", help="Print only shares out of specification, and capability.")] = False,
 ) -> None:
     """Print the statistics of an archive."""
     only_one(json=as_json, csv=as_csv, limits=limits)
@@ -37,15 +39,35 @@ def summary(
             print_summary(summarize(results))
 
 
-@app.command(epilog=examples("report run.nc", "report run.nc --out page.html"))
+@app.command(epilog=examples("report run.nc", "report run.nc --out page.html", "report run.nc --xlsx tables.xlsx"))
 def report(
     archive: Archive,
     out: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Page to write. Default: beside the archive.")] = None,
+    xlsx: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.xlsx", help="Spreadsheet of the tables; the page is then written only with --out."),
+    ] = None,
+    title: Title = None,
+    part_number: PartNumber = None,
+    author: Author = None,
+    revision: Revision = None,
+    date: Date = None,
+    company: Company = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a self-contained page for a browser from an archive."""
-    path = out or Path(archive).with_suffix(".html")
-    check_page(path, overwrite=overwrite)
+    """Write a self-contained page for a browser from an archive, or a spreadsheet of its tables."""
+    page = out if out or xlsx else Path(archive).with_suffix(".html")
+    if page is not None:
+        check_page(page, overwrite=overwrite)
+    if xlsx is not None:
+        check_spreadsheet(xlsx, overwrite=overwrite)
+    entries = dict(zip(ENTRIES, (title, part_number, author, revision, date, company), strict=True))
     with open_archive(archive) as results:
-        write_page(results, summarize(results), path)
-    typer.echo(f"report: {shown(str(path))}")
+        summary, titles = summarize(results), title_block_of(results.attrs).overridden(entries)
+        if page is not None:
+            write_page(results, summary, page, titles)
+        if xlsx is not None:
+            write_spreadsheet(results, summary, xlsx, titles)
+    for kind, path in (("report", page), ("spreadsheet", xlsx)):
+        if path is not None:
+            typer.echo(f"{kind}: {shown(str(path))}")

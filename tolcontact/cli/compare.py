@@ -53,7 +53,7 @@ def compare(
 ) -> None:
     """Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.
 
-    For a model, print agreement, failures, residuals and time. For archives, print how measures change.
+    For a model, print agreement, failures, residuals and time. For archives, print how measurements change.
     """
     are_archives = [path.suffix.lower() == ".nc" for path in inputs]
     if not all(are_archives) and len(inputs) > 1:

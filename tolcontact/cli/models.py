@@ -2,6 +2,7 @@
 
 import json
 import tempfile
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
@@ -9,7 +10,7 @@ from typing import Annotated
 import typer
 
 from tolcontact.archive import open_archive
-from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples
+from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, show_warnings
 from tolcontact.cli.output import check_page, console
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
@@ -61,23 +62,28 @@ def check(
     seed: Seed = 1,
     view: Annotated[bool, typer.Option("--view", help="Also open the page of `tolcontact view`, with marked faults.")] = False,
 ) -> None:
-    """Check a model and its options without a run, and list all faults."""
-    assembly = load_model(model)
+    """Check a model and its options without a run, and list all faults, and what is probably a mistake."""
+    assembly, doubts = None, list[warnings.WarningMessage]()
     try:
-        program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
+        with warnings.catch_warnings(record=True) as doubts:
+            assembly = load_model(model)
+            program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
     except ModelError as error:
-        if view:
+        show_warnings(doubts)
+        if view and assembly is not None:
             _open_view(assembly, None, error.faults, temporary_page(model))
         raise
     if view:
         _open_view(assembly, program.nominal, (), temporary_page(model))
     typer.echo(program.nominal.assembly)
     for part in program.nominal.parts:
-        size = " x ".join(f"{length:.4g}" for length in part.mesh.extents)
-        typer.echo(f"  part {part.name}: {size} mm, {len(part.mesh.faces)} triangles")
+        size = " x ".join(f"{length:.4g}" for length in part.body.extents.round(9))
+        typer.echo(f"  part {part.name}: {size} mm along x, y, z of the assembly, {len(part.mesh.faces)} triangles")
     for k, pair in enumerate(program.nominal.pairs):
         typer.echo(f"  contact {pair.name}: {program.contact_in_words(k)}")
-    typer.echo("no faults found")
+    show_warnings(doubts)
+    count = {0: "", 1: ", 1 warning"}.get(len(doubts), f", {len(doubts)} warnings")
+    typer.echo(f"no faults found{count}")
     if population is not None:
         console().print(population_text(check_population(assembly, samples=population, seed=seed)))
 

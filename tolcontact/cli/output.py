@@ -51,6 +51,16 @@ def check_page(path: Path, *, overwrite: bool = False) -> None:
         raise OptionError(f'"{path}" exists, and is no page of tolcontact; choose another name, or replace it with --overwrite')
 
 
+def check_spreadsheet(path: Path, *, overwrite: bool = False) -> None:
+    """Raise OptionError unless a spreadsheet may be written to `path`: no file is replaced without `overwrite`."""
+    if path.suffix.lower() != ".xlsx":
+        raise OptionError(f'"{path}" is not the name of a spreadsheet; expected one that ends in .xlsx')
+    if not path.parent.is_dir():
+        raise OptionError(f'spreadsheet "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
+    if not overwrite and path.exists():
+        raise OptionError(f'"{path}" exists; choose another name, or replace it with --overwrite')
+
+
 def print_summary(summary: xr.Dataset) -> None:
     """Print the summary of a run. Raises typer.Exit with code 1 if too many realizations were not resolved."""
     console().print(summary_text(summary))

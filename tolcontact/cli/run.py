@@ -25,7 +25,7 @@ from tolcontact.cli.app import (
 )
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
-from tolcontact.declaration.script import load_model
+from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title, titled_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.report import write_page
 from tolcontact.simulation.cluster import client_of
@@ -71,11 +71,17 @@ def run(
         int, typer.Option(help="Number of realizations that are checked between contact points, on the surfaces.")
     ] = SURFACES,
     report: Annotated[Path | None, typer.Option(metavar="FILE.html", help="Also write a page for a browser.")] = None,
+    title: Title = None,
+    part_number: PartNumber = None,
+    author: Author = None,
+    revision: Revision = None,
+    date: Date = None,
+    company: Company = None,
     workers: Workers = None,
     scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate a model with and without contact, and print the statistics of its measures.
+    """Simulate a model with and without contact, and print the statistics of its measurements.
 
     The exit code is 1 if more than 0.1 % of the realizations were not resolved (not converged, not assemblable, or doubtful),
     and if an interval is not as narrow as --until states.
@@ -85,6 +91,7 @@ def run(
     if report is not None:
         check_page(report, overwrite=overwrite)
     method = chosen(resolution=resolution, objective=objective)
+    titles = dict(zip(ENTRIES, (title, part_number, author, revision, date, company), strict=True))
     # Stopping first gives the cursor back.
     with (
         stopped(out, done := [0, samples]),
@@ -97,7 +104,7 @@ def run(
             show(*done)
 
         results = run_model(
-            functools.partial(load_model, model), samples=samples, seed=seed, solver=solver, method=method, out=out,
+            functools.partial(titled_model, model, titles), samples=samples, seed=seed, solver=solver, method=method, out=out,
             overwrite=overwrite and out is not None, resume=resume, keep=keep, surfaces=surfaces, plan=plan, until=until,
             client=client, fields=int(fields) if fields.isdigit() else fields, progress=progress,
         )  # fmt: skip

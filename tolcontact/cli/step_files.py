@@ -22,7 +22,7 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
         _print_rows(listing)
         return
     if listing and listing[0].units:
-        typer.echo(f"lengths in the file: {listing[0].units}; here: mm")
+        typer.echo(f"lengths in the file: {listing[0].units}; here: mm, along x, y, z of the assembly")
     parents: tuple[str, ...] = ()
     for body in listing:
         *products, _ = body.path or ("",)

@@ -157,7 +157,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
             tapes={
                 measure.name: record(value, ca.vertcat(entries, d))
                 for measure, value in zip(nominal.measures, values, strict=True)
-                if not measure.points
+                if measure.is_expression
             },
         )
 

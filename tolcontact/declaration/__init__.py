@@ -10,13 +10,20 @@ Lengths are in mm, angles in rad, forces in N. Points, faces and locators are gi
 
 `part(name, shape, at=..., rotation=...)` places a shape in the nominal assembly: the point p of its own frame lies at
 `rotation * p + at`, where `rotation` is a rotation vector. A shape is a `tc.Box(x, y, z)`, which reaches from the origin of
-its frame to (x, y, z), or a `tc.Mesh(source)`, a triangle surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
+its frame to (x, y, z), a `tc.Pin(diameter, length)` about the z axis, from -length to 0, or a `tc.Mesh(source)`, a triangle
+surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
 `trimesh.Trimesh`; `units="in"` states the units of a file that is not in mm (see `tolcontact.geometry`).
 
 >>> base = clamp.part("base", tc.Box(100, 50, 10), fixed=True)
 >>> plate = clamp.part("plate", tc.Box(60, 40, 8), at=(20, 5, 10))
 >>> plate
 part plate: box 60 x 40 x 8 mm at (20, 5, 10)
+
+`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z. A rotation about an oblique axis is a vector along it:
+(30, 0, 30) turns by 42.4 degrees about the bisector of x and z.
+
+>>> tc.degrees(90), tc.degrees(0, 0, 180)
+(1.5707963267948966, (0.0, 0.0, 3.141592653589793))
 
 Names of parts, pairs, forces and measures also name groups and labels of the archive. They start with a letter, digit or
 underscore, hold no "/" and no control character, and differ from each other.
@@ -36,7 +43,7 @@ A face consists of the triangles that meet every criterion you give; without any
 | `tc.Brep((x, y, z))`, `tc.Brep(12)` | the face of a STEP file that passes through a point, or has a number |
 | `tc.Brep("seat")` | the faces of a STEP file that have a name, where it gives names |
 | `tc.Brep(3, 7)` | all of these faces; so are those of <code>tc.Brep(3) &#124; tc.Brep("seat")</code> |
-| `tc.Brep(3, whole=True)` | all faces of one surface that touch: both halves of a hole that the file splits |
+| `tc.Brep(3, whole=True)` | all faces of one surface: both halves of a hole that the file splits, also between keyways |
 | `[0, 1, 2]` | triangles by their indices in the mesh |
 | a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
 
@@ -52,17 +59,22 @@ point, direction)` declares them one by one.
 
 A tolerance is the full width of its zone: 0.6 means -0.3 to +0.3. The tolerance of `locate(..., tolerance=...)` applies to
 every locator that does not have its own. By default the deviation is normal with 6 sigma equal to the width;
-`tolcontact.variation` lists the other distributions.
+`tolcontact.variation` lists the other distributions. Limits may be written as on a drawing, "±0.3" or "+0.4/-0.2", or as a
+pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 
 >>> scheme = tc.three_two_one(plate.face("-z"), plate.face("-y"), plate.face("-x"), inset=5)
 >>> location = clamp.locate(plate, scheme, tolerance=0.6)
 >>> print(location)
-location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, range 0.6 mm
+location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, full width 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
-locator A1: (5, 5, 0) along (0, 0, 1), uniform, range 0.1 mm
+locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
+>>> print(tc.Tolerance("+0.4/-0.2"))
+normal, full width 0.6 mm, shifted by 0.1 mm
 
-`locate(..., on=other)` positions a part on another part, which then carries it along. A part that is not located must be
-`fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are rejected.
+`locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
+a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
+that is not located must be `fixed=True`, and stays at its nominal place. Six locators whose directions are not independent are
+rejected.
 
 A locator with `one_sided=True` is a support: its part may lift off it, and may not pass through it. A part with supports may
 have more than six locators, of which at most six are two-sided. `stiffness` (N/mm) is used by the objective
@@ -79,7 +91,10 @@ moves it as the objective requires: with "active points" or "all points" only as
 opposed planes (a slot, a tab, a thickness). It deviates as a whole, outward from its material, and can be used in place of a
 face. The same deviation moves everything that touches the feature, is located by it, or is measured at `feature.point(x, y,
 z)` or at an end of its axis, `feature.axis(0)`. This includes pairs and 3-2-1 schemes that choose the triangles of the feature
-without naming it.
+without naming it. The limits of a size may be a tolerance class of ISO 286-1, with capital letters for holes and slots.
+
+>>> tc.Size(8, "H7"), tc.Size(8, "g6")
+(size 8 H7 +0.015 +0 mm, size 8 g6 -0.005 -0.014 mm)
 
 >>> cover = clamp.part("cover", tc.Box(60, 40, 5), at=(20, 5, 18))
 >>> foot = cover.feature("foot", cover.face("-z"), datum="A")
@@ -87,7 +102,7 @@ without naming it.
 >>> top = cover.feature("top", cover.face("+z"), tc.Parallelism(0.05, "A"), tc.Profile(0.2, "A"))
 >>> width = cover.feature("width", cover.face("+x"), cover.face("-x"), tc.Size(60, 0.1, -0.05))
 >>> print(top)
-feature top of cover: cover +z; parallelism 0.05 mm to A; profile 0.2 mm to A
+feature top of cover: cover +z; parallelism 0.05 A; profile 0.2 A
 >>> thickness = clamp.measure("thickness", foot.point(0, 0, 0), to=top.point(0, 0, 5), along="z", tolerance=0.3)
 
 `part.pattern("H", face, face, ..., tolerances...)` declares several like features with common tolerances, such as holes.
@@ -140,7 +155,7 @@ A measure is the displacement of a point along a direction, the distance of two 
 of the symbolic poses that returns a CasADi expression. With `absolute=True` a displacement becomes the coordinate of the
 point; with `absolute=False` a distance becomes its difference from the nominal distance. `limits=(lower, upper)` are the
 allowed values of the measure, with None for an open side. `tolerance` is short for limits at half the tolerance below and
-above the nominal value.
+above the nominal value; `tolerance="+0.2/-0.1"` states them on both sides of it.
 
 >>> height = clamp.measure("height", plate.point(0, 0, 8), along="z", tolerance=0.5)
 >>> step = clamp.measure("step", base.point(20, 5, 10), to=plate.point(0, 0, 0), along="z", limits=(None, 0.2))
@@ -148,7 +163,32 @@ above the nominal value.
 ...     return poses.rotation(plate)[2, 0]
 >>> slope = clamp.measure("slope", tilt, units="rad")
 
-The function receives poses with the methods `position(point)`, `rotation(part)` and `translation(part)`.
+The function receives poses with `position(point)`, `rotation(part)` and `translation(part)`.
+Measurements of faces are declared as objects. Their units follow from their kind: mm, and rad for angles.
+
+| measurement | value |
+|---|---|
+| `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
+| `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
+| `tc.AxisDistance(..., across="z")` | across a direction, at the middle of the first axis; `along="x"`: one component |
+| `tc.Angle(face, face)` | angle of planes or axes, from 0 on; with `about="y"` its sign, positive if turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
+| `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
+
+A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
+at the point's nominal foot. The stations of a seam are points along it. Gap and flush are measured perpendicular to the faces
+of the second part, which carry the directions as they tilt.
+
+>>> seam = tc.stations(plate.point(0, 0, 0), plate.point(60, 0, 0), 5)
+>>> gaps = [tc.Gap(point, base.face("+z")) for point in seam]
+>>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
+>>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
+>>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
+sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
+derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.
 
 ## The model's method, and faults
 
@@ -179,9 +219,9 @@ A model script is a Python file with a function `assembly()` that returns the de
 under a main guard it runs by itself, with the options of `tolcontact run`; the files in `models/` are such scripts.
 
 The same declarations as JSON are accepted wherever a script is: `tolcontact run model.json`. `tc.write_model(model,
-"model.json")` writes them. What a script would leave out may be left out, files of shapes are named from the folder of the
-JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON schema follows from the classes of
-this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
+"model.json")` writes them. What a script would leave out may be left out, tolerances may be written as texts, files of shapes
+are named from the folder of the JSON file, and errors state the place: `parts[2].features[0].tolerances[1].width`. The JSON
+schema follows from the classes of this chapter: `python -m tolcontact.declaration.json_model > model.schema.json` writes it.
 
 A model of a stranger is data, and cannot ask for everything: files have at most 64 MiB, assemblies 1000 parts and 2000
 measures, pairs 100 000 contact points, names 500 characters, expressions 100 000 steps, and a draw of a distribution takes at
@@ -196,7 +236,7 @@ assembly without running any code of the script. Functions of poses are kept as 
 contact seat: plate -z (moving) against base +z (reference), spacing 5 mm
 """
 
-from tolcontact.declaration.assembly import Assembly, has_supports, is_free, movers
+from tolcontact.declaration.assembly import Assembly
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.contributor import Correlation, Population, Variable
 from tolcontact.declaration.feature_tolerance import (
@@ -212,50 +252,82 @@ from tolcontact.declaration.feature_tolerance import (
     Position,
     Profile,
     Roundness,
-    Size,
     Straightness,
     Symmetry,
     TotalRunout,
 )
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import Box, Mesh
-from tolcontact.declaration.locator import Locator, ThreeTwoOne, three_two_one
+from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
+from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import (
+    Angle,
+    AxisDistance,
+    Clearance,
+    Combination,
+    Difference,
+    Flush,
+    Gap,
+    Maximum,
+    Mean,
+    Measurement,
+    Minimum,
+    Sum,
+    stations,
+)
+from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.size import Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.values import degrees
 
 __all__ = [
     "OUTSIDE",
+    "Angle",
     "Angularity",
     "Assembly",
+    "AxisDistance",
     "Box",
     "Brep",
     "CircularRunout",
+    "Clearance",
     "Coaxiality",
+    "Combination",
     "ContactPair",
     "Correlation",
     "Cylinder",
     "Cylindricity",
     "DatumTargets",
+    "Difference",
     "Face",
     "Facing",
     "Feature",
     "Flatness",
+    "Flush",
     "Force",
+    "Gap",
     "GeometricTolerance",
+    "Geometry",
     "Inside",
     "Largest",
     "LineProfile",
+    "Location",
     "Locator",
+    "Maximum",
+    "Mean",
     "Measure",
+    "Measurement",
     "Mesh",
+    "Minimum",
     "Near",
     "Parallelism",
     "Part",
     "Pattern",
     "Perpendicularity",
     "Picked",
+    "Pin",
     "Point",
     "Population",
     "Position",
@@ -263,14 +335,18 @@ __all__ = [
     "Roundness",
     "Size",
     "Straightness",
+    "Sum",
     "Symmetry",
     "ThreeTwoOne",
+    "TitleBlock",
     "Tolerance",
     "TotalRunout",
     "Triangles",
     "Variable",
+    "degrees",
     "has_supports",
     "is_free",
     "movers",
+    "stations",
     "three_two_one",
 ]

@@ -1,4 +1,4 @@
-"""The assembly: it collects declarations in the order of a script, and knows which parts contact may move."""
+"""The assembly: it collects declarations in the order of a script."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -12,14 +12,17 @@ from tolcontact.declaration.contributor import (
     correlation as _correlation,
     population as _population,
 )
-from tolcontact.declaration.feature_tolerance import Size
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
+from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.size import Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
 
@@ -46,7 +49,8 @@ class Assembly(Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
-    this model is resolved; a run may state another one. Raises TypeError for an argument of a wrong type.
+    this model is resolved; a run may state another one. `title_block` heads its reports. Raises TypeError for an argument of a
+    wrong type.
     """
 
     parts = Declared[Part]()
@@ -58,10 +62,12 @@ class Assembly(Pictured):
     correlations = Declared[Correlation]()
     populations = Declared[Population]()
 
-    def __init__(self, name: str, *, method: Method | None = None) -> None:
+    def __init__(self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None) -> None:
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
+        _expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
         self.name = name
         self.method = method
+        self.title_block = title_block
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     def _add(self, name: str, thing: T) -> T:
@@ -71,7 +77,7 @@ class Assembly(Pictured):
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
-        copy = Assembly(self.name, method=self.method)
+        copy = Assembly(self.name, method=self.method, title_block=self.title_block)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
@@ -85,14 +91,14 @@ class Assembly(Pictured):
     def part(
         self,
         name: str,
-        geometry: Box | Mesh,
+        geometry: Geometry,
         *,
         at: Any = (0, 0, 0),
         rotation: Any = (0, 0, 0),
         fixed: bool | None = None,
     ) -> Part:
         """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
-        _expect(f'part "{name}": geometry', geometry, Box | Mesh, "tc.Box(x, y, z) or tc.Mesh(file)")
+        _expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
         return self._add("parts", Part(name, geometry, _vector(at), _vector(rotation), fixed, script_line()))
 
@@ -102,16 +108,17 @@ class Assembly(Pictured):
         scheme: ThreeTwoOne | Sequence[Locator],
         *,
         tolerance: Any = None,
-        on: Part | None = None,
+        on: Part | Feature | None = None,
         floating: bool = False,
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
-        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], a Tolerance, or a frozen
-        scipy.stats distribution.
+        On a feature of another part, it also follows the deviations of that feature.
+        `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
+        "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
         """
         _expect("locate: the first argument", part, Part, "a part")
-        _expect(f'locate "{part.name}": on', on, Part | None, "a part, or None for the ground")
+        _expect(f'locate "{part.name}": on', on, Part | Feature | None, "a part, a feature of it, or None for the ground")
         scheme = scheme if isinstance(scheme, ThreeTwoOne) else tuple(scheme)
         for locator in scheme if isinstance(scheme, tuple) else ():
             _expect(f'locate "{part.name}": a locator', locator, Locator, "tc.Locator(name, point, direction)")
@@ -135,6 +142,29 @@ class Assembly(Pictured):
         sides = face_of(moving), face_of(reference)
         return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line()))
 
+    def fasten(
+        self,
+        name: str,
+        fastener: Part | Face | Feature | Size | float,
+        *,
+        through: Sequence[Face | Feature],
+        into: Face | Feature | None = None,
+        seat: Face | Feature | None = None,
+        pushed: Any = None,
+    ) -> Part:
+        """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
+
+        fastener   its diameter or its tc.Size, and a part is made; or a part, or the face of its shank
+        through    the holes that it passes through, from its head on
+        into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
+        seat       the plane under its head
+        pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
+
+        Raises ModelError if the fastener does not fit into the nominal assembly.
+        """
+        part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed)
+        return part
+
     def force(self, name: str, *, at: Point, vector: Any) -> Force:
         """Declare a force `vector` [N], in the assembly frame, at a point of a part (see Force)."""
         _expect(f'force "{name}": at', at, Point, "part.point(x, y, z)")
@@ -143,17 +173,22 @@ class Assembly(Pictured):
     def measure(
         self,
         name: str,
-        of: Point | Callable[[Any], Any],
+        of: Point | Measurement | Callable[[Any], Any],
         *,
         to: Point | None = None,
         along: Any = None,
-        tolerance: float | None = None,
+        tolerance: Any = None,
         limits: Sequence[float | None] | None = None,
         absolute: bool | None = None,
-        units: str = "mm",
+        units: str | None = None,
     ) -> Measure:
-        """Declare a measure of a point, of two points, or of a CasADi expression of the poses (see Measure)."""
+        """Declare a measure of a point, of two points, of a measurement, or of a CasADi expression of the poses (see Measure).
+
+        `units` are those of an expression, by default mm. A measurement has its own.
+        """
         axis = None if along is None else direction(along)
+        if units is None:
+            units = min(of.units_among(self._units), default="mm") if isinstance(of, Measurement) else "mm"
         bounds: Any = tuple(limits) if isinstance(limits, list | tuple) else limits
         return self._add("measures", Measure(name, of, to, axis, tolerance, units, script_line(), bounds, absolute))
 
@@ -168,6 +203,10 @@ class Assembly(Pictured):
     def population(self, source: Any, columns: Mapping[str, str] | None = None) -> Population:
         """Declare that contributors are drawn from measured rows: a CSV file, a DataFrame, a Dataset (see Population)."""
         return self._add("populations", _population(source, columns, script_line()))
+
+    @property
+    def _units(self) -> dict[str, str]:
+        return {measure.name: measure.units for measure in self.measures}
 
     def location_of(self, part: Part) -> Location | None:
         """Return the location of `part`; None for a part that is not located."""
@@ -186,7 +225,8 @@ class Assembly(Pictured):
         widths = [zone.width for zone in zones if zone is not None]
         sound = [control for feature in self.features for control in feature.tolerances if not any(control.faults())]
         widths += [control.tolerance.width if isinstance(control, Size) else float(control.width) for control in sound]
-        widths += [float(m.width) for m in self.measures if m.width is not None and m.units == "mm"]
+        measures = [measure for measure in self.measures if measure.units == "mm" and not any(measure.faults())]
+        widths += [float(measure.width) for measure in measures if measure.width is not None]
         return min((width for width in widths if width > CONSTANT_SHARE * max(widths)), default=math.inf)
 
     def omissions(self) -> Iterator[str]:
@@ -204,6 +244,7 @@ class Assembly(Pictured):
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
         yield from text_faults("assembly", [self.name])
+        yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:
                 yield f"it has {count} {name}; expected at most {most}"
@@ -216,12 +257,12 @@ class Assembly(Pictured):
             yield from self._feature_faults(part)
         for location in self.locations:
             yield from _located("part", location.part, location.faults(), location.declared_at)
-            mentioned = location.part, location.on, *location.mentioned
+            mentioned = location.part, location.parent, *location.mentioned
             yield from self._unknown_parts(f'locators of "{location.part.name}"', location.declared_at, *mentioned)
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
             *(("force", force, (force.at.part,)) for force in self.forces),
-            *(("measure", measure, [point.part for point in measure.points]) for measure in self.measures),
+            *(("measure", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),
             *(("population", population, ()) for population in self.populations),
@@ -230,6 +271,8 @@ class Assembly(Pictured):
             yield from _located(kind, thing, thing.faults())
             yield from self._unknown_parts(f'{kind} "{thing.name}"', thing.declared_at, *parts)
         yield from key_faults("variable", [variable.name for variable in self.variables])
+        for number, measure in enumerate(self.measures):
+            yield from _located("measure", measure, measure.reference_faults(self.measures[:number]))
 
     def _feature_faults(self, part: Part) -> Iterator[str]:
         letters = [declared.datum for declared in part.toleranced if declared.datum] + [datum.letter for datum in part.targets]
@@ -275,7 +318,7 @@ class Assembly(Pictured):
                 return
             chain.append(support)
             location = self.location_of(support)
-            support = location.on if location else None
+            support = location.parent if location else None
 
     def _unknown_parts(self, label: str, line: str, *parts: Part | None) -> Iterator[str]:
         for part in parts:
@@ -288,32 +331,6 @@ class Assembly(Pictured):
         declared = (row for part in self.parts for row in (*part.toleranced, *part.targets))
         rows = *self.parts, *declared, *causes, *self.locations, *self.pairs, *self.forces, *self.measures
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
-
-
-def is_free(assembly: Assembly, part: Part) -> bool:
-    """Return True if contact may move the part.
-
-    Without a declared choice a part is free if it is a moving side, floats, or has one-sided locators.
-    """
-    if part.fixed is not None:
-        return not part.fixed
-    location = assembly.location_of(part)
-    floats = location is not None and location.floating
-    return floats or any(pair.moving.part is part for pair in assembly.pairs) or has_supports(assembly, part)
-
-
-def has_supports(assembly: Assembly, part: Part) -> bool:
-    """Return True if a locator of the part is one-sided."""
-    location = assembly.location_of(part)
-    return location is not None and isinstance(location.scheme, tuple) and any(pin.one_sided for pin in location.scheme)
-
-
-def movers(assembly: Assembly, part: Part) -> tuple[Part, ...]:
-    """Return the free parts whose corrections move `part`: the parts that it is located on, then the part itself."""
-    location = assembly.location_of(part)
-    supports = movers(assembly, location.on) if location and location.on else ()
-    touches = any(part in (pair.moving.part, pair.reference.part) for pair in assembly.pairs) or has_supports(assembly, part)
-    return (*supports, part) if touches and is_free(assembly, part) else supports
 
 
 def _expect(label: str, value: Any, kind: Any, expected: str) -> None:

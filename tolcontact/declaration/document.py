@@ -25,17 +25,22 @@ from tolcontact.declaration.face_entry import (
     Document,
     Wrapped,
     Writing,
+    feature_named,
     floats,
     indices_of,
     text_type,
 )
-from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, MOVES, RULES, ZONES, Size
+from tolcontact.declaration.feature_tolerance import BONUSES, KINDS, MATERIALS, RULES, ZONES, GeometricTolerance
 from tolcontact.declaration.force import Force
-from tolcontact.declaration.geometry import UNITS, Box, Mesh
+from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.measurement_entry import MEASURED
 from tolcontact.declaration.part import ASSOCIATIONS, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.place import EntryError, Place, Sources
+from tolcontact.declaration.size import MOVES, Size
+from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import SHAPES, Tolerance, scipy_distribution
 from tolcontact.errors import ArchiveError
 from tolcontact.method import ACTIVE_SETS, OBJECTIVES, REGULARIZATIONS, RESOLUTIONS, SEARCHES, Method
@@ -69,6 +74,21 @@ def _file(name: str, place: Place) -> Path:
     return place.sources.folder / name
 
 
+def _ground_entries(location: Location, writing: Writing) -> Document:
+    feature = {"on_feature": location.on.name} if isinstance(location.on, Feature) else {}
+    return {"on": location.parent and location.parent.name, **feature}
+
+
+def _ground(entries: Mapping[str, Any], place: Place) -> Part | Feature | None:
+    """Return the part that locators are on, or the feature of it; None for the ground."""
+    part = Optional(CODECS[Part]).decode(entries.get("on"), place["on"])
+    if "on_feature" not in entries:
+        return part  # type: ignore[no-any-return]
+    if part is None:
+        raise place["on_feature"].error('it goes with "on", the part of the feature; give both')
+    return feature_named(entries["on_feature"], replace(place["on_feature"], part=part))
+
+
 def _distribution_entries(thing: Any, writing: Writing) -> Document:
     if isinstance(thing.distribution, str):
         return {"distribution": thing.distribution}
@@ -96,16 +116,16 @@ def _distribution(entries: Mapping[str, Any], place: Place) -> Any:
 
 
 def _measured_entries(measure: Measure, writing: Writing) -> Document:
-    if isinstance(measure.of, Point):
-        return {"of": POINT.encode(measure.of, writing)}
-    return {"tape": writing.tapes[measure.name]}
+    if measure.is_expression:
+        return {"tape": writing.tapes[measure.name]}
+    return {"of": MEASURED.encode(measure.of, writing)}
 
 
-def _measured(entries: Mapping[str, Any], place: Place) -> Point | Tape:
+def _measured(entries: Mapping[str, Any], place: Place) -> Point | Measurement | Tape:
     if len(entries) != 1:
-        raise place.error('expected either "of", a point, or "tape", the steps of an expression')
+        raise place.error('expected either "of", a point or a measurement, or "tape", the steps of an expression')
     if "of" in entries:
-        return POINT.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
+        return MEASURED.decode(entries["of"], place["of"])  # type: ignore[no-any-return]
     return tape_of(entries["tape"], place["tape"])
 
 
@@ -120,21 +140,20 @@ def _tolerance_record(cls: Any) -> Record:
 
 
 ARGUMENTS, KEYWORDS = Plain(tuple[float, ...]), Plain(Mapping[str, float])
-POINT = CODECS[Point] = Record(Point, "part on? end? position?")
 DISTRIBUTION = Inline(
     {"distribution": text_type(SHAPES), "scipy": str, "args": ARGUMENTS.wire, "kwds": KEYWORDS.wire},
     _distribution_entries,
     _distribution,
 )
 ZONE = Record(
-    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | None), distribution=DISTRIBUTION,
-    shift=FLOAT, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
+    Tolerance, "range? distribution shift? cp? cpk?", name="Zone", range=Plain(NOT_NEGATIVE | str | None), shift=FLOAT,
+    distribution=DISTRIBUTION, cp=Plain(POSITIVE | None, write=floats), cpk=Plain(float | None, write=floats),
 )  # fmt: skip
-WIDTH = Plain(NOT_NEGATIVE, read=lambda width, place: place.checked(Tolerance(width)))
-CODECS[Tolerance] = Choice("Tolerance", "a width in mm, or named values", ZONE, WIDTH)
+WIDTH = Plain(NOT_NEGATIVE | str, read=lambda width, place: place.checked(Tolerance(width)))
+CODECS[Tolerance] = Choice("Tolerance", "a width in mm, a text such as '±0.1', or named values", ZONE, WIDTH)
 SIZE = Record(
-    Size, "nominal upper lower cp cpk moves distribution", kind="size", nominal=Plain(POSITIVE), lower=Plain(float | None),
-    moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
+    Size, "nominal upper lower cp cpk moves distribution tolerance_class?", kind="size", nominal=Plain(POSITIVE),
+    upper=Plain(float | str), lower=Plain(float | None), moves=Plain(text_type(MOVES)), distribution=DISTRIBUTION,
 )  # fmt: skip
 CONTROL = Choice(
     "FeatureTolerance", f"kind: one of {', '.join(['size', *KINDS])}", SIZE, *map(_tolerance_record, KINDS.values())
@@ -152,8 +171,9 @@ TARGETS = Record(DatumTargets, "datum=letter targets=points declared_at", name="
 TOLERANCED = Choice("Toleranced", "a feature, or a pattern with members", PATTERN, FEATURE)
 SHAPE = Shape(
     "Shape",
-    "a box, or a file",
+    "a box, a pin, or a file",
     Record(Box, "box=x+y+z", mark="box"),
+    Record(Pin, "pin=diameter+length head?", mark="pin"),
     Record(
         Mesh, "file=source units? body? chord?", mark="file", units=Plain(text_type(UNITS) | None),
         chord=Plain(POSITIVE | None), file=Plain(Annotated[str, Meta(description="path, from the folder of this file")],
@@ -178,6 +198,8 @@ METHOD = Record(
     active_set=Plain(text_type(ACTIVE_SETS)),
     search=Plain(text_type(SEARCHES)),
 )  # fmt: skip
+TITLE_BLOCK = Record(TitleBlock, " ".join(f"{name}?" for name in TitleBlock().entries))
+GROUND = Inline({"on": str | None, "on_feature": str}, _ground_entries, _ground)
 # A part is read without its features, whose faces may refer to all parts.
 FEATURES = Inline(
     {"features": Items(TOLERANCED).wire, "datum_targets": Items(TARGETS).wire},
@@ -189,7 +211,7 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME),
+    "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
@@ -197,9 +219,9 @@ RECORDS = {
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
-            {"of": POINT.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
+            {"of": MEASURED.wire, "tape": Annotated[list[list[str | int | float]], Meta(description="steps of an expression")]},
             _measured_entries, _measured,
-        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | None),
+        ), along=Optional(UNIT_VECTOR), tolerance=Plain(POSITIVE | tuple[float, float] | str | None),
         limits=Plain(tuple[float | None, float | None] | None, write=floats),
     ),
     "forces": Record(Force, "at name vector declared_at"),
@@ -210,6 +232,7 @@ RECORDS = {
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
+    ("title_block", TITLE_BLOCK.wire | None, None),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
@@ -220,7 +243,16 @@ def to_document(
     """Return the document of an assembly, for an archive, or for a JSON model in a folder (see Writing)."""
     writing = Writing(triangles, tapes, folder)
     lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
-    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **lists}
+    titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
+    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **lists}
+
+
+def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
+    """Return a tolerance of a feature from its entry in a document. Raises ArchiveError for an entry that states none."""
+    try:
+        return CONTROL.decode(entry, Place(Sources({})))  # type: ignore[no-any-return]
+    except EntryError as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
 
 
 def from_document(document: Any, meshes: Mapping[str, Any]) -> Assembly:
@@ -262,7 +294,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     sources = replace(sources, inputs=ENTRIES * len(parts) + deviations)
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
-    assembly = Assembly(struct.name, method=method).replaced(**things)
+    title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
+    assembly = Assembly(struct.name, method=method, title_block=title_block).replaced(**things)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly

@@ -58,7 +58,7 @@ def _part(name: str, place: Place) -> Part:
     return place.sources.parts[name]  # type: ignore[no-any-return]
 
 
-def _feature(name: str, place: Place) -> Feature:
+def feature_named(name: str, place: Place) -> Feature:
     """Return the feature that an entry names, of the part that its record names."""
     features = {feature.name: feature for feature in place.part.features}
     if name not in features:
@@ -193,7 +193,7 @@ BOXES = Plain(tuple[tuple[Vector, Vector], ...])
 FLOAT = Plain(float, write=floats)
 CODECS |= {
     Part: Plain(str, lambda part, writing: part.name, _part),
-    Feature: Plain(str, lambda feature, writing: feature.name, _feature),
+    Feature: Plain(str, lambda feature, writing: feature.name, feature_named),
     np.ndarray: Plain(list[list[float]], lambda array, writing: array.tolist(), _array),
 }
 CRITERION = Choice(

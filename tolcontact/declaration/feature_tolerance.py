@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
-from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import Vector, direction as _direction, is_finite, is_length
 from tolcontact.readable import Readable
 
@@ -15,60 +14,10 @@ RULES = (INSIDE, EXTREMES, "truncated", "uniform", "translation", "polar")
 TRANSLATIONS = ("translation", "polar")  # rules without tilts
 BONUSES = ("fills", "accepts", "none")
 MATERIALS = ("", "M", "L")
-MOVES = ("both", "first", "second")
+SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
 AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
-
-
-@dataclass(frozen=True, repr=False)
-class Size(Readable):
-    """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
-
-    `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` has 8.05 and 8.15. Sizes vary about the
-    middle of the limits by `distribution` (see tc.Tolerance). `moves` states which of two planes moves with the size:
-    "both" by half each, or the "first" or "second" alone.
-    """
-
-    kind: ClassVar[str] = "size"
-
-    nominal: float
-    upper: float
-    lower: float = None  # type: ignore[assignment]  # -upper by default
-    _: KW_ONLY
-    distribution: Any = "normal"
-    cp: float | None = None
-    cpk: float | None = None
-    moves: str = "both"
-
-    def __post_init__(self) -> None:
-        if self.lower is None and is_length(self.upper):
-            object.__setattr__(self, "lower", -self.upper)
-
-    @property
-    def tolerance(self) -> Tolerance:
-        """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
-        if not isinstance(self.distribution, str):
-            return Tolerance(distribution=self.distribution)
-        width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
-        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
-
-    def faults(self) -> Iterator[str]:
-        for name in ("nominal", "upper", "lower"):
-            if not is_length(getattr(self, name)):
-                yield f"{name} is {getattr(self, name)!r}; expected a number in mm"
-                return
-        if not self.nominal > 0:
-            yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
-        if not self.lower < self.upper:
-            yield f"the lower limit {self.lower:+g} is not below the upper one {self.upper:+g}; swap them"
-        else:
-            yield from self.tolerance.faults()
-        if self.moves not in MOVES:
-            yield f"moves is {self.moves!r}; expected one of {', '.join(MOVES)}"
-
-    def __str__(self) -> str:
-        return f"size {self.nominal:g} {self.upper:+g} {self.lower:+g} mm"
 
 
 @dataclass(frozen=True, repr=False)
@@ -201,6 +150,17 @@ class GeometricTolerance(Readable):
             yield f'cp is given with the rule "{self.rule}"; it goes with normal components'
 
     def __str__(self) -> str:
+        """Return the tolerance with the symbols of a drawing."""
+        diameter, material = "⌀" if self.zone == "round" else "", f" {SYMBOLS[self.material]}" if self.material else ""
+        unit = f"/{'×'.join(f'{length:g}' for length in self._unit_lengths)}" if self._unit_lengths else ""
+        projected = "" if self.projected is None else f" Ⓟ{self.projected:g}"
+        unequal = "" if self.outside is None else f" Ⓤ{self.outside:g}"
+        frame = f"{self.kind} {diameter}{self.width:g}{unit}{unequal}{material}{projected}{' Ⓣ' if self.tangent else ''}"
+        return " ".join([frame, *(re.sub(r"\(([ML])\)", lambda m: f" {SYMBOLS[m[1]]}", datum) for datum in self._compartments)])
+
+    @property
+    def archived_text(self) -> str:
+        """The tolerance without symbols, as archives describe the contributors of a feature."""
         round_ = "diameter " if self.zone == "round" else ""
         unit = f" per {' x '.join(f'{length:g}' for length in self._unit_lengths)} mm" if self._unit_lengths else ""
         tangent, datums = " of the tangent plane" if self.tangent else "", f" to {self.datums}" if self.datums else ""

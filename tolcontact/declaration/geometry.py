@@ -28,6 +28,26 @@ class Box(Readable):
         return f"box {self.x:g} x {self.y:g} x {self.z:g} mm"
 
 
+@dataclass(frozen=True, repr=False)
+class Pin(Readable):
+    """A round pin about the z axis of its part's frame, from z = -length to 0 [mm]; a `head` of a bolt is above z = 0."""
+
+    diameter: float
+    length: float
+    head: bool = False
+
+    def faults(self) -> Iterator[str]:
+        for name in ("diameter", "length"):
+            size = getattr(self, name)
+            if not (is_length(size) and size > 0):
+                yield f"pin {name} is {size!r}; expected a length in mm above 0"
+        if not isinstance(self.head, bool):
+            yield f"pin head is {self.head!r}; expected True or False"
+
+    def __str__(self) -> str:
+        return f"pin {self.diameter:g} x {self.length:g} mm{' with a head' if self.head else ''}"
+
+
 STEP = (".step", ".stp")
 UNITS = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1e3, "in": 25.4, "ft": 304.8}  # [mm]
 
@@ -79,3 +99,6 @@ class Mesh(Readable):
         if isinstance(self.source, str | Path):
             return shown(f"mesh {Path(self.source).name}" + (f" {self.body}" if self.body is not None else ""))
         return f"mesh of {len(getattr(self.source, 'faces', ()))} triangles"
+
+
+Geometry = Box | Mesh | Pin

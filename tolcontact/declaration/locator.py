@@ -115,16 +115,23 @@ def three_two_one(
 class Location(Readable):
     """The location of a part: its locators, their common tolerance, and the part that they are `on` (None: the ground).
 
-    A `floating` part has fewer than six locators. The directions that they leave open are nominal in the raw state, and
-    contact determines them.
+    Locators `on` a feature of another part follow it as it shifts and tilts: a cylinder with its axis.
+
+    A `floating` part has fewer than six locators. The directions that they leave open are nominal in the raw state, and contact
+    determines them.
     """
 
     part: Part
     scheme: ThreeTwoOne | tuple[Locator, ...]
     tolerance: Tolerance | None = None
-    on: Part | None = None
+    on: Part | Feature | None = None
     declared_at: str = ""
     floating: bool = False
+
+    @property
+    def parent(self) -> Part | None:
+        """The part that the locators are on; None for the ground."""
+        return self.on.part if isinstance(self.on, Feature) else self.on
 
     @property
     def mentioned(self) -> tuple[Part, ...]:
@@ -136,6 +143,8 @@ class Location(Readable):
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
+        if isinstance(self.on, Feature) and self.on not in self.on.part.features:
+            yield f'it is on feature "{self.on.name}", which is no feature of part "{self.on.part.name}"; take one of that part'
 
     def _faces_faults(self) -> Iterator[str]:
         yield from self.scheme.faults() if isinstance(self.scheme, ThreeTwoOne) else ()
@@ -175,7 +184,8 @@ class Location(Readable):
 
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
-        ground = self.on.name if self.on else "the ground"
+        feature = f"{self.on.name} of " if isinstance(self.on, Feature) else ""
+        ground = f"{feature}{self.parent.name}" if self.parent else "the ground"
         floating = ", floating" if self.floating else ""
         return f"location of {self.part.name} on {ground}: {scheme}{floating}" + (
             f"; {self.tolerance}" if self.tolerance else ""

@@ -5,14 +5,17 @@ rows (operation, operands...): "input" with an index into the pose entries of al
 with a number, or the name of a CasADi operation with the positions of earlier rows. The last row is the value.
 """
 
+import contextlib
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from tolcontact.declaration.part import Point
+from tolcontact.declaration.measurement import Measurement
+from tolcontact.declaration.part import Part, Point
 from tolcontact.declaration.place import MAX_NUMBER, Place
 from tolcontact.declaration.values import Vector, is_finite, is_length, is_line
+from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
 
 
@@ -23,21 +26,28 @@ class Measure(Readable):
         of one Point                its displacement from its nominal place, along `along` [mm]; its coordinate, if `absolute`
         of a Point and `to` Point   the distance from the first to the second, along `along` [mm] (gap, flush); its deviation
                                     from the nominal distance, if `absolute` is False
+        of a Measurement            its value, such as a gap, an angle or the least of several measures [mm, rad]
         of a function               the CasADi expression that the function returns for the symbolic poses
 
-    `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits at half
-    of it below and above the nominal value.
+    `limits` are the smallest and the largest allowed value; None leaves a side open. `tolerance` is short for limits around the
+    nominal value: at half of a number below and above it, or at deviations such as "±0.1", "+0.1/-0.05" or (-0.05, 0.1).
     """
 
     name: str
-    of: Point | Callable[[Any], Any] | tuple[Any, ...]
+    of: Point | Measurement | Callable[[Any], Any] | tuple[Any, ...]
     to: Point | None = None
     along: Vector | None = None
-    tolerance: float | None = None
+    tolerance: float | Deviations | None = None  # a text or another pair only if it is no tolerance
     units: str = "mm"
     declared_at: str = ""
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+
+    def __post_init__(self) -> None:
+        with contextlib.suppress(TextFault):  # faults() reports it
+            value = written(self.tolerance, units=self.units)
+            is_symmetric = isinstance(value, Deviations) and not value.middle
+            object.__setattr__(self, "tolerance", value.width if is_symmetric else value)
 
     @property
     def points(self) -> tuple[Point, ...]:
@@ -45,8 +55,20 @@ class Measure(Readable):
         return tuple(point for point in (self.of, self.to) if isinstance(point, Point))
 
     @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts that are measured; none for an expression."""
+        return self.of.parts if isinstance(self.of, Measurement) else tuple(point.part for point in self.points)
+
+    @property
+    def is_expression(self) -> bool:
+        """Whether the measure is a user's own expression of the poses."""
+        return not isinstance(self.of, Point | Measurement)
+
+    @property
     def quantity(self) -> str:
-        """The quantity that is measured: a displacement, a coordinate, a distance, its deviation, or an expression."""
+        """The quantity: a displacement, a coordinate, a distance, its deviation, a kind of measurement, or an expression."""
+        if isinstance(self.of, Measurement):
+            return self.of.kind
         if not isinstance(self.of, Point):
             return "expression"
         if self.to is None:
@@ -57,7 +79,7 @@ class Measure(Readable):
     def width(self) -> float | None:
         """The width of the allowed zone; None if a side is open."""
         if self.limits is None:
-            return self.tolerance
+            return self.tolerance.width if isinstance(self.tolerance, Deviations) else self.tolerance
         lower, upper = self.limits
         return None if lower is None or upper is None else float(upper - lower)
 
@@ -66,21 +88,15 @@ class Measure(Readable):
         if self.limits is not None:
             lower, upper = self.limits
             return -math.inf if lower is None else lower, math.inf if upper is None else upper
+        if isinstance(self.tolerance, Deviations):
+            return nominal + self.tolerance.lower, nominal + self.tolerance.upper
         half = math.inf if self.tolerance is None else self.tolerance / 2
         return nominal - half, nominal + half
 
     def faults(self) -> Iterator[str]:
         for point in self.points:
             yield from point.faults()
-        if isinstance(self.of, Point):
-            if self.along is None:
-                yield 'a measured point needs a direction; give along="z", or a vector'
-            elif not is_finite(self.along):
-                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
-        elif not callable(self.of) and not isinstance(self.of, tuple):
-            yield f"it measures a {type(self.of).__name__}; expected part.point(x, y, z) or a function of the poses"
-        elif self.along is not None or self.to is not None:
-            yield "a function of the poses defines its measure by itself; leave out to and along"
+        yield from self._subject_faults()
         if not (self.units and is_line(self.units)):
             yield (
                 f'units is {self.units!r}; expected a text such as "mm", "rad", or "1" for a pure number, '
@@ -88,34 +104,73 @@ class Measure(Readable):
             )
         if self.to is not None and not isinstance(self.to, Point):
             yield f"to is a {type(self.to).__name__}; expected part.point(x, y, z)"
-        if self.tolerance is not None and not (
-            isinstance(self.tolerance, int | float) and math.isfinite(self.tolerance) and self.tolerance > 0
-        ):
-            yield f"tolerance is {self.tolerance!r}; expected the full width of the allowed zone, above 0"
-        if self.limits is not None:
-            yield from self._limits_faults()
+        yield from self._limits_faults()
         if not isinstance(self.absolute, bool | None):
             yield f"absolute is {self.absolute!r}; expected True or False"
         elif self.absolute is not None and not isinstance(self.of, Point):
-            yield "absolute is for measures of points; a function of the poses has its own value, so leave it out"
+            yield f"absolute is for measures of points; a {self._noun} has its own value, so leave it out"
+
+    def _subject_faults(self) -> Iterator[str]:
+        if isinstance(self.of, Point):
+            if self.along is None:
+                yield 'a measured point needs a direction; give along="z", or a vector'
+            elif not is_finite(self.along):
+                yield 'along is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+        elif not (isinstance(self.of, Measurement | tuple) or callable(self.of)):
+            yield (
+                f"it measures a {type(self.of).__name__}; expected part.point(x, y, z), a measurement such as tc.Gap(...), "
+                "or a function of the poses"
+            )
+        elif self.along is not None or self.to is not None:
+            yield f"a {self._noun} defines its measure by itself; leave out to and along"
+        if isinstance(self.of, Measurement):
+            yield from self.of.faults()
+
+    @property
+    def _noun(self) -> str:
+        return "measurement" if isinstance(self.of, Measurement) else "function of the poses"
 
     def _limits_faults(self) -> Iterator[str]:
+        width = self.tolerance.width if isinstance(self.tolerance, Deviations) else self.tolerance
+        if fault := text_fault(self.tolerance, units=self.units):
+            yield f"tolerance is {fault}"
+        elif width is not None and not (is_length(width) and width > 0):
+            yield f"tolerance is {self.tolerance!r}; expected the full width of the allowed zone, above 0"
+        if self.limits is None:
+            return
         if self.tolerance is not None:
             yield "it has both a tolerance and limits; give one of them"
         fault = f"limits are {self.limits!r}; expected (lower, upper), numbers with lower < upper, or None for an open side"
         if not (isinstance(self.limits, tuple) and len(self.limits) == 2):
-            yield fault
+            is_text = isinstance(self.limits, str)
+            yield (
+                f"{fault}; around the nominal value they are a tolerance, as in tolerance={self.limits!r}" if is_text else fault
+            )
             return
         limits = [limit for limit in self.limits if limit is not None]
         if not limits or not all(map(is_length, limits)) or (len(limits) == 2 and not limits[0] < limits[1]):
             yield fault
+
+    def reference_faults(self, earlier: "Sequence[Measure]") -> Iterator[str]:
+        """Yield faults of a measurement's units and references: it may only refer to the earlier measures."""
+        if not isinstance(self.of, Measurement):
+            return
+        units = {measure.name: measure.units for measure in earlier}
+        for name in dict.fromkeys(self.of.names):
+            if name not in units:
+                yield f'unknown measure "{name}"; those declared before it are: {", ".join(units) or "none"}'
+        own = self.of.units_among(units)
+        if len(own) > 1:
+            yield f"it combines measurements in {' and '.join(sorted(own))}; expected the same units"
+        elif own and own != {self.units}:
+            yield f"units is {self.units!r}, but its measurement is in {min(own)}; leave units out"
 
     def __str__(self) -> str:
         along = "" if self.along is None else " along ({:g}, {:g}, {:g})".format(*self.along)
         if self.to is not None:
             subject = f"distance {self.of} to {self.to}{along}"
         else:
-            subject = f"{self.of}{along}" if isinstance(self.of, Point) else "expression of the poses"
+            subject = "expression of the poses" if self.is_expression else f"{self.of}{along}"
         if isinstance(self.of, Point) and self.absolute is not None:
             subject = f"{self.quantity}, {subject}"
         return f"measure {self.name}: {subject}{self._limit_text}"
@@ -123,6 +178,8 @@ class Measure(Readable):
     @property
     def _limit_text(self) -> str:
         if self.limits is None:
+            if isinstance(self.tolerance, Deviations):
+                return f", tolerance {self.tolerance} {self.units}"
             return "" if self.tolerance is None else f", tolerance {self.tolerance:g} {self.units}"
         lower, upper = self.limits
         if lower is None or upper is None:

@@ -5,10 +5,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
-from tolcontact.declaration.geometry import Box, Mesh
+from tolcontact.declaration.geometry import Geometry
 from tolcontact.declaration.selection import Near, Picker, Selection, criterion
-from tolcontact.declaration.toleranced import Toleranced, letter_faults
+from tolcontact.declaration.toleranced import Control, Toleranced, letter_faults
 from tolcontact.declaration.values import Vector, is_finite, script_line, vector
 from tolcontact.later import LATER, PMI
 from tolcontact.readable import Readable
@@ -26,7 +25,7 @@ class Part(Readable):
     """
 
     name: str
-    geometry: Box | Mesh
+    geometry: Geometry
     at: Vector = (0.0, 0.0, 0.0)
     rotation: Vector = (0.0, 0.0, 0.0)
     fixed: bool | None = None
@@ -50,7 +49,7 @@ class Part(Readable):
     def feature(
         self,
         name: str,
-        *constituents: "Face | Size | GeometricTolerance",
+        *constituents: "Face | Control",
         datum: str | None = None,
         association: str = OUTSIDE,
     ) -> "Feature":
@@ -59,7 +58,7 @@ class Part(Readable):
         `association` is how a plane that leans becomes a datum: "outside" or "least squares" (see `tolcontact.features`).
         """
         for constituent in constituents:
-            if not isinstance(constituent, Face | Size | GeometricTolerance):
+            if not isinstance(constituent, Face | Control):
                 raise TypeError(
                     f'feature "{name}": {type(constituent).__name__} is neither a face nor a tolerance; expected '
                     "part.face(...), tc.Size(...), tc.Position(...) or another tolerance of a feature"
@@ -73,7 +72,7 @@ class Part(Readable):
     def pattern(
         self,
         name: str,
-        *constituents: "Face | Sequence[Face] | Feature | Size | GeometricTolerance",
+        *constituents: "Face | Sequence[Face] | Feature | Control",
         datum: str | None = None,
     ) -> "Pattern":
         """Name several like faces with their common tolerances: `part.pattern("H", face, face, tc.Position(0.2, "A"))`.
@@ -89,12 +88,12 @@ class Part(Readable):
                 members.append(tuple(constituent))
             elif isinstance(constituent, Feature):
                 members.append(constituent)
-            elif not isinstance(constituent, Size | GeometricTolerance):
+            elif not isinstance(constituent, Control):
                 raise TypeError(
                     f'pattern "{name}": {type(constituent).__name__} is neither a member nor a tolerance; expected '
                     "part.face(...), two faces in parentheses, a feature, tc.Size(...), tc.Position(...) or another tolerance"
                 )
-        tolerances = tuple(tolerance for tolerance in constituents if isinstance(tolerance, Size | GeometricTolerance))
+        tolerances = tuple(tolerance for tolerance in constituents if isinstance(tolerance, Control))
         pattern = Pattern(name, self, tuple(members), tolerances, datum, script_line())
         self.add(pattern)
         return pattern
@@ -134,9 +133,9 @@ class Part(Readable):
 
     def faults(self) -> Iterator[str]:
         yield from self.geometry.faults()
-        for label, value in (("at", self.at), ("rotation", self.rotation)):
+        for label, value, example in (("at", self.at, "(0, 0, 10)"), ("rotation", self.rotation, "tc.degrees(0, 0, 90)")):
             if not is_finite(value):
-                yield f"{label} is not a vector of three finite numbers"
+                yield f"{label} is not a vector of three finite numbers; give it as in {label}={example}"
 
     def __str__(self) -> str:
         place = "" if self.at == (0.0, 0.0, 0.0) else " at ({:g}, {:g}, {:g})".format(*self.at)
@@ -203,7 +202,7 @@ class Feature(Toleranced, Readable):
     name: str
     part: Part
     faces: tuple[Face, ...]
-    tolerances: tuple[Size | GeometricTolerance, ...] = ()
+    tolerances: tuple[Control, ...] = ()
     datum: str | None = None
     declared_at: str = ""
     association: str = OUTSIDE
@@ -262,7 +261,7 @@ class Pattern(Toleranced, Readable):
     name: str
     part: Part
     constituents: tuple[tuple[Face, ...] | Feature, ...]
-    tolerances: tuple[Size | GeometricTolerance, ...] = ()
+    tolerances: tuple[Control, ...] = ()
     datum: str | None = None
     declared_at: str = ""
 

@@ -4,6 +4,7 @@ import contextlib
 import importlib.util
 import sys
 import traceback
+from dataclasses import FrozenInstanceError
 from pathlib import Path
 
 from tolcontact.declaration import Assembly
@@ -46,6 +47,8 @@ def load_model(path: Path) -> Assembly:
         raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {error}') from error
     except Exception as error:  # a user's script may raise anything
         reason = error.msg if isinstance(error, SyntaxError) else error
+        if isinstance(error, FrozenInstanceError):
+            reason = f"{error}, since declarations do not change; state it in the call that declares it"
         raise ScriptError(f'model script "{path}" failed{_where(error, path)}: {type(error).__name__}: {reason}') from error
     finally:
         with contextlib.suppress(ValueError):  # a script may do anything to it

@@ -121,7 +121,8 @@ class Near(Readable):
 class Brep(Readable):
     """Faces of the B-rep of a STEP file, each by number (`tolcontact faces` lists them), by name, or by a point [mm].
 
-    With `whole`, each one stands for all faces of the same surface that touch it, as the two halves of a hole do.
+    With `whole`, each one stands for all faces that make up its surface: the two halves of a hole, or the parts of a bore that
+    keyways interrupt.
     `Brep(3) | Brep("seat")` are the faces of both.
     """
 

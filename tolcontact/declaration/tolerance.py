@@ -1,5 +1,6 @@
 """The variation of a contributor: the range of its tolerance, and the distribution that fills this range."""
 
+import contextlib
 import math
 import time
 from collections.abc import Iterator
@@ -9,6 +10,7 @@ from typing import Any
 import scipy
 
 from tolcontact.declaration.values import is_length
+from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
 from tolcontact.readable import Readable
 
 MAX_DRAW_SECONDS = 0.01
@@ -25,17 +27,25 @@ class Tolerance(Readable):
         triangular         between -range/2 and +range/2, mode 0
         truncated normal   6 sigma = range, cut at -range/2 and +range/2
 
-    `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal distribution:
-    6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
+    The range may be written as on drawings: "±0.1" has the range 0.2, and "+0.1/-0.05" or (-0.05, 0.1) the range 0.15 with a
+    shift of 0.025. `shift` [mm] moves the whole distribution. `cp` and `cpk` are the capability of a process with a normal
+    distribution: 6 sigma = range / cp, and the mean moves up by a further range / 2 * (1 - cpk / cp).
     `distribution` may also be a frozen continuous distribution of `scipy.stats`. It defines the spread by itself; leave
     `range` out.
     """
 
-    range: float | None = None
+    range: float | None = None  # a text or a pair only if it is no tolerance
     distribution: Any = "normal"
     shift: float = 0.0
     cp: float | None = None
     cpk: float | None = None
+
+    def __post_init__(self) -> None:
+        with contextlib.suppress(TextFault):  # faults() reports it
+            value = written(self.range)
+            object.__setattr__(self, "range", value.width if isinstance(value, Deviations) else value)
+            if isinstance(value, Deviations) and value.middle and is_length(self.shift):
+                object.__setattr__(self, "shift", self.shift + value.middle)
 
     def faults(self) -> Iterator[str]:
         if isinstance(self.distribution, str):
@@ -44,7 +54,9 @@ class Tolerance(Readable):
                     f'unknown distribution "{self.distribution}"; expected one of {", ".join(SHAPES)}, '
                     "or a frozen distribution of scipy.stats"
                 )
-            if not (isinstance(self.range, int | float) and math.isfinite(self.range) and self.range >= 0):
+            if fault := text_fault(self.range):
+                yield f"tolerance is {fault}"
+            elif not (is_length(self.range) and self.width >= 0):
                 yield f"tolerance range is {self.range!r}; expected the full width of the zone in mm, 0 or above"
         else:
             yield from self._scipy_faults()
@@ -85,20 +97,27 @@ class Tolerance(Readable):
 
     @property
     def width(self) -> float:
-        """Full width of the zone [mm]: the range, or six standard deviations of a scipy.stats distribution."""
-        return float(6 * self.distribution.std() if self.range is None else self.range)
+        """Full width of the zone [mm]: the range, or six standard deviations of a scipy.stats distribution.
+
+        It is 0 if the tolerance has a fault that leaves it without a width.
+        """
+        if is_length(self.range):
+            return float(self.range or 0)
+        return float(6 * self.distribution.std()) if hasattr(self.distribution, "std") else 0.0
 
     def __str__(self) -> str:
-        if isinstance(self.distribution, str):
-            spread = f"{self.distribution}, range {self.range:g} mm"
-        else:
+        if hasattr(self.distribution, "dist"):
             spread = f"scipy.stats.{self.distribution.dist.name}"
-        capability = "".join(f", {name} {value:g}" for name, value in (("cp", self.cp), ("cpk", self.cpk)) if value is not None)
-        return spread + capability + (f", shifted by {self.shift:g} mm" if self.shift else "")
+        else:
+            width = f"{self.range:g} mm" if is_length(self.range) else repr(self.range)
+            spread = f"{self.distribution}, full width {width}"
+        numbers = [(name, value) for name, value in (("cp", self.cp), ("cpk", self.cpk)) if is_length(value)]
+        capability = "".join(f", {name} {value:g}" for name, value in numbers)
+        return spread + capability + (f", shifted by {self.shift:g} mm" if is_length(self.shift) and self.shift else "")
 
 
 def tolerance(value: Any) -> Tolerance:
-    """Return the Tolerance for a range [mm], a frozen scipy.stats distribution, or a Tolerance."""
+    """Return the Tolerance for a range [mm], limit deviations, a frozen scipy.stats distribution, or a Tolerance."""
     if isinstance(value, Tolerance):
         return value
     if hasattr(value, "ppf"):

@@ -4,9 +4,11 @@ import re
 from collections.abc import Iterator
 from typing import ClassVar
 
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position, Size
+from tolcontact.declaration.feature_tolerance import GeometricTolerance, Position
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import is_length
 
+Control = Size | GeometricTolerance  # what limits a feature
 LETTER = re.compile(r"[A-Z]{1,2}")
 
 
@@ -20,7 +22,7 @@ class Toleranced:
     noun: ClassVar[str] = "feature"
     has_common_zone: ClassVar[bool] = False
 
-    tolerances: tuple[Size | GeometricTolerance, ...]
+    tolerances: tuple[Control, ...]
 
     @property
     def size(self) -> Size | None:

@@ -8,7 +8,7 @@ import unicodedata
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
@@ -88,6 +88,22 @@ def direction(value: Any) -> Vector:
     if not (math.isfinite(length) and length > 0):
         return NOT_A_VECTOR
     return (x / length, y / length, z / length)
+
+
+@overload
+def degrees(angle: float, /) -> float: ...
+@overload
+def degrees(*angles: float) -> tuple[float, ...]: ...
+def degrees(*angles: float) -> float | tuple[float, ...]:
+    """Return angles in degrees as radians: a number for one, a tuple for several, as in `rotation=tc.degrees(0, 0, 90)`.
+
+    A rotation is a vector along its axis, whose length is the angle. Raises TypeError for anything but numbers.
+    """
+    for angle in angles:
+        if not is_length(angle):
+            raise TypeError(f"degrees of {angle!r}; expected finite numbers, as in tc.degrees(0, 0, 90)")
+    radians = tuple(math.radians(angle) for angle in angles)
+    return radians[0] if len(radians) == 1 else radians
 
 
 def is_finite(value: Vector) -> bool:

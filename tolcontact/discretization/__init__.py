@@ -52,8 +52,9 @@ A `tc.FaceWarning` names a feature or contact pair whose B-rep faces are only so
 curved surface: files split holes into halves. `tc.Brep(number, whole=True)` chooses all of them.
 
 A `tc.UnitsWarning` names a mesh without stated units whose size is implausible in mm, either in itself (below 1 mm or above 10
-m) or compared with a part that it touches. It also names a mesh if a locator, measure or force is farther from it than its own
-size.
+m) or compared with a part that it touches. It also names a mesh if all declared points would lie on it in another unit.
+
+`tc.build` looks at the nominal assembly as well (see `tolcontact.plausibility`).
 
 ## Balls and shafts
 

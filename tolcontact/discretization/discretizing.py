@@ -2,21 +2,34 @@
 
 import difflib
 import logging
-from collections.abc import Callable, Iterator, Sequence, Set
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, DatumTargets, Locator, Part, ThreeTwoOne, Tolerance, has_supports, is_free, movers
+from tolcontact.declaration import (
+    Assembly,
+    DatumTargets,
+    Feature,
+    Location,
+    Locator,
+    Part,
+    ThreeTwoOne,
+    Tolerance,
+    has_supports,
+    is_free,
+    movers,
+)
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
+from tolcontact.discretization.measurements import nominal_measurements
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.partial_surfaces import warn_of_partial_surfaces
 from tolcontact.discretization.unit_check import warn_of_units
 from tolcontact.errors import GeometryFault, ModelError, designation
-from tolcontact.features import Features, datum_order
+from tolcontact.features import Features, Placement, datum_order
 from tolcontact.geometry.faces import Meshes
 from tolcontact.geometry.files.reading import Shape, read_files
 from tolcontact.geometry.shapes import field_surface, shape
@@ -53,7 +66,12 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     features = Features(sum(len(part.locators) for part in parts if part is not None))
     if is_sound and None not in parts:
         _add_features(assembly, meshes, features, faults)
-        parts = [_on_features(part, features, meshes, faults) for part in parts if part is not None]
+        placements = {part.part: part.placement for part in parts if part is not None}
+        parts = [
+            _on_ground(_on_features(part, features, meshes, faults), assembly.location_of(part.part), features, placements)
+            for part in parts
+            if part is not None
+        ]
     nominal_parts = tuple(part for part in parts if part is not None)
     placed = {nominal.part: nominal for nominal in nominal_parts}
     if len(assembly.pairs) > MANY_PAIRS:
@@ -76,7 +94,8 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     warn_of_partial_surfaces(assembly, meshes)
-    return Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
+    nominal = Nominal(assembly, nominal_parts, (*pairs, *_support_pairs(nominal_parts)), assembly.measures, features)
+    return replace(nominal, measurements=nominal_measurements(nominal))
 
 
 def _shapes(assembly: Assembly, faults: _Faults) -> dict[Part, Shape]:
@@ -119,6 +138,16 @@ def _on_features(part: NominalPart, features: Features, meshes: Meshes, faults: 
             locator.on and features.face_of(locator.on, np.array(locator.point), part.placement) for locator in scheme
         )
     return replace(part, locators=replace(part.locators, faces=faces))
+
+
+def _on_ground(
+    part: NominalPart, location: Location | None, features: Features, placements: Mapping[Part, Placement]
+) -> NominalPart:
+    """Return the part with the feature of another part that its locators are on."""
+    if location is None or not isinstance(location.on, Feature):
+        return part
+    ground = features.middle_of(location.on, placements[location.on.part])
+    return replace(part, locators=replace(part.locators, grounds=(ground,) * len(part.locators)))
 
 
 def _repeated_labels(labels: Sequence[str]) -> Iterator[str]:
@@ -212,7 +241,7 @@ def _nominal_part(assembly: Assembly, part: Part, meshes: Meshes, faults: _Fault
         nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
         faults.attempt(designation("part", part), nominal.check_independent)
-    parent = location.on if location else None
+    parent = location.parent if location else None
     return NominalPart(
         name=part.name,
         part=part,
@@ -243,6 +272,7 @@ def _locators(
         stiffness=np.array([float(locator.stiffness) for locator in declared]),
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
         faces=(None,) * len(declared),
+        grounds=(None,) * len(declared),
     )
 
 

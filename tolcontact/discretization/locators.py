@@ -26,6 +26,7 @@ class Locators:
     stiffness    (locator,) [N/mm]
     one_sided    (locator,) bool: supports that the part may lift off
     faces        for each locator the face of a feature that it stands against; None for a nominal face
+    grounds      for each locator the feature of another part that it is on; None if it is on no feature
     floating     middle (3,) and size [mm] of a floating part; None for a part that its locators fix
     """
 
@@ -36,6 +37,7 @@ class Locators:
     stiffness: np.ndarray
     one_sided: np.ndarray
     faces: tuple[FaceDeviation | None, ...]
+    grounds: tuple[FaceDeviation | None, ...]
     floating: tuple[np.ndarray, float] | None = None
 
     def __len__(self) -> int:
@@ -53,14 +55,19 @@ class Locators:
             stiffness=np.concatenate([part.stiffness for part in parts]),
             one_sided=np.concatenate([part.one_sided for part in parts]),
             faces=tuple(face for part in parts for face in part.faces),
+            grounds=tuple(ground for part in parts for ground in part.grounds),
         )
 
     def pushes(self, locator: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the columns (k,) of deviations that move the face at a locator out of its part, and how far for 1 (k,)."""
-        face = self.faces[locator]
-        if face is None:
-            return np.zeros(0, dtype=int), np.zeros(0)
-        return face.columns, face.outward(self.points[locator, None], -self.directions[locator, None])[0]
+        """Return the columns (k,) of deviations by which features push the part at a locator, and how far for 1 (k,).
+
+        These are the face of the part itself, as it moves out of the part, and the feature of another part that it is on.
+        """
+        point, into_part = self.points[locator, None], self.directions[locator, None]
+        features = [(self.faces[locator], -into_part), (self.grounds[locator], into_part)]
+        pushes = [(face.columns, face.outward(point, outward)[0]) for face, outward in features if face is not None]
+        columns, factors = zip((np.zeros(0, dtype=int), np.zeros(0)), *pushes, strict=True)
+        return np.concatenate(columns), np.concatenate(factors)
 
     @property
     def matrix(self) -> tuple[np.ndarray, np.ndarray]:

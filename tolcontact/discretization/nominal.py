@@ -11,12 +11,13 @@ from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
+from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, body_face
-from tolcontact.geometry.faces import triangles
+from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.surface import Surface
 
 GAPS_TOGETHER = 1 << 20  # that are computed at once
@@ -172,13 +173,17 @@ class ContactPoints:
 
 @dataclass(frozen=True, eq=False)
 class Nominal:
-    """An assembly with numbers."""
+    """An assembly with numbers.
+
+    measurements   of each measure; None for those of points and expressions
+    """
 
     assembly: Assembly
     parts: tuple[NominalPart, ...]
     pairs: tuple[ContactPoints, ...]
     measures: tuple[Measure, ...]
     _features: Features
+    measurements: tuple[NominalMeasurement | None, ...] = ()
     _face_pairs: dict[int, FacePair] = field(default_factory=dict, init=False)
 
     def face_pair(self, index: int) -> FacePair | None:
@@ -230,9 +235,23 @@ class Nominal:
     def part_index(self, part: Part) -> int:
         return self.assembly.parts.index(part)
 
+    @property
+    def lines(self) -> list[np.ndarray]:
+        """The lines (line, 2, 3) [mm] that show each measurement; none for measures of points and expressions."""
+        return [np.zeros((0, 2, 3)) if measurement is None else measurement.lines for measurement in self.measurements]
+
+    @property
+    def meshes(self) -> Meshes:
+        """The mesh of each part, in its own frame."""
+        return {part.part: part.mesh for part in self.parts}
+
     def triangles(self, face: Face) -> list[int]:
         """Return the indices of the triangles of a face in its part's mesh."""
-        return [int(k) for k in triangles(face, {part.part: part.mesh for part in self.parts})]
+        return [int(k) for k in triangles(face, self.meshes)]
+
+    def deviation(self, face: Face) -> FaceDeviation | None:
+        """Return how a face deviates; None if it belongs to no feature. Raises GeometryFault if it does in part."""
+        return self._features.face_at(face, self.meshes, self.parts[self.part_index(face.part)].placement)
 
     def position(self, point: Point) -> np.ndarray:
         """Return the nominal assembly coordinates (3,) [mm] of a declared point."""

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
+import trimesh
 
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP, UNITS
@@ -19,7 +20,7 @@ MIN_POINT_REACH = 0.25  # of a mesh in a probable unit: the least reach of point
 
 
 def warn_of_units(assembly: Assembly, shapes: Mapping[Part, Shape]) -> None:
-    """Warn of points that lie far off their mesh, and of meshes of implausible size if no units are given.
+    """Warn of meshes without stated units whose points lie on them in another unit, or whose size is implausible.
 
     A size is implausible by itself, or beside a part that the mesh touches. One warning is issued for each mesh.
     """
@@ -32,7 +33,7 @@ def warn_of_units(assembly: Assembly, shapes: Mapping[Part, Shape]) -> None:
 
 
 def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> Iterator[str]:
-    """Yield the point that lies farthest off the mesh, if its distance exceeds the size of the mesh."""
+    """Yield the point that lies farthest off the mesh, if all points would lie on it in another unit."""
     location = assembly.location_of(part)
     scheme = location.scheme if location and isinstance(location.scheme, tuple) else ()
     declared = [
@@ -49,18 +50,14 @@ def _far_point(assembly: Assembly, part: Part, geometry: Mesh, shape: Shape) -> 
     distances, size = _distances(points, shape.mesh.bounds), float(shape.mesh.scale)
     if not (distances > size).any():
         return
-    (name, point), distance = declared[int(distances.argmax())], float(distances.max())
-    doubt = f"{size:.4g} mm across, but {name} lies {distance:.4g} mm away from it"
-    unit = _probable_unit(points, geometry, shape)
-    if unit:
-        yield f"{doubt}; {_advice(geometry, size, unit)}"
-    else:
-        yield f"{doubt}; check the coordinates ({', '.join(f'{c:g}' for c in point)}), which are in the part's own frame"
+    (name, _), distance = declared[int(distances.argmax())], float(distances.max())
+    if unit := probable_unit(points, geometry, shape.mesh):
+        yield f"{size:.4g} mm across, but {name} lies {distance:.4g} mm away from it; {_advice(geometry, size, unit)}"
 
 
-def _probable_unit(points: np.ndarray, geometry: Mesh, shape: Shape) -> str | None:
+def probable_unit(points: np.ndarray, geometry: Mesh, mesh: trimesh.Trimesh) -> str | None:
     """Return the unit with which all points (point, 3) [mm] lie on the mesh, if most of them are off it."""
-    bounds, size = shape.mesh.bounds, float(shape.mesh.scale)
+    bounds, size = mesh.bounds, float(mesh.scale)
     distances = _distances(points, bounds)
     if _states_units(geometry) or np.median(distances) <= MESH_MARGIN * size:
         return None

@@ -25,7 +25,7 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 
 | tolerance | applies to | controls |
 |---|---|---|
-| `tc.Size(8.1, +0.05, -0.02)` | cylinder, sphere, two planes | diameter or distance, as shaped, and its limits |
+| `tc.Size(8, 0.05, -0.02)`, `tc.Size(8, "H7")` | cylinder, sphere, two planes | diameter or distance, as shaped; limits |
 | `tc.Position(0.2, datums)` | axis, centre, plane, two planes | place and tilt |
 | `tc.Coaxiality`, `tc.Symmetry` | axis; middle of two planes | as position |
 | `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
@@ -93,11 +93,12 @@ member has by itself, without a common zone, are those of features: declare one 
 
 from tolcontact.features.datum_order import datum_order
 from tolcontact.features.feature_geometry import AxisFeature, FeatureOfSize, PlaneFeature
-from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, NominalPattern
+from tolcontact.features.feature_recognition import feature_geometry
+from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, NominalPattern, Placement
 from tolcontact.features.tolerance_kinds import zone_of
 from tolcontact.features.tolerance_layers import Datum, Layer
 
 __all__ = [
     "AxisFeature", "Datum", "FaceDeviation", "FeatureOfSize", "Features", "Layer", "NominalFeature", "NominalPattern",
-    "PlaneFeature", "datum_order", "zone_of",
+    "Placement", "PlaneFeature", "datum_order", "feature_geometry", "zone_of",
 ]  # fmt: skip

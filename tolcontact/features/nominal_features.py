@@ -270,6 +270,11 @@ class Features:
         nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
         return None if nominal is None else self._used(nominal, nominal.face_with(position), placement)
 
+    def middle_of(self, feature: Feature, placement: Placement) -> FaceDeviation | None:
+        """Return how the middle of a feature deviates, which no size moves; None if the feature could not be added."""
+        nominal = next((nominal for nominal in self.features if nominal.feature is feature), None)
+        return None if nominal is None else self._used(nominal, None, placement)
+
     def _used(self, nominal: NominalFeature, number: int | None, placement: Placement) -> FaceDeviation:
         """Return the deviation of a face: the same object for all that uses it."""
         key = (nominal.feature, number)
@@ -302,6 +307,11 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             f"its size is {geometry.size:.9g} mm as shaped, and {size.nominal:g} mm in its tolerance; state the size of the "
             "shape, with the limits about it"
         )
+    if size.is_for_holes not in (None, geometry.is_inner):
+        own, other = (
+            ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
+        )
+        raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {own}; write "{other}"')
 
 
 def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:

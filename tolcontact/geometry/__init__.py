@@ -47,10 +47,11 @@ a body that are closer than 1e-5 mm at 100 mm, 1e-4 mm at 1 m, are one.
 
 An assembly holds several bodies. `tolcontact bodies FILE.stp` and `tc.bodies_in` list them; `tc.Mesh(file, body=...)` is one
 of them in the frame of its product; `tc.parts_from(model, file)` declares all of them, or only the named ones, as parts in
-their positions. `tolcontact faces FILE.stp --body NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds,
-directions, radii and areas, and with their names if the file has any; `tc.Brep("...")` chooses a face by its name. Faces of one
-surface that touch, such as the halves of a hole, are listed with each other's numbers; `tc.Brep(6, whole=True)` chooses all of
-them by any of their numbers. A face that the file states several times in one place has one number, and is listed as such.
+their positions, and `tc.parts_from(model, file, fixed=["plate"])` holds the plate there. `tolcontact faces FILE.stp --body
+NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds, directions, radii and areas, and with their names
+if the file has any; `tc.Brep("...")` chooses a face by its name. Faces of one surface that touch, such as the halves of a
+hole, are listed with each other's numbers; `tc.Brep(6, whole=True)` chooses all of them by any of their numbers. A face that
+the file states several times in one place has one number, and is listed as such.
 Areas and boxes are those of the true faces, not of triangles. A B-spline surface within 0.1 um of a plane, cylinder, cone or
 sphere is taken for it. Where a file states no simple surface, one is fitted to the vertices to within 1 um, and its residual is
 listed. STEP files that refer to other files are rejected.

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import trimesh
@@ -13,6 +14,7 @@ from tolcontact.geometry.edges import smooth_pieces
 from tolcontact.geometry.files import BREP, FACE_NAMES, STATED_FACES, SURFACES
 from tolcontact.geometry.files.stated_face import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
+from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruptions
 from tolcontact.readable import Readable
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the surface on which it is
@@ -22,8 +24,6 @@ DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
 GENERAL = "general"  # kind of a face without an analytic surface
 UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
-
-FaceOnSurface = tuple[AnalyticSurface | None, np.ndarray]  # a surface, if one is known, and the triangles (face,) on it
 
 
 @dataclass(frozen=True, repr=False)
@@ -39,7 +39,7 @@ class FaceInFile(Readable):
     area        [mm2]; of its triangles, if the file states it by triangles
     residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
     name        its name in the file, which other faces may have too; empty if it has none
-    whole       numbers of the faces of its surface that touch it, and it; empty if it has the surface for itself
+    whole       numbers of the faces that make up its surface, and it; empty if it has the surface for itself
     copies      number of other faces in the same place, which have no numbers of their own
     """
 
@@ -129,19 +129,31 @@ def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
 
 
 def whole_surfaces(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return the number of the whole surface of each B-rep face (face,): faces of one surface that touch have the same one."""
+    """Return the number of the whole surface of each B-rep face (face,): faces of one surface have the same one."""
     return np.array([face.whole[0] if face.whole else face.number for face in describe_faces(mesh)], dtype=np.int64)
 
 
 def _wholes(mesh: trimesh.Trimesh, number_of: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
-    """Yield for each B-rep face the numbers of the faces that touch it and make up its surface with it; none if it is alone."""
+    """Yield for each B-rep face the numbers of the faces that make up its surface with it; none if it is alone.
+
+    They touch, or a cylinder or cone is interrupted between them.
+    """
     neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
     pairs = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
     links = [pair for pair in pairs if are_one_surface(mesh, *(faces[number] for number in pair))]
-    label = trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=len(faces))
+    label = _components(links, len(faces))
+    links += interruptions(mesh, faces, label, partial(are_one_surface, mesh))
+    label = _components(links, len(faces))
     for number in label:
         members = tuple(int(member) + 1 for member in np.flatnonzero(label == number))
         yield members if len(members) > 1 else ()
+
+
+def _components(links: Sequence[Sequence[int]], count: int) -> np.ndarray:
+    """Return the number of the component (node,) of `count` nodes that links of two join."""
+    return np.asarray(
+        trimesh.graph.connected_component_labels(np.array(links, dtype=np.int64).reshape(-1, 2), node_count=count)
+    )
 
 
 def are_one_surface(mesh: trimesh.Trimesh, face: FaceOnSurface, neighbour: FaceOnSurface) -> bool:

@@ -17,10 +17,12 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
     Corners of the face's own rim are not among them.
     """
     face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
-    if not (0 < len(face_rim) <= MAX_EDGES and 0 < len(target_rim) <= MAX_EDGES):
+    if not _are_few(face_rim, target_rim):
         return np.zeros((0, 3))
     n = _mean_normal(target)
-    crossings = _crossings(np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim], n)
+    edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
+    row, _, share = _crossings(edges_p, edges_q, n)
+    crossings = edges_p[row, 0] + share[:, None] * (edges_p[row, 1] - edges_p[row, 0])
     # Corners of the target's rim, moved along its normal into this face.
     normal = face.corner_normals.reshape(-1, 3).mean(axis=0)
     corners = np.asarray(target.mesh.vertices)[np.unique(target_rim)]
@@ -32,8 +34,22 @@ def overlap_corners(face: Surface, target: Surface) -> np.ndarray:
     return np.concatenate([crossings, below[is_over]])
 
 
-def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """Return the places (crossing, 3) on edges p where edges q cross them, seen along n (3,); edges (edge, end, 3).
+def crossing_edges(face: Surface, target: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """Return edges (crossing, end, 3) [mm] of the rim of a face, and those of the target's rim that cross them."""
+    face_rim, target_rim = (rim(np.asarray(surface.mesh.faces)) for surface in (face, target))
+    edges_p, edges_q = np.asarray(face.mesh.vertices)[face_rim], np.asarray(target.mesh.vertices)[target_rim]
+    if not _are_few(face_rim, target_rim):
+        return edges_p[:0], edges_q[:0]
+    row, column, _ = _crossings(edges_p, edges_q, _mean_normal(target))
+    return edges_p[row], edges_q[column]
+
+
+def _are_few(*rims: np.ndarray) -> bool:
+    return all(0 < len(edge) <= MAX_EDGES for edge in rims)
+
+
+def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return which edges p and q (edge, end, 3) cross, seen along n (3,): their numbers, and the share of p where they do.
 
     Where p + a r meets q + b s in the plane across n, a = (q - p) x s / (r x s) and b = (q - p) x r / (r x s).
     """
@@ -48,7 +64,7 @@ def _crossings(edges_p: np.ndarray, edges_q: np.ndarray, n: np.ndarray) -> np.nd
         b = (pq[..., 0] * r[:, None, 1] - pq[..., 1] * r[:, None, 0]) / cross
     lengths = np.linalg.norm(r, axis=1)[:, None] * np.linalg.norm(s, axis=1)[None]
     row, column = np.nonzero((np.abs(cross) > MIN_ANGLE * lengths) & (a >= 0) & (a <= 1) & (b >= 0) & (b <= 1))
-    return start[row] + a[row, column, None] * (end - start)[row]
+    return row, column, a[row, column]
 
 
 def _mean_normal(face: Surface) -> np.ndarray:

@@ -4,21 +4,24 @@ import igl
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Box, Mesh
+from tolcontact.declaration import Box, Geometry, Mesh, Pin
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import edges
 from tolcontact.geometry.files.reading import Contents, Shape, read, read_files
+from tolcontact.geometry.pin_shape import pin_shape
 
 FIELD_STATIONS = 12  # of a part's size, over which displacement is shown
 
 
-def shape(geometry: Box | Mesh, contents: Contents | None = None) -> Shape:
+def shape(geometry: Geometry, contents: Contents | None = None) -> Shape:
     """Return the closed or open triangle surface of a geometry. `contents` are those of files that were read together.
 
     Raises GeometryFault if a mesh cannot be read, is empty, or its outside is undefined.
     """
     if isinstance(geometry, Box):
         return Shape(trimesh.creation.box(bounds=[[0, 0, 0], [geometry.x, geometry.y, geometry.z]]))
+    if isinstance(geometry, Pin):
+        return Shape(pin_shape(geometry))
     surface = read(geometry, read_files([geometry]) if contents is None else contents)
     mesh = surface.mesh
     if len(mesh.faces) == 0:

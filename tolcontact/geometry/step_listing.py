@@ -2,9 +2,10 @@
 
 import logging
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import trimesh
 from scipy.spatial.transform import Rotation
@@ -17,7 +18,7 @@ from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, p
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
-from tolcontact.geometry.files.reader import ReadTimeout
+from tolcontact.geometry.files.reader import UnfinishedRead
 from tolcontact.readable import Readable
 
 LISTING_CHORD = 0.5  # [mm] of triangles that only tell which faces there are, and which of them touch
@@ -111,37 +112,66 @@ def faces_of_records(path: str | Path) -> dict[int, RecordedFace]:
     return found
 
 
+class PartsOfFile(dict[str, Part]):
+    """The parts of a STEP file by their names."""
+
+    def __missing__(self, name: str) -> Part:
+        raise OptionError(f'no part "{shown(str(name))}" is declared of the file; its parts are: {_first(list(self))}')
+
+
 def parts_from(
     model: Assembly,
     path: str | Path,
     names: Sequence[str] | None = None,
     *,
-    fixed: bool | None = None,
+    fixed: bool | Sequence[str] | None = None,
     chord: float | None = None,
-) -> dict[str, Part]:
+) -> "PartsOfFile":
     """Declare bodies of a STEP file as parts of a model, each in its place, and return the parts by their names.
 
     All bodies are declared, or those in `names`. A part has the name of its body in the file, without characters that a
     part's name may not have; where a name repeats, the second body is "name (2)" and so on. The part's own frame is the
-    frame of its product, which is the same in all places of the product. `fixed` is as of a Part, `chord` [mm] as of a Mesh.
-    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if `names` is one text.
+    frame of its product, which is the same in all places of the product. `fixed` is as of a Part and applies to all of them, or
+    it lists the bodies that are fixed, as in fixed=["plate"]. `chord` [mm] is as of a Mesh.
+    Raises ModelError if the file cannot be read, or holds no body of a name; TypeError if `names` or `fixed` is one text.
     """
-    if isinstance(names, str):
-        raise TypeError(f"names is {names!r}; expected a list of the names of bodies")
+    if not isinstance(model, Assembly):
+        raise TypeError(f'model is a {type(model).__name__}; expected an assembly, as in tc.parts_from(model, "file.stp")')
+    wanted = None if names is None else _names("names", names)
+    fixed_names = [] if fixed is None or isinstance(fixed, bool) else _names("fixed", fixed)
     try:
         bodies = _bodies(_product(path, chord))  # with the triangles that the parts will have
     except OptionError as error:
         raise ModelError(model.name, [str(error)]) from error
     by_name = {body.name: body for body in bodies}
-    if missing := [name for name in (() if names is None else names) if name not in by_name]:
-        listed = ", ".join(f'"{body.name}"' for body in bodies[:MAX_LISTED]) + (", ..." if len(bodies) > MAX_LISTED else "")
+    if missing := [name for name in (*(wanted or ()), *fixed_names) if name not in by_name]:
+        listed = _first([body.name for body in bodies])
         raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
-    declared = bodies if names is None else [by_name[name] for name in names]
-    return {
-        name: model.part(name, Mesh(path, body=body.number, chord=chord), at=body.at, rotation=body.rotation, fixed=fixed)
-        for body in declared
-        if (name := part_name(body))
-    }
+    declared = bodies if wanted is None else [by_name[name] for name in wanted]
+    if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
+        raise ModelError(model.name, [f'fixed has the body "{name}", which names has not; add it there' for name in undeclared])
+    parts = PartsOfFile()
+    for body in declared:
+        is_fixed = fixed if isinstance(fixed, bool) else body.name in fixed_names or None
+        mesh = Mesh(path, body=body.number, chord=chord)
+        part = model.part(part_name(body), mesh, at=body.at, rotation=body.rotation, fixed=is_fixed)
+        parts[part.name] = part
+    return parts
+
+
+def _first(names: Sequence[str]) -> str:
+    """Return the first names of a list for a message."""
+    return ", ".join(f'"{name}"' for name in names[:MAX_LISTED]) + (", ..." if len(names) > MAX_LISTED else "")
+
+
+def _names(option: str, value: Any) -> list[str]:
+    """Return the names of bodies that an option lists. Raises TypeError for anything but a list of texts."""
+    is_list = isinstance(value, Iterable) and not isinstance(value, str | Mapping)
+    names = list(value) if is_list else []
+    if not is_list or not all(isinstance(name, str) for name in names):
+        example = value if isinstance(value, str) else "plate"
+        raise TypeError(f'{option} is {value!r}; expected a list of the names of bodies, as in {option}=["{example}"]')
+    return names
 
 
 def part_name(body: BodyInFile) -> str:
@@ -155,7 +185,7 @@ def _listed_product(path: str | Path) -> Product:
     try:
         product = _product(path, LISTING_CHORD if Mesh(path).is_step else None)
     except OptionError as error:
-        if not isinstance(error.__cause__, ReadTimeout):
+        if not isinstance(error.__cause__, UnfinishedRead):
             raise
         product = _product(path)  # the chord of a very large file is coarser
     if product.missing_faces:

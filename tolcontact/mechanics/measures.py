@@ -10,6 +10,7 @@ from tolcontact.declaration import Measure, Part, Point
 from tolcontact.declaration.measure import BINARY, MAX_STEPS, UNARY, Tape
 from tolcontact.discretization import Nominal
 from tolcontact.errors import ModelError
+from tolcontact.mechanics.measurements import Observed, value_of
 from tolcontact.mechanics.pose import ENTRIES, Pose
 from tolcontact.mechanics.setting import face_height, face_pose
 
@@ -116,8 +117,11 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
     Raises ModelError if a user's function fails or does not return a scalar.
     """
     faults: list[str] = []
-    expressions = []
-    for measure in nominal.measures:
+    expressions: list[ca.SX] = []
+    for measure, measurement in zip(nominal.measures, nominal.measurements, strict=True):
+        if measurement is not None:
+            expressions.append(value_of(measurement, Observed(poses, deviations, expressions)))
+            continue
         try:
             expressions.append(_expression(measure, nominal, poses, deviations))
         except Exception as error:  # a user's function may raise anything; it becomes a fault of the model
@@ -125,6 +129,7 @@ def measured(nominal: Nominal, poses: Sequence[Pose], deviations: ca.SX) -> list
                 f'measure "{measure.name}" ({measure.declared_at}): its function failed with '
                 f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
             )
+            expressions.append(ca.SX.nan(1))
     if faults:
         raise ModelError(nominal.assembly.name, faults)
     return expressions
@@ -141,7 +146,8 @@ def _expression(measure: Measure, nominal: Nominal, poses: Sequence[Pose], devia
             origin = nominal.position(of) if measure.quantity == "displacement" else np.zeros(3)
             moved = part_poses.position(of) - ca.DM(origin)
         return ca.dot(ca.DM(np.array(measure.along)), moved)
-    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else measure.of(part_poses)
+    function: Any = measure.of
+    value: Any = replay(measure.of, poses, deviations) if isinstance(measure.of, tuple) else function(part_poses)
     expression = ca.SX(value)
     if expression.shape != (1, 1):
         raise ValueError(f"it returned an expression of shape {expression.shape}; expected one number")

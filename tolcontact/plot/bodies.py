@@ -181,5 +181,5 @@ def _add_marks(plotter: Any, marks: Marks, size: float) -> None:
             plotter.add_points(np.array(pair["points"]), color=CONTACT, point_size=5, render_points_as_spheres=True)
     for measure in marks.measures:
         plotter.add_points(np.array(measure["points"]), color=MEASURE, point_size=12, render_points_as_spheres=True)
-        if len(measure["points"]) == 2:
-            plotter.add_mesh(pv.Line(*measure["points"]), color=MEASURE, line_width=2)
+        for line in measure["lines"]:
+            plotter.add_mesh(pv.Line(*line), color=MEASURE, line_width=2)

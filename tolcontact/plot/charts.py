@@ -52,12 +52,18 @@ def histogram(
     edges = np.histogram_bin_edges(both_states, bins)
     for state, x in values.items():
         weights = np.full(len(x), 100 / len(x))
-        axes.hist(x, edges.tolist(), weights=weights, color=COLOURS[state], alpha=0.6, label=state)
+        axes.hist(x, edges.tolist(), weights=weights, color=COLOURS[state], alpha=0.6, label=terms.WORD_OF_STATE[state])
         mean, sigma = float(x.mean()), float(x.std(ddof=1))
         if sigma > 0:
             z = np.linspace(-CURVE_SIGMAS, CURVE_SIGMAS, 161)
             height = 100 * (edges[1] - edges[0]) / (sigma * math.sqrt(2 * math.pi))
-            axes.plot(mean + sigma * z, height * np.exp(-(z**2) / 2), ":", color=COLOURS[state], label=f"normal, {state}")
+            axes.plot(
+                mean + sigma * z,
+                height * np.exp(-(z**2) / 2),
+                ":",
+                color=COLOURS[state],
+                label=f"normal, {terms.WORD_OF_STATE[state]}",
+            )
     for limit in limits(rows)[place][:2]:
         if math.isfinite(limit):
             axes.axvline(limit, color=LIMIT_COLOUR, label="_limit")

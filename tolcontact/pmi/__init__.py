@@ -82,9 +82,9 @@ a process of its own; if it crashes at a file, a sentence says so.
 ## Limits
 
 Editions 1 to 3 of AP242 are read; edition 4, AP242 XML and QIF are refused by name. A file of AP203 or AP214 is read, but
-nothing in it. A fit such as H7 is named, and not turned into limits. Sizes of datum targets, coordinate systems, orientations
-of zones, and occurrences of a part in an assembly are not read. A dimension with a value that has no unit of its own is listed
-without it. A damaged file leads to a single message.
+nothing in it. A feature takes the limits of a fit such as H7 from ISO 286-1. Sizes of datum targets, coordinate systems,
+orientations of zones, and occurrences of a part in an assembly are not read. A dimension with a value that has no unit of its
+own is listed without it. A damaged file leads to a single message.
 """
 
 from tolcontact.pmi.annotations import Datum, DatumReference, DatumTarget, Dimension, Pmi, Tolerance

@@ -1,9 +1,12 @@
 """What features can state of the annotations of a file: tolerances and sizes as they are declared. Lengths in mm."""
 
+import math
 from typing import Any
 
 from tolcontact.declaration import feature_tolerance as declared
-from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance
+from tolcontact.declaration.size import Size
+from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
 
 _KINDS = {
@@ -69,22 +72,38 @@ def _compartment(reference: DatumReference) -> str:
     return "-".join(reference.letters) + "".join(f"({material})" for material in materials[:1])
 
 
-def size(stated: Dimension, nominal: float) -> Size:
+def size(stated: Dimension, nominal: float, *, is_inner: bool) -> Size:
     """Return the size of a shape of `nominal` size [mm], with the limits of a dimension about it.
 
     Raises Undeclared with the reason.
     """
-    if stated.lower is None or stated.upper is None:
-        raise Undeclared(
-            f"its limits are not stated{f': its fit {stated.fit} is not turned into limits' if stated.fit else ''}"
-        )
-    if stated.unit != "mm":
-        raise Undeclared("it is an angle")
-    factor = 2.0 if "radius" in stated.name else 1.0
-    lower, upper = factor * stated.lower, factor * stated.upper
+    lower, upper = _limits(stated, nominal, is_inner)
     if not lower < upper:
         raise Undeclared(f"its limits {lower:g} and {upper:g} leave no width")
     if not lower - MAX_SIZE_DIFFERENCE * (upper - lower) <= nominal <= upper + MAX_SIZE_DIFFERENCE * (upper - lower):
         raise Undeclared(f"its limits are {lower:.6g} to {upper:.6g}, and the size of the shape is {nominal:.6g}")
     middle = round(nominal, _DIGITS)  # the kernel's numbers differ from those of the file in their last digits
     return Size(middle, round(upper - middle, _DIGITS), round(lower - middle, _DIGITS))
+
+
+def _limits(stated: Dimension, nominal: float, is_inner: bool) -> tuple[float, float]:
+    """Return the limits of a size [mm]: those of a dimension, else those of its tolerance class. Raises Undeclared."""
+    factor = 2.0 if "radius" in stated.name else 1.0
+    if stated.lower is not None and stated.upper is not None:
+        if stated.unit != "mm":
+            raise Undeclared("it is an angle")
+        return factor * stated.lower, factor * stated.upper
+    if not stated.fit:
+        raise Undeclared("its limits are not stated")
+    basis = nominal if stated.nominal is None else factor * stated.nominal
+    try:
+        fit = tolerance_class(stated.fit.split()[0])
+        lower, upper = fit.deviations(basis) if fit else (math.nan, math.nan)
+    except UndefinedClass as error:
+        raise Undeclared(str(error)) from error
+    if fit is None:
+        raise Undeclared(f"its fit {stated.fit} is no tolerance class of ISO 286-1")
+    if fit.is_hole != is_inner:
+        kinds = ("a hole", "a shaft") if fit.is_hole else ("a shaft", "a hole")
+        raise Undeclared(f"its fit {stated.fit} is for {kinds[0]}, and the feature is {kinds[1]}")
+    return basis + lower, basis + upper

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
 from tolcontact.declaration import DatumTargets, Mesh, Part
-from tolcontact.declaration.feature_tolerance import Size
+from tolcontact.declaration.size import Size
 from tolcontact.errors import GeometryFault, OptionError, shown
 from tolcontact.features import Features, datum_order
 from tolcontact.geometry.faces import Meshes

@@ -5,7 +5,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tolcontact.declaration import Brep, DatumTargets, Face, Feature, Part, Pattern
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration.size import Size
 from tolcontact.declaration.values import Vector, script_line
 from tolcontact.errors import GeometryFault
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, SlabFeature
@@ -135,7 +136,7 @@ def _state(claim: Claim, draft: Draft) -> None:
                 raise Undeclared(
                     f"sizes of features are those of cylinders, spheres and two opposed planes, and it is a {kind}"
                 )
-            draft.stated.append((claim, declarable.size(dimension, geometry.size)))
+            draft.stated.append((claim, declarable.size(dimension, geometry.size, is_inner=geometry.is_inner)))
         case tolerance:
             draft.stated.append((claim, declarable.tolerance(tolerance, is_axis=isinstance(geometry, AxisFeature))))
 

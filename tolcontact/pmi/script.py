@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from tolcontact.declaration import Brep, Face, Feature, Mesh, Part, Pattern, Point
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import GeometricTolerance
+from tolcontact.declaration.size import Size
 from tolcontact.errors import shown
 from tolcontact.pmi.annotations import Tolerance
 from tolcontact.pmi.declared_file import DeclaredFile

@@ -7,13 +7,13 @@ import numpy as np
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.brep_face import (
     FaceInFile,
-    FaceOnSurface,
     are_one_surface,
     describe_faces,
     faces_at,
     faces_on_surfaces,
 )
 from tolcontact.geometry.files import STATED_FACES, Shape
+from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 
 MAX_OPPOSED_ERROR = 1e-3  # [rad] between two planes that count as parallel
 MAX_ANGLE = 0.01  # [rad] between directions of faces that may be parts of one surface: fitted ones differ by much less

@@ -21,8 +21,8 @@ variation simulation of stand: 1000 realizations
 `write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. The page is a single file
 that needs no network and runs no scripts but its own; commands replace other files than pages only with `--overwrite`. It shows
 the assembly in 3D, with fields, single realizations and sections; histograms with limits, and the convergence of estimates;
-measures against contributors; contact, certificates, and the settings of the run. `write_view` (`tolcontact view`) writes the
-assembly before a run: faces with their selectors, features with their tolerances, locators, contact points, and nominal gaps.
+measurements against contributors; contact, certificates, and the settings of the run. `write_view` (`tolcontact view`) writes
+the assembly before a run: faces with their selectors, features with their tolerances, locators, contact points, nominal gaps.
 A feature or a pattern that you choose in the list is highlighted on all of its faces, and a face that you click on names its
 features. The model may still lack measures and locations of parts. In a notebook, a declared assembly or a program shows this
 page, a summary shows its tables, and `results.tolcontact` shows the report.
@@ -31,9 +31,14 @@ page, a summary shows its tables, and `results.tolcontact` shows the report.
 How to read the text:
 
 - Each figure is `estimate [lower, upper]`, with the decimals that its 95 % interval supports.
-- The columns are the raw state, the corrected state, and the change between them. Changes compare the same draws, so their
+- The first table gives mean, 6 sigma, Ppk and the share out of specification of each measurement: without contact, where parts
+  stand as their locators put them even if they penetrate each other; and with contact, where none penetrates another. The
+  archive calls these states `raw` and `corrected`. A line for each measurement with limits states its verdict: it meets them
+  if the 95 % interval of the share out of specification, with contact, lies at or below 0.27 %; it does not if the interval
+  lies above; otherwise the verdict is open, and the number of realizations that would probably decide is stated.
+- The next tables give all statistics in both states, and the change between them. Changes compare the same draws, so their
   intervals are narrower than a comparison of the two columns suggests.
-- The second table gives, for each part, the smallest and largest 6 sigma of the displacement over its surface.
+- Another table gives, for each part, the smallest and largest 6 sigma of the displacement over its surface.
 - The last lines describe contact: the share of realizations that it touched, their statuses, the pairs in conflict, the largest
   penetration at contact points and between surfaces, and advice if another method fits better.
 
@@ -43,9 +48,10 @@ says so.
 
 from tolcontact.report.figures import grouped
 from tolcontact.report.html import is_page, nominal_and_faults, write_comparison, write_page, write_view
+from tolcontact.report.spreadsheet import write_spreadsheet
 from tolcontact.report.text import analysis_text, capability_text, comparison_text, population_text, runs_text, summary_text
 
 __all__ = [
     "analysis_text", "capability_text", "comparison_text", "grouped", "is_page", "nominal_and_faults", "population_text",
-    "runs_text", "summary_text", "write_comparison", "write_page", "write_view",
+    "runs_text", "summary_text", "write_comparison", "write_page", "write_spreadsheet", "write_view",
 ]  # fmt: skip

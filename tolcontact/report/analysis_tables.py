@@ -104,6 +104,8 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         ]
         linear = float(shares["linear"])
         rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
+    if not np.isfinite(dataset["linear"].values).any():
+        missed = ["It has no linear shares: in the nominal assembly it is at a kink, or nothing changes it to first order."]
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
     columns = ["", "raw", "corrected, alone", "in total", "linear"]
@@ -153,7 +155,8 @@ def _slopes(dataset: xr.Dataset) -> AnalysisTable:
         slopes = dataset.isel(contributor=int(k))
         by_contact = [number(slopes["by_contact"].sel(contact=contact).values) for contact in terms.CONTACT_STATES]
         corrected = number(slopes["sensitivity"].isel(state=terms.CORRECTED).values)
-        spread, nominal = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", f"{float(slopes['nominal']):.3g}"
+        spread, slope = f"{float(slopes['spread'][terms.CORRECTED]):.2g}", float(slopes["nominal"])
+        nominal = f"{slope:.3g}" if math.isfinite(slope) else "kink"
         kinks = percent(slopes["changing"].values)
         rows.append([str(slopes["contributor"].values), nominal, *by_contact, corrected, spread, kinks])
     small = dataset.sizes["contributor"] - len(rows)

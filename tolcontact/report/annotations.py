@@ -23,7 +23,7 @@ class Marks:
 
     locators   at (3,), along (3,)
     contacts   part (its number), points (point, 3), gaps (point,), None where only an archive is known
-    measures   points (point, 3), along (3,), or None
+    measures   points (point, 3), along (3,), or None, lines (line, 2, 3) between points, and at (3,), the place of the name
     features   at (3,), the centre of the face
     forces     at (3,), or None at the end of an axis, along (3,)
     """
@@ -42,7 +42,7 @@ def marks_of(results: xr.DataTree) -> Marks:
         forces = [
             {"name": force["name"], "at": _at(document, force["at"]), "along": force["vector"]} for force in document["forces"]
         ]
-        measures = list(_measures(document))
+        measures = list(_measures(document, *_lines(results)))
     except (LookupError, TypeError, ValueError, RuntimeError) as error:  # no run wrote it: its checksum was forged
         raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
     return Marks(_locators(results), list(_contacts(results)), measures, _features(results), forces)
@@ -59,9 +59,9 @@ def marks_of_nominal(nominal: Nominal) -> Marks:
         [{"name": name, "at": at.tolist(), "along": along.tolist()} for name, at, along in locators],
         contacts,
         [
-            {"name": measure.name, "points": [_position(nominal, point) for point in measure.points], "along": measure.along}
-            for measure in nominal.measures
-            if measure.points
+            _measure(measure.name, measure.along, [_position(nominal, point) for point in measure.points], lines)
+            for measure, lines in zip(nominal.measures, nominal.lines, strict=True)
+            if measure.points or len(lines)
         ],
         [{"name": face.name, "at": face.centre.tolist()} for face in nominal.faces],
         [
@@ -106,12 +106,31 @@ def _features(results: xr.DataTree) -> list[Mark]:
     return [{"name": str(name), "at": at.tolist()} for name, at in faces]
 
 
-def _measures(document: Mark) -> Iterator[Mark]:
-    for measure in document["measures"]:
-        ends = [_at(document, measure[word]) for word in ("of", "to") if word in measure]
-        positions = [end for end in ends if end is not None]
-        if positions:
-            yield {"name": measure["name"], "points": positions, "along": measure["along"]}
+def _lines(results: xr.DataTree) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lines (line, 2, 3) that show measurements, and the number of the measure (line,) of each; none if old."""
+    model = results["model"].to_dataset()
+    if terms.LINE_ENDS.name not in model:
+        return np.zeros((0, 2, 3)), np.zeros(0, dtype=int)
+    return model[terms.LINE_ENDS.name].values, model[terms.MEASURE_OF_LINE.name].values
+
+
+def _measures(document: Mark, lines: np.ndarray, measure_of_line: np.ndarray) -> Iterator[Mark]:
+    for number, measure in enumerate(document["measures"]):
+        declared = [measure[word] for word in ("of", "to") if "part" in (measure.get(word) or {})]
+        positions = [end for end in (_at(document, point) for point in declared) if end is not None]
+        own = lines[measure_of_line == number]
+        if positions or len(own):
+            yield _measure(measure["name"], measure["along"], positions, own)
+
+
+def _measure(name: str, along: Any, positions: list[list[float]], lines: np.ndarray) -> Mark:
+    """Return the mark of a measure of points, or of a measurement that lines show."""
+    if not positions:
+        ends = dict.fromkeys(tuple(map(float, end)) for line in lines for end in line)
+        at = [float(x) for x in lines[-1].mean(axis=0)]
+        return {"name": name, "points": [list(end) for end in ends], "along": None, "lines": lines.tolist(), "at": at}
+    pair = [positions] if len(positions) == 2 else []
+    return {"name": name, "points": positions, "along": along, "lines": pair, "at": positions[0]}
 
 
 def _at(document: Mark, point: Mark) -> list[float] | None:

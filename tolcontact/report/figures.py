@@ -4,15 +4,35 @@ import math
 
 import xarray as xr
 
+from tolcontact.limits import GAP_ACCURACY
+
 MAX_DECIMALS = 6
 MAX_DECIMALS_PERCENT = 2
 NO_INTERVAL = "[-]"
 PERCENT_FROM = 10_000  # ppm; smaller shares are in ppm
+NOISE = 1e-5  # of the scale of a declared value: a shorter text that is off by less is its rounding
 
 
 def grouped(count: int) -> str:
     """Return a count with separated thousands: 57 344."""
     return f"{count:,}".replace(",", " ")
+
+
+def plain(value: float, scale: float | None = None) -> str:
+    """Return a declared value in the fewest decimals that differ from it by less than `NOISE` of its scale; "" without a value.
+
+    The scale is the width of the limits, or by default the size of the value.
+    """
+    if not math.isfinite(value):
+        return ""
+    allowed = NOISE * (scale or abs(value))
+    decimals = next((d for d in range(MAX_DECIMALS + 1) if abs(round(value, d) - value) <= allowed), None)
+    return f"{value:.6g}" if decimals is None else f"{_rounded(value, decimals):.{decimals}f}"
+
+
+def settled(penetration: float) -> float:
+    """Return a penetration [mm], or 0 where it is rounding."""
+    return penetration if penetration > GAP_ACCURACY else 0.0
 
 
 def limits_text(measure: xr.Dataset) -> str:
@@ -21,8 +41,9 @@ def limits_text(measure: xr.Dataset) -> str:
     stops = str(measure["measure_stops"].values) if "measure_stops" in measure.coords else ""
     note = f" ({stops} limit: a stop)" if stops else ""
     if math.isfinite(lower) and math.isfinite(upper):
-        return f"limits {lower:g} to {upper:g}{note}"
-    return f"at least {lower:g}{note}" if math.isfinite(lower) else f"at most {upper:g}{note}" if math.isfinite(upper) else ""
+        return f"limits {plain(lower, upper - lower)} to {plain(upper, upper - lower)}{note}"
+    sides = (("at least", lower), ("at most", upper))
+    return next((f"{words} {plain(limit)}{note}" for words, limit in sides if math.isfinite(limit)), "")
 
 
 def number(values: object, *, sign: bool = False, max_decimals: int = MAX_DECIMALS) -> str:

@@ -123,6 +123,7 @@ def _coordinates(rows: xr.Dataset, combinations: list[tuple[tuple[str, ...], int
         terms.OF_ITERATIONS: list(terms.MIDDLES),
         terms.EXTREME: list(terms.EXTREMES),
         terms.MEASURE_UNITS.name: (terms.MEASURE, rows[terms.MEASURE_UNITS.name].values),
+        terms.MEASURE_NOMINAL.name: (terms.MEASURE, rows[terms.MEASURE_NOMINAL.name].values),
         **{
             name: (terms.MEASURE, np.array(values))
             for name, values in zip(terms.MEASURE_LIMITS, zip(*limits(rows), strict=True), strict=True)

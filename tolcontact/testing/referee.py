@@ -156,13 +156,15 @@ class ArchivedFaces:
     def pushes(self, locators: np.ndarray, deviations: np.ndarray) -> np.ndarray:
         """Return how far locators move their parts (realization, locator) [mm]."""
         pushes = deviations[:, locators].copy()
-        for place, locator in enumerate(locators):
-            face = int(self._sample[terms.FACE_OF_LOCATOR.name][locator]) if terms.FACE_OF_LOCATOR.name in self._sample else -1
-            if face >= 0:
-                tau, rho = self.displacement(face, deviations)
-                arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
-                inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
-                pushes[:, place] += self.height(face, deviations) - (tau + np.cross(rho, arm)) @ inward
+        none = np.full(max(locators, default=0) + 1, -1)
+        for variable, sign in ((terms.FACE_OF_LOCATOR, -1.0), (terms.GROUND_OF_LOCATOR, 1.0)):
+            for place, locator in enumerate(locators):
+                face = int(self._sample.get(variable.name, none)[locator])
+                if face >= 0:
+                    tau, rho = self.displacement(face, deviations)
+                    arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
+                    inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
+                    pushes[:, place] += self.height(face, deviations) + sign * (tau + np.cross(rho, arm)) @ inward
         return pushes
 
 

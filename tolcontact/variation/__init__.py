@@ -17,7 +17,7 @@ distribution of `scipy.stats` may be given instead of a name. It defines its own
 >>> import tolcontact as tc
 >>> from scipy import stats
 >>> print(tc.Tolerance(0.6))
-normal, range 0.6 mm
+normal, full width 0.6 mm
 >>> skewed = tc.Tolerance(distribution=stats.gamma(4, scale=0.02))
 >>> skewed.width  # six standard deviations [mm]
 0.24

@@ -77,7 +77,7 @@ class Contributor(NamedTuple):
     def description(self) -> str:
         """The name of its distribution; of a freedom of a feature the tolerance, and the rule from its zone to the spread."""
         if self.layer is not None:
-            return f"{self.layer.tolerance}; {self.layer.tolerance.rule}"
+            return f"{self.layer.tolerance.archived_text}; {self.layer.tolerance.rule}"
         if self.source == DATUM:
             return "follows from the tilts of the datum feature"
         if self.tolerance is None:

@@ -7,3 +7,4 @@ from tolcontact.vocabulary.labels import ArchiveVariable as ArchiveVariable
 from tolcontact.vocabulary.summary import *  # noqa: F403
 from tolcontact.vocabulary.surface import *  # noqa: F403
 from tolcontact.vocabulary.variation import *  # noqa: F403
+from tolcontact.vocabulary.words import *  # noqa: F403

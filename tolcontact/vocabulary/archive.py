@@ -212,10 +212,23 @@ QUANTITY = ArchiveVariable(
     "measure_quantity",
     (MEASURE,),
     str,
-    "what a measure is the value of: displacement, coordinate, distance, deviation of distance, or expression of the poses",
+    "what a measure is the value of: displacement, coordinate, distance, deviation of distance, a kind of measurement such as "
+    "gap, clearance or angle, or expression of the poses",
 )
 LIMITS = (LOWER_LIMIT, UPPER_LIMIT, QUANTITY)  # not in archives before format 4
 MEASURE_UNITS = ArchiveVariable("measure_units", (MEASURE,), str, "units of the measure")
+
+MEASURE_LINE, LINE_END = "measure_line", "line_end"
+MEASURE_OF_LINE = ArchiveVariable(
+    "measure_of_line", (MEASURE_LINE,), "i4", "number of the measure that a line shows, counted from 0"
+)
+LINE_ENDS = ArchiveVariable(
+    "measure_line_ends",
+    (MEASURE_LINE, LINE_END, AXIS),
+    "f8",
+    "ends of the lines that show what is measured, nominal; gaps, axes and directions",
+    "mm",
+)
 
 DECLARATION = ArchiveVariable("declaration", (), str, "the declared model as JSON, enough to rebuild it")
 MESH_VERTICES = ArchiveVariable("vertices", (VERTEX, AXIS), "f8", "vertices of a mesh in its part's own frame", "mm")

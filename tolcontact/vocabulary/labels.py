@@ -26,6 +26,7 @@ MONTE_CARLO, LATIN_HYPERCUBE, SOBOL = PLANS = ("monte-carlo", "latin hypercube",
 REPLICATE = 256  # realizations that the last two draw together, independent of all others
 METHOD_ATTRIBUTES = ("resolution", "objective", "active_set")  # of archives, summaries and analyses
 KEPT = ("measures", "poses", "all")
+TITLE_PREFIX = "document_"  # of the attributes of an archive that hold its title block
 FIELD_CHOICES = ("some", "all", "none")  # besides a number
 
 UNFINISHED = -1

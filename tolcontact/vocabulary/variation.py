@@ -58,6 +58,13 @@ FACE_OF_LOCATOR = ArchiveVariable(
     "face_of_locator", (LOCATOR,), "i4", "number of the feature's face that a locator stands against, counted from 0; -1: none"
 )
 
+GROUND_OF_LOCATOR = ArchiveVariable(
+    "ground_of_locator",
+    (LOCATOR,),
+    "i4",
+    "number of the feature, of another part, that a locator is on and moves with, counted from 0 as faces are; -1: none",
+)
+
 FREEDOM_LABEL = label(FREEDOM, "component of a small displacement p -> p + tau + rho x (p - centre)")
 FEATURE_OF_FACE = ArchiveVariable("feature_of_face", (FEATURE_FACE,), str, "feature that a face belongs to, as part.feature")
 FACE_CENTRE = ArchiveVariable(

@@ -17,6 +17,7 @@ from tolcontact.compilation import Program, compile_program
 from tolcontact.discretization import discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import USUAL_SEARCH, Method
+from tolcontact.plausibility import warn_of_nominal
 from tolcontact.simulation import Block
 from tolcontact.simulation.cluster import MapBlocks, Workers, mapping, threads_of
 from tolcontact.statistics import compare_runs as compare_results
@@ -66,6 +67,7 @@ def compare(
     nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
     programs = [compile_program(nominal, solver, method) for solver, method in contestants]
+    warn_of_nominal(programs[0])
     kept = 2 + 12 * len(nominal.parts) + len(nominal.measures) + len(nominal.pairs)
     for program in programs:
         check_affordable(program, samples=samples, seed=seed, threads=threads_of(client), kept=kept)

@@ -17,6 +17,7 @@ from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
 from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method
+from tolcontact.plausibility import warn_of_nominal
 from tolcontact.statistics.intervals import proportion_of
 from tolcontact.variation import Draws
 from tolcontact.variation.measured_population import measured_population
@@ -33,10 +34,13 @@ def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None =
 
     The model of an archive has the method of its run. `method` replaces the model's own; a mapping, such as
     {"resolution": "exact"}, replaces single choices.
+    A NominalWarning names what is probably a mistake in the nominal assembly (see tolcontact.plausibility).
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
     assembly, method_of_run = _loaded(model) if isinstance(model, str | Path) else (assembly_of(model), None)
-    return compile_program(discretize(assembly), solver, method_of(assembly, method, method_of_run))
+    program = compile_program(discretize(assembly), solver, method_of(assembly, method, method_of_run))
+    warn_of_nominal(program)
+    return program
 
 
 def check(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> tuple[str, ...]:

@@ -89,7 +89,7 @@ def _uniquely_named(bodies: Sequence[Body]) -> Iterator[Body]:
 def listed(bodies: Sequence[Body]) -> str:
     """Return a list of bodies for a message: numbers, names, sizes and places."""
     entries = "; ".join(f"{number}. {body}" for number, body in enumerate(bodies[:MAX_LISTED], start=1))
-    return entries + (f"; and {len(bodies) - MAX_LISTED} more" if len(bodies) > MAX_LISTED else "")
+    return entries + (f"; and {len(bodies) - MAX_LISTED} more (see tolcontact bodies)" if len(bodies) > MAX_LISTED else "")
 
 
 def _body(shape: StepShape, place: ShapePlace, *, is_alone: bool) -> Body:

@@ -61,7 +61,7 @@ class Product:
             if len(self.bodies) > 1:
                 raise GeometryFault(
                     f'"{self.path}" holds {len(self.bodies)} bodies, but a part is one body; name one, '
-                    'tc.Mesh(..., body="..."), '
+                    'tc.Mesh(..., body="...") or --body "...", '
                     f"or declare all with tc.parts_from: {listed(self.bodies)}"
                 )
             return self.bodies[0]

@@ -25,8 +25,8 @@ POLL_SECONDS = 0.02  # between two looks for a file of the worker
 PROGRAM = Path(__file__).with_name("worker.py")
 
 
-class ReadTimeout(GeometryFault):
-    """A file was not read in time: it is damaged, or its triangles are too fine."""
+class UnfinishedRead(GeometryFault):
+    """Reading a file took too long, or crashed: the file is damaged, or its triangles are too fine for the CAD kernel."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _by_one_process(jobs: Sequence[Job], limits: Limits) -> Iterator[dict[str, n
             _wait_for(process, MAX_START_SECONDS, folder / "ready")
             for k, path in enumerate(job.path for job in jobs):
                 if not _wait_for(process, seconds[k], folder / f"{k}.npz", folder / f"{k}.txt"):
-                    kind = ReadTimeout if process.poll() is None else GeometryFault
+                    kind = UnfinishedRead if (process.poll() or -1) < 0 else GeometryFault
                     yield kind(f'"{path}" {_end(process, folder, seconds[k])}')
                     return
                 yield _result(path, folder, k)
@@ -138,6 +138,7 @@ def _end(process: subprocess.Popen, folder: Path, seconds: float) -> str:
         )
     if code < 0:
         name = f", {signal.Signals(-code).name}" if -code in set(signal.Signals) else ""
-        return f"is damaged: it crashed its reader process (signal {-code}{name}); export it again"
+        end = f"it crashed its reader process (signal {-code}{name})"
+        return f"cannot be read: {end}; it is damaged, or beyond the CAD kernel; export it again"
     message = (folder / "errors").read_text(errors="replace").strip().rpartition("\n")[2]
     return f"was not read: its reader process ended with exit code {code} ({clipped(message) or 'no message'}); export it again"

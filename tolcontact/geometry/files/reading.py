@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from tolcontact.declaration import Box, Mesh
+from tolcontact.declaration import Geometry, Mesh
 from tolcontact.declaration.geometry import UNITS
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.edges import rim
@@ -56,7 +56,7 @@ State = tuple[str, int, int, int, float | None, reader.Limits]
 _cache: dict[State | None, Content] = {}
 
 
-def read_files(geometries: Iterable[Box | Mesh], limits: reader.Limits = reader.DEFAULT_LIMITS) -> Contents:
+def read_files(geometries: Iterable[Geometry], limits: reader.Limits = reader.DEFAULT_LIMITS) -> Contents:
     """Return the content or the fault of each file that the geometries name. Each file is read once."""
     files = [geometry for geometry in geometries if isinstance(geometry, Mesh) and isinstance(geometry.source, str | Path)]
     contents: dict[Key, Content | GeometryFault] = {}
@@ -108,7 +108,7 @@ def _remember(state: State | None, content: Content | GeometryFault) -> None:
 def _load(texts: Mapping[Key, StepText | None], limits: reader.Limits) -> dict[Key, dict[str, np.ndarray] | GeometryFault]:
     """Return the arrays or the fault of each file.
 
-    A STEP file without a required chord gets coarser triangles if there would be too many.
+    A STEP file without a required chord gets coarser triangles if there would be too many, or if they cannot be made.
     """
     results: dict[Key, dict[str, np.ndarray] | GeometryFault] = {}
     keys = list(texts)
@@ -118,7 +118,9 @@ def _load(texts: Mapping[Key, StepText | None], limits: reader.Limits) -> dict[K
         if coarsening > 1:
             for key, job in zip(keys, jobs, strict=True):
                 if not _is_too_fine(results[key]):
-                    log.warning('"%s": triangles within %.2g mm, since finer ones are too many', job.path, job.chord)
+                    log.warning(
+                        '"%s": triangles within %.2g mm, since finer ones are too many or cannot be made', job.path, job.chord
+                    )
         keys = [
             (path, chord) for path, chord in keys if chord is None and texts[path, chord] and _is_too_fine(results[path, chord])
         ]
@@ -135,7 +137,7 @@ def _job(key: Key, text: StepText | None, coarsening: float) -> reader.Job:
 
 
 def _is_too_fine(result: dict[str, np.ndarray] | GeometryFault) -> bool:
-    return isinstance(result, reader.ReadTimeout) if isinstance(result, GeometryFault) else "count" in result
+    return isinstance(result, reader.UnfinishedRead) if isinstance(result, GeometryFault) else "count" in result
 
 
 def _content(path: Path, arrays: Mapping[str, np.ndarray], text: StepText | None) -> Content | GeometryFault:

@@ -10,7 +10,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.report.analysis_tables import analysis_report, archived_analysis
 
 MAX_BARS = 15  # of a chart
-CASES_NOTE = "The corrected ones are the first of the single realizations above."
+CASES_NOTE = "Those with contact are the first of the single realizations above."
 
 
 def contributions_of(results: xr.DataTree) -> list[dict[str, Any]]:

@@ -23,9 +23,31 @@ function chart(title, into = byId("charts")) {
 }
 
 const SETTINGS = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["lasso2d", "select2d"] };
-const STATES = ["raw", "corrected"];
+const STATES = data.states;
 const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 
-const limits = (measure) => measure.limits.filter((limit) => limit !== null).map((limit) => ({
-  type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: "#d01c1c", width: 2 },
-}));
+/** Lines at the limits of a measurement, each with its value above it; a limit far outside widens the axis. */
+function showLimits(shown, measure) {
+  const names = ["lower limit", "upper limit"];
+  const known = measure.limits.map((limit, k) => ({ limit, name: names[k] })).filter((each) => each.limit !== null);
+  shown.shapes = known.map(({ limit }) => ({
+    type: "line", x0: limit, x1: limit, y0: 0, y1: 1, yref: "paper", line: { color: "#d01c1c", width: 2 },
+  }));
+  shown.annotations = known.map(({ limit, name }) => ({
+    x: limit, y: 1, yref: "paper", yanchor: "bottom", xanchor: name === names[0] ? "right" : "left", showarrow: false,
+    text: `${name} ${figure(limit)}`, font: { color: "#e5484d", size: 11 },
+  }));
+}
+
+/** Charts are drawn in the colours and the widths of the window, but printed in black, as wide as paper; settings are unfolded. */
+const PAPER = [[".pictures .histogram", 520, 220], [".pictures .contributors", 520, 165], ["", 690, 300]]; // parent, px, px
+function relayout(isPrinted) {
+  const ink = isPrinted ? "#1a1c1f" : getComputedStyle(document.body).color;
+  document.querySelectorAll(".js-plotly-plot").forEach((box) => {
+    const [, width, height] = PAPER.find(([parent]) => !parent || box.closest(parent));
+    Plotly.relayout(box, { "font.color": ink, autosize: !isPrinted, width: isPrinted ? width : null, height: isPrinted ? height : null });
+  });
+  document.querySelectorAll("details.printed").forEach((fold) => { fold.open = isPrinted; });
+}
+window.addEventListener("beforeprint", () => relayout(true));
+window.addEventListener("afterprint", () => relayout(false));

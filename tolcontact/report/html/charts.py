@@ -8,10 +8,12 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.realizations import pieces
+from tolcontact.report.contributor_shares import ContributorShares
 from tolcontact.report.html.scene import packed
 from tolcontact.statistics import intervals
 
 BINS = 60
+MAX_BARS = 10  # contributors beside a histogram
 MAX_POINTS = 2000  # realizations in scatter charts
 CONVERGENCE_STEPS = 40
 FIGURES = {"mean": "mean", "sixSigma": "6 sigma"}
@@ -39,6 +41,14 @@ def charts_of(results: xr.DataTree, summary: xr.Dataset) -> list[dict[str, Any]]
             }
         )
     return charts
+
+
+def bars_of(shares: ContributorShares) -> list[dict[str, Any]]:
+    """Return the largest linear shares [%] of a measurement, with their intervals."""
+    return [
+        {"name": name, "share": [100 * float(value) for value in values]}
+        for name, values in zip(shares.groups[:MAX_BARS], shares.shares, strict=False)
+    ]
 
 
 def compared_charts(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> list[dict[str, Any]]:

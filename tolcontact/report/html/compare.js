@@ -13,7 +13,7 @@ function distribution(measure, state, box) {
     hovertemplate: `%{x:.4g} ${units}: %{y:.2f} %<extra>${escaped(run.name)}</extra>`,
   }));
   const shown = layout(`${name}, ${STATES[state]}`, `${name} [${units}]`, "% of realizations");
-  shown.shapes = limits(measure);
+  showLimits(shown, measure);
   Plotly.newPlot(chart(`Distributions of ${measure.name}, ${STATES[state]}`, box), traces, shown, SETTINGS);
 }
 

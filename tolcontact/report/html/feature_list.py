@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 
 from tolcontact.declaration import Assembly, Face, Feature, Part, Pattern
-from tolcontact.declaration.feature_tolerance import GeometricTolerance, Size
+from tolcontact.declaration.feature_tolerance import GeometricTolerance
 from tolcontact.declaration.selection import Inside
+from tolcontact.declaration.size import Size
 from tolcontact.errors import GeometryFault
 from tolcontact.geometry.faces import Meshes, triangles
 

@@ -11,17 +11,29 @@ import jinja2
 import markupsafe
 import xarray as xr
 
-from tolcontact.declaration import Assembly
+from tolcontact.declaration import Assembly, TitleBlock
+from tolcontact.declaration.title_block import title_block_of
 from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.replacing import replacing
+from tolcontact.report.contributor_shares import ContributorShares, contributor_shares
 from tolcontact.report.figures import grouped, limits_text
 from tolcontact.report.html.analyses import contributions_of, tables_of
-from tolcontact.report.html.charts import charts_of, compared_charts, relations_of
+from tolcontact.report.html.charts import bars_of, charts_of, compared_charts, relations_of
 from tolcontact.report.html.scene import gap_rows, scene_of, view_of
+from tolcontact.report.model_tables import model_tables
+from tolcontact.report.results_table import COLUMNS, SIDES, result_rows, share_heading
 from tolcontact.report.text.runs import CHANGES, VALUES, change_rows, runs_lines, value_rows
-from tolcontact.report.text.summary import contact_lines, measure_rows, notes, overview_cells, pair_columns, pair_rows
-from tolcontact.vocabulary import STATES
+from tolcontact.report.text.summary import contact_lines, measure_rows, notes, pair_columns, pair_rows
+from tolcontact.statistics.verdict import VERDICT_RULE
+from tolcontact.vocabulary import (
+    CONTRIBUTORS,
+    ESTIMATES_NOTE,
+    GLOSSARY,
+    SIMULATION_SETTINGS,
+    STATE_WORDS,
+    reaction_words,
+)  # fmt: skip
 
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
@@ -32,11 +44,17 @@ SCRIPTS = {
 }
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",
        "samples", "kept", "fields", "versions", "history", "format")  # fmt: skip
+TITLE_ENTRIES = {"part_number": "part number", "revision": "revision", "author": "author", "date": "date"}
+MAX_ROWS = 15  # of the table of an analysis, above a fold
+WORDS = {
+    "states": STATE_WORDS, "rule": VERDICT_RULE, "glossary": GLOSSARY, "estimates_note": ESTIMATES_NOTE,
+    "contributors_heading": CONTRIBUTORS, "settings_heading": SIMULATION_SETTINGS,
+}  # fmt: skip
 
 
-def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path) -> None:
-    """Write the report of a run with this summary. Raises ArchiveError if the file cannot be written."""
-    _write(page_of(results, summary), path)
+def write_page(results: xr.DataTree, summary: xr.Dataset, path: Path, title_block: TitleBlock | None = None) -> None:
+    """Write the report of a run (see page_of). Raises ArchiveError if the file cannot be written."""
+    _write(page_of(results, summary, title_block), path)
 
 
 def write_view(assembly: Assembly, nominal: Nominal | None, faults: Sequence[str], path: Path) -> None:
@@ -57,27 +75,35 @@ def is_page(path: Path) -> bool:
         return GENERATOR.encode() in file.read(1000)
 
 
-def page_of(results: xr.DataTree, summary: xr.Dataset) -> str:
-    """Return the report of a run with this summary."""
-    scene = scene_of(results, summary)
+def page_of(results: xr.DataTree, summary: xr.Dataset, title_block: TitleBlock | None = None) -> str:
+    """Return the report of a run with this summary; without a `title_block`, it has that of the archive."""
+    scene, titles = scene_of(results, summary), title_block or title_block_of(results.attrs)
+    shares = contributor_shares(results, summary.attrs["realizations"])
     values = {
         "title": summary.attrs["title"],
+        "titles": titles,
+        "block": {word: entry for name, word in TITLE_ENTRIES.items() if (entry := titles.entries[name])},
         "realizations": grouped(summary.attrs["realizations"]),
         "begun": grouped(summary.attrs["samples"]) if summary.attrs["samples"] > summary.attrs["realizations"] else "",
-        "overview": _overview(summary),
-        "details": _details(summary),
+        "results": _results(summary),
+        "details": _details(summary, shares),
+        "model": model_tables(results),
         "contact": list(contact_lines(summary, summary.attrs["realizations"])),
-        "pairs": {"columns": pair_columns(summary), "rows": pair_rows(summary)} if summary.sizes["pair"] else None,
+        "pairs": _pairs(summary) if summary.sizes["pair"] else None,
         "tables": list(tables_of(results)),
-        "contributions": (shares := contributions_of(results)),
+        "contributions": (indices := contributions_of(results)),
+        "max_rows": MAX_ROWS,
         "run": {name: str(results.attrs[name]) for name in RUN if name in results.attrs},
         "missing": _missing(scene),
     }
     data = {
         "scene": scene,
-        "charts": charts_of(results, summary),
+        "charts": [
+            {**chart, "contributors": bars_of(of_measure)}
+            for chart, of_measure in zip(charts_of(results, summary), shares, strict=True)
+        ],
         "relations": relations_of(results, summary),
-        "contributions": shares,
+        "contributions": indices,
     }
     return _page("report", values, data)
 
@@ -128,13 +154,15 @@ def comparison_page(runs: Mapping[str, xr.DataTree], comparison: xr.Dataset) -> 
 
 def summary_table(summary: xr.Dataset) -> str:
     """Return the overview of a summary as a table outside of a page."""
-    return _template("overview").render(overview=_overview(summary))
+    return _template("overview").render(results=_results(summary))
 
 
 def _page(kind: str, values: dict[str, Any], data: dict[str, Any]) -> str:
     """Return a page of a kind, which selects its template and scripts."""
     scripts = [_as_is(file) for file in SCRIPTS[kind]]
+    data |= {"states": STATE_WORDS}
     return _template(kind).render(
+        **WORDS,
         data=jinja2.utils.htmlsafe_json_dumps(data, dumps=_plain_json),
         style=_as_is("page.css"),
         generator=markupsafe.Markup(GENERATOR),
@@ -170,23 +198,31 @@ def _plain_json(data: Any, **_: Any) -> str:
     return json.dumps(data, allow_nan=False, separators=(",", ":"))
 
 
-def _overview(summary: xr.Dataset) -> list[dict[str, Any]]:
-    rows = []
-    for name in summary["measure"].values:
-        measure = summary.sel(measure=name)
-        units, limits = str(measure["measure_units"].values), limits_text(measure)
-        for state in STATES:
-            cells = overview_cells(measure["statistic_value"].sel(state=state))
-            rows.append({"measure": str(name), "units": units, "limits": limits, "state": state, "cells": cells})
-    return rows
+def _results(summary: xr.Dataset) -> dict[str, Any]:
+    return {"columns": COLUMNS, "shares": share_heading(summary), "sides": SIDES, "rows": result_rows(summary)}
 
 
-def _details(summary: xr.Dataset) -> list[dict[str, Any]]:
-    """Return all estimates of each measure as rows of texts."""
+def _pairs(summary: xr.Dataset) -> dict[str, Any]:
+    explanation = reaction_words(summary["reaction"].attrs["units"]).explanation
+    return {"columns": pair_columns(summary), "rows": pair_rows(summary), "explanation": explanation}
+
+
+def _details(summary: xr.Dataset, shares: Sequence[ContributorShares]) -> list[dict[str, Any]]:
+    """Return what the page says of each measurement: limits, contributors, and all estimates as rows of texts."""
     details = []
-    for measure in summary["measure"].values:
-        rows = measure_rows(summary.sel(measure=measure))
-        details.append({"name": str(measure), "rows": rows, "note": "; ".join(notes(rows))})
+    for name, contributors in zip(summary["measure"].values, shares, strict=True):
+        measure = summary.sel(measure=name)
+        rows = measure_rows(measure)
+        details.append(
+            {
+                "name": str(name),
+                "units": str(measure["measure_units"].values),
+                "limits": limits_text(measure),
+                "rows": rows,
+                "note": "; ".join(notes(rows)),
+                "contributors": contributors,
+            }
+        )
     return details
 
 

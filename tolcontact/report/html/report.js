@@ -2,6 +2,7 @@
 // The report: fields and single realizations in the scene, and charts with plotly.
 
 const OF_CONTACT = ["touching", "reaction"];
+const MOST_PORTRAITS = 40;
 
 function drive(viewer) {
   const one = data.scene.realizations, motions = one.motions && unpacked(one.motions);
@@ -31,9 +32,9 @@ function drive(viewer) {
     const own = Array.from(gaps.values.subarray((k * 2 + seen) * pairs, (k * 2 + seen + 1) * pairs));
     const values = data.charts.map((chart, m) => {
       const at = (s) => figure(measured.values[(k * 2 + s) * data.charts.length + m]);
-      return `${chart.name}: raw ${at(RAW)}, corrected ${at(CORRECTED)} ${chart.units}`;
+      return `${chart.name}: ${STATES[RAW]} ${at(RAW)}, ${STATES[CORRECTED]} ${at(CORRECTED)} ${chart.units}`;
     });
-    const deepest = pairs ? `smallest gap, ${seen ? "corrected" : "raw"}: ${figure(Math.min(...own))} mm` : "no contact pairs";
+    const deepest = pairs ? `smallest gap, ${STATES[seen]}: ${figure(Math.min(...own))} mm` : "no contact pairs";
     byId("said").textContent = [
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
@@ -62,7 +63,9 @@ function drive(viewer) {
 
 // --- charts ----------------------------------------------------------------------------------------------------------
 
-function histogram(measure) {
+const placeOf = (number, name) => document.querySelector(`[data-measure="${number}"] .${name}`);
+
+function histogram(measure, into) {
   if (!measure.edges.length) return;
   const name = escaped(measure.name), width = measure.edges[1] - measure.edges[0];
   const middles = measure.edges.slice(0, -1).map((edge) => edge + width / 2);
@@ -77,12 +80,49 @@ function histogram(measure) {
     const y = x.map((value) => (total * width * Math.exp(-(((value - mean) / sigma) ** 2) / 2)) / (sigma * Math.sqrt(2 * Math.PI)));
     traces.push({ type: "scatter", mode: "lines", name: `normal, ${STATES[s]}`, x, y, line: { color: COLOURS[s], dash: "dot" }, hoverinfo: "skip" });
   });
-  const shown = layout(name, `${name} [${escaped(measure.units)}]`, "realizations");
-  shown.shapes = limits(measure);
-  Plotly.newPlot(chart(`Histogram of ${measure.name}, raw and corrected`), traces, shown, SETTINGS);
+  const shown = layout("", `${name} [${escaped(measure.units)}]`, "realizations");
+  Object.assign(shown, { margin: { ...shown.margin, t: 76 }, legend: { orientation: "h", y: 1.08, yanchor: "bottom", x: 0 } });
+  showLimits(shown, measure);
+  // A state that does not vary is one high bar, which would hide the shape of the other.
+  const highest = (s) => Math.max(...measure.states[s].counts), varying = [RAW, CORRECTED].filter((s) => measure.sixSigma[s] > 0);
+  if (varying.length === 1) shown.yaxis.range = [0, 1.1 * highest(varying[0])];
+  Plotly.newPlot(chart(`Histogram of ${measure.name}, ${STATES.join(" and ")}`, into), traces, shown, SETTINGS);
 }
 
-function settling(measure) {
+/** Linear shares of the contributors of a measurement, the largest above. */
+function contributors(measure, into) {
+  const bars = measure.contributors.toReversed();
+  if (!bars.length) return into.remove();
+  const of = (k) => bars.map((bar) => bar.share[k]);
+  const [share, low, high] = [0, 1, 2].map(of);
+  const traces = [{
+    type: "bar", orientation: "h", y: bars.map((bar) => escaped(bar.name)), x: share.map((x) => Math.max(x, 0)), marker: { color: COLOURS[1] },
+    error_x: {
+      type: "data", symmetric: false, thickness: 1,
+      array: high.map((x, k) => x - share[k]), arrayminus: low.map((x, k) => Math.max(share[k], 0) - Math.max(x, 0)),
+    },
+    hovertemplate: "%{y}: %{x:.1f} %<extra></extra>",
+  }];
+  const shown = layout("Contributors, with contact", "% of variance", "");
+  Object.assign(shown, { showlegend: false, bargap: 0.3 });
+  Object.assign(shown.margin, { l: 12, t: 36 });
+  Object.assign(shown.yaxis, { automargin: true, type: "category" });
+  shown.xaxis.rangemode = "nonnegative";
+  Plotly.newPlot(chart(`Contributors to the variance of ${measure.name}`, into), traces, shown, SETTINGS);
+}
+
+/** The place of a measurement on the assembly. */
+function portrait(viewer, measure, into) {
+  const marks = data.scene.measures.find((mark) => mark.name === measure.name);
+  if (!marks) return;
+  const image = document.createElement("img");
+  image.alt = `The points of ${measure.name} on the assembly`;
+  image.src = viewer.portrait(marks);
+  into.append(image);
+  into.hidden = false;
+}
+
+function settling(measure, into) {
   const name = escaped(measure.name);
   const traces = measure.states.flatMap((own, s) => {
     const { shape, values } = unpacked(own.settling);
@@ -94,7 +134,7 @@ function settling(measure) {
   });
   const shown = layout(`${name}: mean with its 95 % interval`, "realizations", escaped(measure.units));
   shown.xaxis.type = "log";
-  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`), traces, shown, SETTINGS);
+  Plotly.newPlot(chart(`Mean of ${measure.name} after more and more realizations`, into), traces, shown, SETTINGS);
 }
 
 /** Shares of variance by contributor: total Sobol' indices of both states, with intervals, and linear percentages. */
@@ -119,7 +159,7 @@ function contributions(of) {
   Object.assign(shown, { barmode: "group", bargap: 0.25, height: 140 + 34 * groups.length });
   shown.margin.l = 12;
   shown.yaxis.automargin = true;
-  const box = chart(`Contributions to the variance of ${of.measure}, raw and corrected`, byId("shares"));
+  const box = chart(`Contributions to the variance of ${of.measure}, ${STATES.join(" and ")}`, byId("shares"));
   box.style.height = `${shown.height}px`;
   Plotly.newPlot(box, traces, shown, SETTINGS);
 }
@@ -151,17 +191,21 @@ function relations() {
   draw();
 }
 
-for (const measure of data.charts) {
-  histogram(measure);
-  settling(measure);
-}
-data.contributions.forEach(contributions);
-relations();
+// Pictures come first: charts take the room that these leave.
 try {
   window.viewer = new Viewer(data.scene);
+  data.charts.slice(0, MOST_PORTRAITS).forEach((measure, number) => portrait(window.viewer, measure, placeOf(number, "portrait")));
   control(window.viewer);
   drive(window.viewer);
 } catch (error) {
   byId("scene").replaceWith(`The assembly cannot be drawn here: ${error.message}`);
   console.warn(error);
 }
+data.charts.forEach((measure, number) => {
+  histogram(measure, placeOf(number, "histogram"));
+  contributors(measure, placeOf(number, "contributors"));
+  const fold = placeOf(number, "convergence");
+  fold.addEventListener("toggle", () => settling(measure, fold), { once: true });
+});
+data.contributions.forEach(contributions);
+relations();

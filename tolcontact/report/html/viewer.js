@@ -126,16 +126,57 @@ class Viewer {
     const group = new THREE.Group();
     const shape = new THREE.SphereGeometry(0.008 * this.size, 16, 12);
     const material = new THREE.MeshBasicMaterial({ color: "#c2410c", depthTest: false });
+    const stroke = new THREE.LineBasicMaterial({ color: "#c2410c", depthTest: false });
     for (const measure of this.data.measures) {
       for (const at of measure.points) {
         const ball = new THREE.Mesh(shape, material);
         ball.position.set(...at);
         group.add(ball);
       }
-      group.add(this.label(measure.name, measure.points[0]));
+      const ends = measure.lines.flat().map((at) => new THREE.Vector3(...at));
+      group.add(new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ends), stroke));
+      group.add(this.label(measure.name, measure.at));
     }
     this.scene.add(group);
     return group;
+  }
+
+  /** A picture of the assembly with the points of one measurement, and an arrow along its direction. */
+  portrait(measure, width = 480, height = 360) {
+    this.paint("", 3, RAW);
+    const shown = Object.values(this.marks).map((group) => [group, group.visible]);
+    for (const [group] of shown) group.visible = false;
+    const group = new THREE.Group(), colour = "#d01c1c", material = new THREE.MeshBasicMaterial({ color: colour, depthTest: false });
+    const ball = new THREE.SphereGeometry(0.015 * this.size, 16, 12);
+    const points = measure.points.map((at) => new THREE.Vector3(...at));
+    for (const point of points) {
+      const mark = new THREE.Mesh(ball, material);
+      mark.position.copy(point);
+      group.add(mark);
+    }
+    const lines = measure.lines.map((line) => line.map((at) => new THREE.Vector3(...at)));
+    if (measure.along) {
+      const end = points[0].clone().addScaledVector(new THREE.Vector3(...measure.along).normalize(), 0.16 * this.size);
+      lines.push([points[0], end]);
+      const tip = this.arrows([{ name: measure.name, at: end.toArray(), along: measure.along }], colour, 0.05);
+      tip.children.forEach((cone) => { cone.material.depthTest = false; });
+      group.add(tip);
+    }
+    for (const line of lines) {
+      const geometry = new THREE.BufferGeometry().setFromPoints(line);
+      group.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: colour, depthTest: false })));
+    }
+    this.scene.add(group);
+    this.renderer.setPixelRatio(1);
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.draw();
+    const picture = this.canvas.toDataURL();
+    this.scene.remove(group);
+    for (const [marks, visible] of shown) marks.visible = visible;
+    this.resize();
+    return picture;
   }
 
   /** The names of features, where they are; not shown at first: there may be many. */

@@ -12,12 +12,22 @@ from rich.text import Text
 
 from tolcontact import vocabulary as terms
 from tolcontact.report.analysis_tables import analysis_report
-from tolcontact.report.figures import grouped, number, percent, share
+from tolcontact.report.figures import grouped, number, percent, settled
 from tolcontact.report.text.table import FigureTable
-from tolcontact.vocabulary import OTHER_DRAWS, PPK, SAME_DRAWS, SAME_SEED, STATES, UNRESOLVED, AnalysisRecord
+from tolcontact.vocabulary import (
+    OTHER_DRAWS,
+    OUT_OF_SPECIFICATION_COLUMN,
+    PPK,
+    SAME_DRAWS,
+    SAME_SEED,
+    STATES,
+    UNRESOLVED,
+    WORD_OF_STATE,
+    AnalysisRecord,
+)
 
-VALUES = ("", "mean", "6 sigma", PPK, "outside")
-CHANGES = ("", "shift of mean", "6 sigma", "outside, points", "furthest")
+VALUES = ("", "mean", "6 sigma", PPK, OUT_OF_SPECIFICATION_COLUMN)
+CHANGES = ("", "shift of mean", "6 sigma", f"{OUT_OF_SPECIFICATION_COLUMN},\npoints", "largest\ndifference")
 _DRAWS = {
     SAME_DRAWS: "the same draws; changes are from the same realizations",
     SAME_SEED: "the same seed, but other draws; changes are realization by realization",
@@ -51,7 +61,7 @@ def runs_lines(comparison: xr.Dataset) -> Iterator[str]:
         lines = [
             f"{name}: {run['title'].values}",
             f"{grouped(int(run['realizations']))} realizations: {', '.join(counts)}",
-            f"largest penetration: raw {_depth(run, 'raw')} mm, corrected {_depth(run, 'corrected')} mm",
+            "largest penetration: " + ", ".join(f"{_depth(run, state)} mm {WORD_OF_STATE[state]}" for state in STATES),
         ]
         if name != comparison.attrs["reference_run"]:
             lines.append(_DRAWS[str(run["draws"].values)])
@@ -61,13 +71,13 @@ def runs_lines(comparison: xr.Dataset) -> Iterator[str]:
 
 
 def value_rows(measure: xr.Dataset) -> list[list[str]]:
-    """Return rows of a measure by run and state: mean, 6 sigma, Ppk and share outside."""
+    """Return rows of a measure by run and state: mean, 6 sigma, Ppk and share out of specification."""
     rows = []
     for run in measure["run"].values:
         rows.append([str(run), *[""] * (len(VALUES) - 1)])
         for state in STATES:
             mean, spread, ppk, outside = measure["value"].sel(run=run, state=state).values
-            rows.append([f"  {state}", number(mean), number(spread), number(ppk), share(outside)])
+            rows.append([f"  {WORD_OF_STATE[state]}", number(mean), number(spread), number(ppk), percent(outside)])
     return rows
 
 
@@ -81,12 +91,12 @@ def change_rows(measure: xr.Dataset) -> list[list[str]]:
             mean, ratio, outside = changes["change"].values
             furthest = float(changes["furthest"])
             cells = [number(mean, sign=True), percent(ratio - 1, sign=True), percent(outside, sign=True)]
-            rows.append([f"  {state}", *cells, f"{furthest:.2g}" if math.isfinite(furthest) else "-"])
+            rows.append([f"  {WORD_OF_STATE[state]}", *cells, f"{furthest:.2g}" if math.isfinite(furthest) else "-"])
     return rows
 
 
 def _depth(run: xr.Dataset, state: str) -> str:
-    return f"{float(run['penetration'].sel(state=state)):.3g}"
+    return f"{settled(float(run['penetration'].sel(state=state))):.3g}"
 
 
 def comparison_text(comparison: xr.Dataset) -> Group:
@@ -108,7 +118,7 @@ def comparison_text(comparison: xr.Dataset) -> Group:
         )
     heading = f"{comparison.attrs['title']}: {count} realizations, {comparison.attrs['resolution']}"
     reference = comparison.attrs["reference_solver"]
-    note = f"In mm (measures in their own units): residuals, differences from {reference}."
+    note = f"In mm (measurements in their own units): residuals, differences from {reference}."
     return Group(Text(heading, style="bold"), Text(note), Text(), table)
 
 

@@ -9,13 +9,17 @@ from rich.console import Group
 from rich.padding import Padding
 from rich.text import Text
 
-from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, share
+from tolcontact.report.figures import NO_INTERVAL, grouped, limits_text, number, percent, settled, share
+from tolcontact.report.results_table import overview_columns, overview_rows, verdict_lines
 from tolcontact.report.text.table import FigureTable
 from tolcontact.vocabulary import (
     ABOVE,
     BELOW,
     CAPABILITY,
+    ESTIMATES_NOTE,
+    IN_CONTACT,
     NOTICED_SHARE,
+    OUT_OF_SPECIFICATION,
     OUTSIDE,
     PP,
     PP_NORMAL,
@@ -24,15 +28,21 @@ from tolcontact.vocabulary import (
     SHARES,
     SHIFT,
     SPREAD_RATIO,
+    STATE_WORDS,
     STATES,
     VARIANCE_RATIO,
+    WITH_CONTACT,
+    WITHOUT_CONTACT,
+    WORD_OF_STATE,
+    reaction_words,
 )
 
 RAW, CORRECTED = STATES
 CHANGE_OF_STATISTIC = {"mean": SHIFT, "6 sigma": SPREAD_RATIO, "variance": VARIANCE_RATIO}
-SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below", ABOVE: "above", OUTSIDE: "outside"}
+SHORT_LABELS = {"standard deviation": "std. dev.", BELOW: "below the lower limit", ABOVE: "above the upper limit",
+                OUTSIDE: OUT_OF_SPECIFICATION}  # fmt: skip
 PERCENTILE_COUNTERPART = {PP_NORMAL: PP, PPK_NORMAL: PPK}
-APART = "* differs from the index by percentiles: the measure is not normally distributed"
+APART = "* differs from the index by percentiles: the measurement is not normally distributed"
 WITHOUT = f"{NO_INTERVAL} no interval: spreads need 10 realizations; shapes need 1000, and light tails"
 
 
@@ -46,8 +56,9 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
     yield Text(f"{summary.attrs['title']}: {count} realizations", style="bold")
     if summary.attrs["samples"] > count:
         yield Text(f"{grouped(count)} of {grouped(summary.attrs['samples'])} realizations are done; continue with --resume")
-    yield Text("Estimates with their 95 % confidence intervals; changes are from the same draws.\n")
-    yield _overview(summary)
+    yield Text(f"{ESTIMATES_NOTE}.\nChanges are from the same draws.\n")
+    yield FigureTable(overview_columns(), overview_rows(summary))
+    yield from map(Text, verdict_lines(summary))
     for measure in summary["measure"].values:
         yield from _measure_section(summary.sel(measure=measure), str(measure))
     magnitudes = int(summary["magnitude_realizations"])
@@ -65,7 +76,7 @@ def _sections(summary: xr.Dataset) -> Iterator[Text | FigureTable | Padding]:
 
 
 def capability_text(summary: xr.Dataset) -> Group:
-    """Return shares outside of limits and capability of each measure of a summary."""
+    """Return shares out of specification and capability of each measurement of a summary."""
     return Group(
         Text(f"{summary.attrs['title']}: {summary.attrs['realizations']} realizations", style="bold"), *_limits(summary)
     )
@@ -77,23 +88,8 @@ def _limits(summary: xr.Dataset) -> Iterator[Text | FigureTable]:
         yield Text(f"\n{name} ({measure['measure_units'].values}): {limits_text(measure) or 'no limits'}", style="bold")
         if limits_text(measure):
             rows = measure_rows(measure.sel(statistic=[*SHARES, *CAPABILITY]))
-            yield FigureTable(["", RAW, CORRECTED], [row[:-1] for row in rows])
+            yield FigureTable(["", *STATE_WORDS], [row[:-1] for row in rows])
             yield from map(Text, notes(rows))
-
-
-def _overview(summary: xr.Dataset) -> FigureTable:
-    """Return the figures of each measure that decide about it."""
-    rows = []
-    for measure, states in zip(summary["measure"].values, summary["statistic_value"], strict=True):
-        rows.append([str(measure), "", "", "", ""])
-        rows += [[f"  {name}", *overview_cells(of_state)] for name, of_state in zip((RAW, CORRECTED), states, strict=True)]
-    return FigureTable(["", "mean", "6 sigma", PPK, "outside"], rows)
-
-
-def overview_cells(statistics: xr.DataArray) -> list[str]:
-    """Return mean, 6 sigma, Ppk and share outside of a measure in one state."""
-    mean, spread, ppk, outside = statistics.sel(statistic=["mean", "6 sigma", PPK, OUTSIDE]).values
-    return [number(mean), number(spread), number(ppk), share(outside)]
 
 
 def _measure_section(measure: xr.Dataset, name: str) -> Iterator[Text | FigureTable]:
@@ -101,7 +97,7 @@ def _measure_section(measure: xr.Dataset, name: str) -> Iterator[Text | FigureTa
     subtitle = ", ".join(text for text in (quantity, limits_text(measure)) if text)
     yield Text(f"\n{name} ({units}){': ' if subtitle else ''}{subtitle}", style="bold")
     rows = measure_rows(measure)
-    yield FigureTable(["", RAW, CORRECTED, "change"], rows)
+    yield FigureTable(["", *STATE_WORDS, "change"], rows)
     yield from map(Text, notes(rows))
 
 
@@ -113,7 +109,7 @@ def notes(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def measure_rows(measure: xr.Dataset) -> list[list[str]]:
-    """Return rows of label, raw, corrected and change of a measure; an index apart from that by percentiles is marked by *."""
+    """Return rows of label, both states and change of a measurement; * marks an index apart from that by percentiles."""
     rows = []
     estimates = dict(
         zip(measure["statistic"].values, measure["statistic_value"].transpose("statistic", ...).values, strict=True)
@@ -150,18 +146,17 @@ def _field_table(summary: xr.Dataset) -> FigureTable:
         for state in (RAW, CORRECTED):
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
-            rows.append([str(part), state, *extremes])
-    return FigureTable(["part", "state", "least", "largest"], rows)
+            rows.append([str(part), WORD_OF_STATE[state], *extremes])
+    return FigureTable(["part", "", "smallest", "largest"], rows)
 
 
 def pair_columns(summary: xr.Dataset) -> list[str]:
     """Return the heading of `pair_rows`."""
-    units = summary["reaction"].attrs["units"]
-    return ["contact pair", "carries", f"mean reaction, {units}", "95th percentile"]
+    return ["contact pair", IN_CONTACT, reaction_words(summary["reaction"].attrs["units"]).heading, "95th\npercentile"]
 
 
 def pair_rows(summary: xr.Dataset) -> list[list[str]]:
-    """Return rows of each pair: the share of realizations in which it carries, and its reaction."""
+    """Return rows of each pair: the share of realizations in which it is in contact, and its reaction."""
     rows = []
     for pair in summary["pair"].values:
         mean, *_, high = summary["reaction"].sel(pair=pair).values
@@ -182,14 +177,14 @@ def contact_lines(summary: xr.Dataset, count: int) -> Iterator[str]:
     if unconverged := by_status["not_converged"]:
         yield f"not converged: {unconverged} of {count}; the statistics include their last poses"
     if doubtful := by_status["doubtful"]:
-        yield f"doubtful: {doubtful} of {count} answers lie too far from the raw pose to be certified"
-    raw, corrected = (float(summary["penetration"].sel(state=state)) for state in (RAW, CORRECTED))
+        yield f"doubtful: {doubtful} of {count} answers lie too far from the pose without contact to be certified"
+    raw, corrected = (settled(float(summary["penetration"].sel(state=state))) for state in (RAW, CORRECTED))
     median, largest = summary["iterations"].values
     steps = f", {median:g} steps (median), {largest:g} at most" if summary.attrs["resolution"] == "exact" else ""
     yield f"resolution: {summary.attrs['resolution']}{steps}; objective: {summary.attrs['objective']}"
     if shifted := summary.attrs["datum_shifts"]:
         yield f"datum shift of {shifted}: not drawn; contact of the datum features determines it"
-    yield f"largest penetration at contact points: raw {raw:.3g} mm, corrected {corrected:.3g} mm"
+    yield f"largest penetration at contact points: {raw:.3g} mm {WITHOUT_CONTACT}, {corrected:.3g} mm {WITH_CONTACT}"
     yield from _between(summary, count)
     yield from _advice(summary, corrected)
 
@@ -199,10 +194,10 @@ def _between(summary: xr.Dataset, count: int) -> Iterator[str]:
     checked, depth, overhang = (float(summary[name]) for name in ("surfaces_checked", "surface_penetration", "beside"))
     limit = NOTICED_SHARE * summary.attrs["smallest_range"]
     if math.isfinite(depth):
-        yield f"largest penetration between surfaces: {depth:.3g} mm ({checked:.0f} of {count} checked)"
+        yield f"largest penetration between surfaces: {settled(depth):.3g} mm ({checked:.0f} of {count} checked)"
         if depth > limit:
             share = percent(summary["penetrating_share"].values)
-            yield f"penetration between surfaces above {NOTICED_SHARE:.0%} of the smallest range: {share} of the realizations"
+            yield f"penetration between surfaces above {NOTICED_SHARE:.0%} of the smallest tolerance: {share} of realizations"
         if depth > limit and depth > 2 * float(summary["penetration"].sel(state=CORRECTED)):
             yield f"advice: {_way_out(summary)}"
         if overhang > limit:
@@ -230,7 +225,7 @@ def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:
     if penetration > limit and summary.attrs["active_set"] == "initial":
         yield 'advice: points outside the initial set penetrate; use Method(active_set="closed")'
     elif summary.attrs["resolution"] == "linearized" and penetration > limit:
-        yield f"advice: penetration exceeds {NOTICED_SHARE:.0%} of the smallest range; use --resolution exact"
+        yield f"advice: penetration exceeds {NOTICED_SHARE:.0%} of the smallest tolerance; use --resolution exact"
     elif summary.attrs["resolution"] == "linearized" and _by_status(summary)["not_converged"]:
         yield "advice: some realizations did not converge; use --resolution exact"
 

@@ -12,7 +12,7 @@ from rich.text import Text
 
 NAME_WIDTH = 12  # longer names and labels may be wrapped
 WIDTH = 80  # of files and pipes
-BETWEEN = "   "  # columns
+BETWEEN = "  "  # columns
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class FigureTable:
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
         width = options.max_width if console.is_terminal else WIDTH
-        rows = [[[cell] for cell in row] for row in self.rows]
+        rows = [[cell.split("\n") for cell in row] for row in self.rows]
         if self._full_width(rows) > width:
             rows = [[cell.replace(" [", "\n[").split("\n") for cell in row] for row in self.rows]
         if self._full_width(rows) <= width:
@@ -33,14 +33,16 @@ class FigureTable:
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
         for k, (column, least) in enumerate(zip(self.columns, self._widths(rows), strict=True)):
             min_width = min(least, NAME_WIDTH) if k == 0 else None
-            table.add_column(column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width)
+            table.add_column(
+                column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width, vertical="bottom"
+            )
         for row in rows:
             table.add_row(*map("\n".join, row))
         yield table
 
     def _widths(self, rows: Sequence[Sequence[Sequence[str]]]) -> list[int]:
         """Return the width of each column, for cells of several lines."""
-        cells: list[Sequence[Sequence[str]]] = [[[column] for column in self.columns], *rows]
+        cells: list[Sequence[Sequence[str]]] = [[column.split("\n") for column in self.columns], *rows]
         return [max(cell_len(line) for row in cells for line in row[k]) for k in range(len(self.columns))]
 
     def _full_width(self, rows: Sequence[Sequence[Sequence[str]]]) -> int:
@@ -49,7 +51,10 @@ class FigureTable:
     def _lines(self, rows: Sequence[Sequence[Sequence[str]]]) -> Iterator[Text]:
         """Yield what a rich table would show, which takes a hundred times as long for cells that it need not wrap."""
         widths = self._widths(rows)
-        yield Text(_line(self.columns, widths), style="table.header", no_wrap=True)
+        headings = [column.split("\n") for column in self.columns]
+        height = max(map(len, headings))
+        for cells in zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True):
+            yield Text(_line(cells, widths), style="table.header", no_wrap=True)
         yield Text("─" * self._full_width(rows), no_wrap=True)
         if rows:
             lines = [_line(cells, widths) for row in rows for cells in zip_longest(*row, fillvalue="")]

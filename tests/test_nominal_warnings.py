@@ -1,0 +1,243 @@
+"""What is probably a mistake in the nominal assembly is a warning that names it; what is meant stays silent."""
+
+import math
+import re
+import warnings
+from pathlib import Path
+
+import igl
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+import tolcontact as tc
+from tests.helpers import nightly
+from tolcontact.declaration.script import load_model
+from tolcontact.geometry.body_overlap import SolidBody, common_ball
+from tolcontact.plausibility import KINDS
+
+MODELS = sorted((Path(__file__).parents[1] / "models").glob("[!c]*.py")) + [
+    Path(__file__).parents[1] / "models" / f"{name}.py" for name in ("cells", "channel", "clutch", "cover")
+]
+FEET = [("A1", (2, 2, 0), "z"), ("A2", (48, 2, 0), "z"), ("A3", (25, 23, 0), "z")]
+SIDES = [("B1", (2, 0, 5), "y"), ("B2", (48, 0, 5), "y"), ("C1", (0, 12, 5), "x")]
+
+
+def model(
+    *, at=(20.0, 12.5, 10.0), turn=(0, 0, 0), tolerance=0.2, changes=None, point=(50, 0, 10), limits=(-0.5, 0.5)
+) -> tc.Assembly:
+    """A block on a table, both turned; `changes` replaces locators by name, and `at` is in the frame of the table."""
+    a = tc.Assembly("stand")
+    table = a.part("table", tc.Box(100, 50, 10), fixed=True, rotation=turn)
+    block = a.part("block", tc.Box(50, 25, 10), at=Rotation.from_rotvec(turn).apply(at), rotation=turn)
+    locators = {name: tc.Locator(name, point, direction) for name, point, direction in FEET + SIDES}
+    a.locate(block, list((locators | (changes or {})).values()), tolerance=tolerance)
+    a.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+    up = Rotation.from_rotvec(turn).apply((0, 0, 1))
+    a.measure("height", block.point(*point), along=up, limits=limits)
+    return a
+
+
+def warned(assembly) -> list[str]:
+    with warnings.catch_warnings(record=True) as records:
+        warnings.simplefilter("always")
+        tc.build(assembly)
+    return [str(record.message) for record in records if record.category is tc.NominalWarning]
+
+
+def kinds(assembly) -> list[str]:
+    return [re.match(r"\[(\w+)\]", text)[1] for text in warned(assembly)]
+
+
+def off(name, point, direction, **options):
+    return {name: tc.Locator(name, point, direction, **options)}
+
+
+MISTAKES = {
+    "overlap of a pair": (
+        {"at": (20, 12.5, 5)},
+        r'\[overlap\] contact pair "interface" \(test_nominal.*py:\d+\): its faces overlap by 5 mm.* "block" and "table"',
+    ),
+    "gap of a pair": ({"at": (20, 12.5, 13)}, r'\[gap\] contact pair "interface" .* 3 mm apart .* never touch'),
+    "point of a measure": (
+        {"point": (500, 0, 10)},
+        r'\[point\] measure "height" .* \(500, 0, 10\) lies 450 mm off part "block"',
+    ),
+    "point of the assembly": (
+        {"at": (70, 25, 10), "changes": off("A2", (118, 27, 10), "z")},
+        r'\[point\] part "block" .* locator "A2".*: \(48, 2, 0\) is this one of the assembly',
+    ),
+    "support out of the part": (
+        {"changes": off("A3", (25, 23, 0), "-z", one_sided=True)},
+        r'\[direction\] part "block" .* "A3" points out of the part',
+    ),
+    "wide zone": ({"tolerance": 30}, r'\[tolerance\] part "block" .* locator "A1": its tolerance of 30 mm .* 50 mm long'),
+    "points too close": (
+        {"changes": off("A2", (2.1, 2, 0), "z")},
+        r"\[tolerance\] .* turn the part by \d+ degrees .* closest ones are 0.1 mm",
+    ),
+    "limits beside the displacement": (
+        {"limits": (19, 21)},
+        r'\[limits\] measure "height" .* 0 is outside .*\(19 to 21 mm\).*absolute=True measures the coordinate',
+    ),
+    "open limit": ({"limits": (None, -5)}, r"\[limits\] .*\(open to -5 mm\); check the limits"),
+    "limits far off": ({"limits": (-90, 90)}, r"\[limits\] .* sigma away from its nominal value 0"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_one_warning_that_names_it(mistake):
+    options, pattern = MISTAKES[mistake]
+    (text,) = warned(model(**options))
+    assert re.search(pattern, text), text
+    assert re.match(r"\[(\w+)\]", text)[1] in KINDS
+
+
+def test_a_sound_model_is_silent():
+    assert not warned(model())
+
+
+@pytest.mark.parametrize("turn", [(0, 0, math.pi / 2), (0.3, -1.2, 0.7)])
+def test_warnings_do_not_depend_on_the_frame(turn):
+    assert not warned(model(turn=turn))
+    assert kinds(model(at=(20, 12.5, 5), turn=turn)) == ["overlap"]
+    assert kinds(model(at=(20, 12.5, 13), turn=turn)) == ["gap"]
+
+
+@pytest.mark.parametrize("depth", [0.05, *nightly(0.0, 0.1)])
+def test_an_overlap_within_the_tolerances_is_silent(depth):
+    # The gap of a corner outside of the triangle of the feet has sigma 0.2 / 6 times about 1.5.
+    assert not warned(model(at=(20, 12.5, 10 - depth)))
+
+
+def test_a_clearance_that_tolerances_may_close_is_silent():
+    assert not warned(model(at=(20, 12.5, 10.3)))
+
+
+def test_other_contact_may_close_a_wide_gap():
+    """The block is pushed down by 4 mm onto a table that is 3 mm below it."""
+    a = model(at=(20, 12.5, 13))
+    lid = a.part("lid", tc.Box(50, 25, 10), at=(20, 12.5, 19), fixed=True)
+    block = a.parts[1]
+    a.contact("lid", moving=block.face("+z"), reference=lid.face("-z"))
+    assert kinds(a) == ["overlap"]  # of the lid: the block, 4 mm inside of it, reaches the table
+
+
+def test_forces_close_gaps():
+    a = model(at=(20, 12.5, 13))
+    a.force("weight", at=a.parts[1].point(25, 12, 5), vector=(0, 0, -1))
+    for objective, expected in (("all points", ["gap"]), ("seating", [])):
+        pressed = a.replaced()
+        pressed.method = tc.Method(objective=objective)
+        assert kinds(pressed) == expected
+
+
+@pytest.mark.parametrize(("rotation", "is_doubtful"), [((0, 0, 90), True), ((0, 0, 5), True), ((0, 0, 1.5 * math.pi), False)])
+def test_rotations_that_are_probably_degrees(rotation, is_doubtful):
+    a = model()
+    a.part("lamp", tc.Box(5, 5, 5), at=(0, 0, 90), rotation=rotation, fixed=True)
+    texts = warned(a)
+    assert bool(texts) == is_doubtful
+    assert all("[angle]" in text and "tc.degrees({:g}, {:g}, {:g})".format(*rotation) in text for text in texts)
+
+
+@pytest.mark.parametrize(("direction", "is_doubtful"), [("x", False), ("y", True)])
+def test_a_direction_of_the_assembly_on_a_turned_part(direction, is_doubtful):
+    a = tc.Assembly("turned")
+    block = a.part("block", tc.Box(50, 25, 10), rotation=(0, 0, math.pi / 2))
+    sides = [("B1", (0, 5, 5), direction), ("B2", (0, 20, 5), "x"), ("C1", (25, 0, 5), "y")]  # its x is the assembly's y
+    a.locate(block, [tc.Locator(*locator) for locator in FEET + sides], tolerance=0.2)
+    a.measure("height", block.point(0, 0, 0), along="z")
+    texts = warned(a)
+    assert len(texts) == is_doubtful
+    for text in texts:
+        assert re.match(r'\[direction\] part "block" .*\(0, 1, 0\) of locator "B1"', text)
+        assert "(1, 0, 0) is this one of the assembly" in text
+
+
+def test_bodies_that_are_no_pair():
+    a = model()
+    a.part("stop", tc.Box(20, 20, 20), at=(98, 20, 0), fixed=True)
+    (text,) = warned(a)
+    assert re.match(r'\[overlap\] part "table" .* overlaps part "stop" by about 2 mm near \(99, .* no contact pair', text)
+    a = model()
+    a.part("stop", tc.Box(20, 20, 20), at=(100, 20, 0), fixed=True)  # it touches
+    assert not warned(a)
+
+
+@pytest.mark.parametrize("seed", [1, *nightly(2, 3, 4)])
+def test_the_common_ball_of_blocks_is_as_thick_as_their_overlap(seed):
+    rng = np.random.default_rng(seed)
+    for thickness in (5.0, 1.0, 0.3):
+        R = Rotation.random(random_state=seed)
+        turned = np.eye(4)
+        turned[:3, :3] = R.as_matrix()
+        blocks = [trimesh.creation.box((50, 30, 10)) for _ in range(2)]
+        blocks[1].apply_translation((*rng.uniform(-10, 10, 2), 10 - thickness))
+        bodies = [SolidBody(block.apply_transform(turned)) for block in blocks]
+        diameter, centre = common_ball(*bodies, 0.2)
+        assert thickness * 0.9 <= diameter <= thickness * (1 + 1e-9)
+        assert R.inv().apply(centre)[2] == pytest.approx(5 - thickness / 2, abs=thickness / 10)
+        assert common_ball(*bodies, 1.01 * thickness) is None
+
+
+def test_the_common_ball_of_spheres_and_of_one_body_in_another():
+    spheres = [trimesh.creation.icosphere(subdivisions=3, radius=10) for _ in range(2)]
+    spheres[1].apply_translation((12, 5, 0))
+    diameter, centre = common_ball(*map(SolidBody, spheres), 0.2)
+    assert diameter == pytest.approx(20 - 13, rel=0.1)
+    assert centre == pytest.approx((6, 2.5, 0), abs=1)
+    small = trimesh.creation.box((2, 2, 2))
+    assert common_ball(SolidBody(spheres[0]), SolidBody(small), 0.05)[0] == pytest.approx(2, rel=0.1)
+    assert common_ball(SolidBody(small), SolidBody(small), 0.05)[0] == pytest.approx(2, rel=0.1)
+
+
+def test_depths_agree_with_planes_and_winding_numbers():
+    points = np.random.default_rng(1).uniform(-12, 12, (2000, 3))
+    for mesh in (trimesh.creation.icosphere(2, 10), trimesh.creation.box((9, 5, 2))):  # convex
+        heights = ((points[:, None] - mesh.triangles_center) * mesh.face_normals).sum(axis=2).max(axis=1)
+        depths = SolidBody(mesh).depth(points)
+        assert (depths > 0).any() and (depths[heights > 0] < 0).all()
+        assert depths[heights < 0] == pytest.approx(-heights[heights < 0], abs=1e-9)
+    ring = trimesh.creation.annulus(5, 11, 10, sections=24)
+    turns = igl.winding_number(np.array(ring.vertices), np.array(ring.faces, dtype=np.int64), points)
+    assert ((SolidBody(ring).depth(points) > 0) == (turns > 0.5)).all()
+
+
+def test_a_pin_in_a_hole_of_its_size_is_no_overlap():
+    """Triangles of the pin lie inside the plate's; the overlap is thinner than the faces are exact."""
+    a = tc.Assembly("fit")
+    a.part("plate", tc.Mesh(trimesh.creation.annulus(5, 20, 10, sections=24)), fixed=True)
+    pin = trimesh.creation.cylinder(5, 20, sections=36)
+    a.part("pin", tc.Mesh(pin), fixed=True)
+    a.measure("nothing", a.parts[0].point(20, 0, 0), along="z")
+    assert not warned(a)
+    sunk = a.replaced(parts=[a.parts[0]], measures=[])
+    sunk.part("pin", tc.Mesh(pin), at=(4, 0, 0), fixed=True)
+    sunk.measure("nothing", sunk.parts[0].point(20, 0, 0), along="z")
+    assert kinds(sunk) == ["overlap"]
+
+
+def test_a_warning_is_silenced_by_its_name():
+    a = model(at=(20, 12.5, 5), point=(500, 0, 10))
+    assert kinds(a) == ["point", "overlap"]
+    with warnings.catch_warnings(record=True) as records:
+        warnings.filterwarnings("ignore", r'\[overlap\] contact pair "interface"', tc.NominalWarning)
+        tc.build(a)
+    assert [str(record.message)[:7] for record in records] == ["[point]"]
+
+
+def test_a_run_and_its_continuation_warn_once_each(tmp_path):
+    a, path = model(at=(20, 12.5, 5)), tmp_path / "run.nc"
+    for samples, options in ((10, {}), (20, {"resume": True})):
+        with warnings.catch_warnings(record=True) as records:
+            warnings.simplefilter("always", tc.NominalWarning)
+            tc.run(a, samples=samples, out=path, **options).close()
+        assert sum(record.category is tc.NominalWarning for record in records) == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", MODELS, ids=lambda path: path.stem)
+def test_the_models_are_silent(path):
+    assert not warned(load_model(path))

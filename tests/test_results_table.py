@@ -1,0 +1,93 @@
+"""The table of results: verdicts, one unit for all shares, and figures without noise."""
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import tolcontact as tc
+from tests import cases
+from tolcontact.report.figures import plain
+from tolcontact.report.results_table import result_rows, share_heading, share_in, share_units, verdict_lines, verdict_text
+from tolcontact.statistics import intervals
+from tolcontact.statistics.verdict import ALLOWED_SHARE, FAILS, MEETS, UNDECIDED, verdict
+
+
+@pytest.mark.parametrize(
+    ("hits", "count", "word"),
+    [
+        (0, 1000, UNDECIDED),
+        (0, 1365, MEETS),
+        (0, 1364, UNDECIDED),
+        (27, 10_000, UNDECIDED),
+        (60, 10_000, FAILS),
+        (5, 10_000, MEETS),
+    ],
+)
+def test_verdicts_are_those_of_the_interval(hits, count, word):
+    """Without a hit the upper end is 1 - 0.025^(1/n), which is 0.27 % at n = 1364.4."""
+    opinion = verdict(np.array(intervals.proportion_of(hits, count)), count)
+    assert opinion.word == word and (opinion.more > 0) == (word == UNDECIDED)
+
+
+def test_the_realizations_that_would_decide_are_enough_but_not_far_too_many():
+    opinion = verdict(np.array(intervals.proportion_of(0, 200)), 200)
+    needed = np.log(0.025) / np.log1p(-ALLOWED_SHARE)
+    assert needed - 200 <= opinion.more <= 1.3 * needed
+    close = verdict(np.array(intervals.proportion_of(2700, 1_000_000)), 1_000_000)
+    assert close.word == UNDECIDED and verdict_text(close) == "undecided: too close to call"
+
+
+def test_without_limits_there_is_no_verdict():
+    assert verdict(np.full(3, np.nan), 100) is None and verdict_text(None) == ""
+
+
+def assembly(limits):
+    a = cases.stack()
+    block = a.parts[-1]
+    for name, bounds in limits.items():
+        a.measure(name, block.point(0, 0, 0), along="z", limits=bounds)
+    return a
+
+
+def test_each_measurement_has_a_row_with_its_verdict():
+    names = {"wide": (-100, 100), "narrow": (-1e-4, 1e-4), "open": None}
+    summary = tc.summarize(tc.run(assembly(names), samples=2000, seed=1, solver="daqp"))
+    rows = {row.name: row for row in result_rows(summary)}
+    assert [rows[name].verdict for name in names] == ["meets", "does not meet", ""]
+    assert [rows[name].is_good for name in names] == [True, False, None]
+    assert rows["wide"].limits == ("0", "-100", "100") and rows["open"].limits == ("0", "", "")
+    assert [figures.state for figures in rows["wide"].states] == ["with contact", "without contact"]
+    lines = list(verdict_lines(summary))
+    assert "wide: meets its limits" in lines and not [line for line in lines if line.startswith("open")]
+
+
+def test_all_shares_of_a_table_have_one_unit():
+    summary = tc.summarize(tc.run(assembly({"wide": (-100, 100)}), samples=300, seed=1, solver="daqp"))
+    few, many = (summary.copy(deep=True) for _ in range(2))
+    outside = {"statistic": "outside limits", "interval": "estimate"}
+    few["statistic_value"].loc[outside], many["statistic_value"].loc[outside] = 0.0099, 0.01
+    assert (share_units(few), share_units(many)) == ("ppm", "%")
+    assert share_heading(few) == "out of specification, ppm"
+    share = np.array([0.0123, 0.0111, 0.0135])
+    assert share_in(share, "ppm") == "12 300 [11 100, 13 500]" and share_in(share, "%") == "1.23 [1.11, 1.35]"
+    assert share_in(np.full(3, np.nan), "%") == "-"
+
+
+@pytest.mark.parametrize(
+    ("value", "scale", "text"),
+    [
+        (-0.400001, 0.8, "-0.4"), (-0.400001, None, "-0.4"), (0.1 + 0.2, None, "0.3"), (12.3456, 1.0, "12.3456"),
+        (1e-7, 1.0, "0"), (1e-7, None, "1e-07"), (-0.0, 1.0, "0"), (450.0, 1.0, "450"), (np.inf, 1.0, ""), (np.nan, None, ""),
+        (0.025, 0.05, "0.025"),
+        (1 / 3, 1.0, "0.33333"), (-2e-17, 0.5, "0"),
+    ],
+)  # fmt: skip
+def test_declared_values_are_without_noise(value, scale, text):
+    assert plain(value, scale) == text
+
+
+def test_sides_without_a_limit_have_no_noise_either():
+    summary = tc.summarize(tc.run(assembly({"one": (None, 0.5)}), samples=100, seed=1, solver="daqp"))
+    assert isinstance(summary, xr.Dataset)
+    (row,) = [row for row in result_rows(summary) if row.name == "one"]
+    assert row.limits == ("0", "", "0.5") and row.states[0].cells[3] == "-" and "[" in row.states[0].cells[4]

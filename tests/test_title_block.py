@@ -1,0 +1,93 @@
+"""Title blocks: in scripts, archives, JSON and on the command line."""
+
+import pytest
+
+import tolcontact as tc
+from tests import cases
+from tests.helpers import call
+from tolcontact.declaration.json_model import read_json
+from tolcontact.declaration.title_block import title_block_of
+from tolcontact.errors import OptionError
+from tolcontact.report.html import page_of
+
+BLOCK = tc.TitleBlock(
+    title="Lid <A&B>", part_number="4711-02", author="É. Noether", revision="C", date="25 Nov", company="Ω Ltd"
+)
+
+
+def titled(block):
+    a = cases.stack()
+    a.title_block = block
+    return a
+
+
+def test_an_archive_holds_the_block_and_the_page_shows_it(tmp_path):
+    with tc.run(titled(BLOCK), samples=20, solver="daqp", out=tmp_path / "a.nc") as results:
+        assert title_block_of(results.attrs) == BLOCK == tc.model_of(results).title_block
+        page = page_of(results, tc.summarize(results))
+        other = page_of(results, tc.summarize(results), tc.TitleBlock(title="Other"))
+    assert "<h1>Lid &lt;A&amp;B&gt;</h1>" in page
+    for entry in ("4711-02", "É. Noether", "Ω Ltd", "25 Nov"):
+        assert entry in page and entry not in other
+    assert "<h1>Other</h1>" in other
+
+
+def test_an_archive_without_a_block_has_none():
+    assert title_block_of({"title": "variation simulation of x"}) == tc.TitleBlock()
+    results = tc.run(cases.stack(), samples=20, solver="daqp")
+    assert not [name for name in results.attrs if name.startswith("document_")]
+    assert tc.model_of(results).title_block is None
+
+
+def test_a_changed_block_does_not_keep_a_run_from_being_resumed(tmp_path):
+    tc.run(titled(BLOCK), samples=20, solver="daqp", out=tmp_path / "a.nc").close()
+    with tc.run(titled(tc.TitleBlock(revision="D")), samples=40, solver="daqp", out=tmp_path / "a.nc", resume=True) as results:
+        assert results.sizes["realization"] == 40
+
+
+@pytest.mark.parametrize(
+    ("block", "said"),
+    [(tc.TitleBlock(title="two\nlines"), "text of one line"), (tc.TitleBlock(author=7), "author is 7"),
+     (tc.TitleBlock(company="x" * 201), "company has 201 characters")],
+)  # fmt: skip
+def test_faults_are_named(block, said):
+    with pytest.raises(tc.ModelError, match=said):
+        tc.run(titled(block), samples=20)
+
+
+def test_wrong_types_are_refused_where_they_are_given():
+    with pytest.raises(TypeError, match=r"title_block is a dict; expected tc.TitleBlock"):
+        tc.Assembly("a", title_block={"title": "x"})
+    with pytest.raises(OptionError, match="revision is 'a\\\\nb'"):
+        BLOCK.overridden({"revision": "a\nb"})
+
+
+def test_the_command_line_replaces_entries(tmp_path):
+    model = tmp_path / "m.py"
+    model.write_text(
+        "import tolcontact as tc\n\n\ndef assembly():\n"
+        "    a = tc.Assembly('a', title_block=tc.TitleBlock(title='Old', author='A. B.'))\n"
+        "    b = a.part('b', tc.Box(10, 20, 10))\n"
+        "    a.locate(b, tc.three_two_one(b.face('-z'), b.face('-y'), b.face('-x')), tolerance=1)\n"
+        "    a.measure('height', b.point(5, 5, 10), along='z', tolerance=1)\n    return a\n"
+    )
+    done = call(tmp_path, "run", model, "--samples", "20", "--out", "a.nc", "--title", "New", "--part-number", "12")
+    assert done.returncode == 0, done.stderr
+    with tc.open_archive(tmp_path / "a.nc") as results:
+        assert title_block_of(results.attrs) == tc.TitleBlock(title="New", author="A. B.", part_number="12")
+    done = call(tmp_path, "report", "a.nc", "--revision", "Z9")
+    page = (tmp_path / "a.html").read_text(encoding="utf-8")
+    assert done.returncode == 0 and "<h1>New</h1>" in page and "Z9" in page and "A. B." in page
+    assert call(tmp_path, "report", "a.nc", "--title", "a\nb").returncode == 2
+
+
+def test_json_models_have_blocks(tmp_path):
+    document = (
+        '{"name": "a", "title_block": {"title": "T", "date": "today"}, "parts": [{"name": "b", "geometry": {"box": [1, 2, 3]}, '
+        '"fixed": true}], "measures": [{"name": "h", "of": {"part": "b", "position": [0, 0, 3]}, "along": [0, 0, 1]}]}'
+    )
+    (tmp_path / "a.json").write_text(document)
+    assert read_json(tmp_path / "a.json").title_block == tc.TitleBlock(title="T", date="today")
+    (tmp_path / "b.json").write_text(document.replace('"date"', '"dates"'))
+    with pytest.raises(tc.ScriptError, match="title_block"):
+        read_json(tmp_path / "b.json")

@@ -1,0 +1,26 @@
+"""Options that replace entries of the title block of a report."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tolcontact.declaration import Assembly, TitleBlock
+from tolcontact.declaration.script import load_model
+
+Title = Annotated[str | None, typer.Option(help="Title of the report. Default: the model's.", rich_help_panel="Title block")]
+PartNumber = Annotated[str | None, typer.Option(help="Part number of the assembly.", rich_help_panel="Title block")]
+Author = Annotated[str | None, typer.Option(help="Author of the report.", rich_help_panel="Title block")]
+Revision = Annotated[str | None, typer.Option(help="Revision of the model or of its drawing.", rich_help_panel="Title block")]
+Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
+Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
+ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
+
+
+def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:
+    """Return the assembly that a file declares, with entries of its title block replaced as far as they are not None."""
+    assembly = load_model(path)
+    if any(entry is not None for entry in entries.values()):
+        assembly.title_block = (assembly.title_block or TitleBlock()).overridden(entries)
+    return assembly

@@ -1,0 +1,317 @@
+"""Measurements of faces, and of other measurements: what a measure may be the value of, besides points and expressions.
+
+Each kind is a class, which `MEASUREMENTS` lists by the kind's name. Measurements can be nested: `tc.Minimum(tc.Gap(...), "m")`.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
+from tolcontact.declaration.values import Vector, direction, is_finite
+from tolcontact.readable import Readable
+
+MAX_DEPTH = 8  # of nested measurements
+MAX_LISTED = 3  # measurements in a text
+MAX_STATIONS = 1000  # of a seam
+
+
+class Measurement(Readable):
+    """A quantity that follows from the poses of parts and the deviations of their features.
+
+    kind     its name, in documents and tables
+    units    of its value; empty for those of the measurements that it combines
+    """
+
+    kind: ClassVar[str]
+    units: ClassVar[str] = "mm"
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        """The faces that are measured."""
+        return ()
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The points that are measured."""
+        return ()
+
+    @property
+    def operands(self) -> "tuple[str | Measurement, ...]":
+        """The measurements that this one combines, or the names of their measures."""
+        return ()
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts that are measured, and those that choose faces."""
+        own = [part for face in self.faces for part in face.parts] + [point.part for point in self.points]
+        return (*own, *(part for nested in self._nested for part in nested.parts))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the measures that this measurement refers to."""
+        own = [operand for operand in self.operands if isinstance(operand, str)]
+        return (*own, *(name for nested in self._nested for name in nested.names))
+
+    @property
+    def _nested(self) -> "tuple[Measurement, ...]":
+        return tuple(operand for operand in self.operands if isinstance(operand, Measurement))
+
+    def units_among(self, units: Mapping[str, str]) -> set[str]:
+        """Return the units of the value, from those of named measures: several if measurements of unlike units are combined."""
+        if not self.operands:
+            return {self.units}
+        own = {units[operand] for operand in self.operands if isinstance(operand, str) and operand in units}
+        return own.union(*(nested.units_among(units) for nested in self._nested))
+
+    def faults(self) -> Iterator[str]:
+        things: tuple[Face | Point | Measurement, ...] = (*self.faces, *self.points, *self._nested)
+        for thing in things:
+            yield from thing.faults()
+
+    def _take_faces(self, **faces: Any) -> None:
+        """Store faces, or those of features. Raises TypeError for what is neither."""
+        for name, face in faces.items():
+            if not isinstance(face, Face | Feature):
+                raise TypeError(f'{self.kind}: {name} is a {type(face).__name__}; expected part.face("+z"), or a feature')
+            object.__setattr__(self, name, face_of(face))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _OfStation(Measurement):
+    station: Point
+    face: Face
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.station, Point):
+            raise TypeError(f"{self.kind}: station is a {type(self.station).__name__}; expected part.point(x, y, z)")
+        self._take_faces(face=self.face)
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        return (self.face,)
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        return (self.station,)
+
+    def __str__(self) -> str:
+        return f"{self.kind} from {self.station} to {self.face}"
+
+
+class Gap(_OfStation):
+    """The distance of a station, a point of one part, from a face of another, perpendicular to this face.
+
+    The face counts beyond its ends: as its plane, cylinder, cone, sphere or torus, or as its tangent plane at the place nearest
+    to the nominal station if its surface is of no such kind. The gap is negative if the station is inside the material.
+    """
+
+    kind = "gap"
+
+
+class Flush(_OfStation):
+    """The height of a station, a point of one part, over a neighbouring outer face of another, perpendicular to this face.
+
+    The face counts beyond its ends, as that of a Gap.
+    """
+
+    kind = "flush"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class _OfTwoFaces(Measurement):
+    first: Face
+    second: Face
+
+    def __post_init__(self) -> None:
+        self._take_faces(first=self.first, second=self.second)
+
+    @property
+    def faces(self) -> tuple[Face, ...]:
+        return (self.first, self.second)
+
+    def __str__(self) -> str:
+        return f"{self.kind} of {self.first} and {self.second}"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Clearance(_OfTwoFaces):
+    """The least distance of two faces of different parts, negative where they overlap.
+
+    Of planes it is the least at the corners of the region in which they face each other nominally: corners of either face over
+    the other's plane, and places where their rims cross. Of a ball or a shaft beside walls it is the least gap of contact (see
+    tolcontact.discretization), of two outer cylinders the distance of their axes less both radii.
+    """
+
+    kind = "clearance"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AxisDistance(_OfTwoFaces):
+    """The distance of the axes of two cylinders or cones; the axis of a sphere is its centre.
+
+    By default it is the shortest distance of the two axes, each as long as its face.
+
+    across   a direction: the distance of the points in which both axes, however long, pierce the plane across it through the
+             middle of the first axis
+    along    a direction: the component of the perpendicular from the middle of the first axis to the second axis, however long
+
+    Directions are fixed in the assembly frame.
+    """
+
+    kind = "distance of axes"
+
+    across: Vector | None = None
+    along: Vector | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        for name in ("across", "along"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, direction(getattr(self, name)))
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        for name in ("across", "along"):
+            yield from _direction_faults(name, getattr(self, name))
+        if self.across is not None and self.along is not None:
+            yield "across and along are both given; give one of them"
+
+    def __str__(self) -> str:
+        return super().__str__() + _direction_text("across", self.across) + _direction_text("along", self.along)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Angle(_OfTwoFaces):
+    """The angle [rad] between two planes or axes, by the normals of planes and the axes of cylinders and cones.
+
+    Planes and lines have no sense: the second direction is reversed if it is more than a right angle from the first one
+    nominally. Without `about` the angle is that of the two directions in space, from 0 on.
+
+    about   a direction, fixed in the assembly frame: the angle by which the first direction must turn about it to coincide with
+            the second one, both seen along it, from -pi to pi
+    """
+
+    kind = "angle"
+    units = "rad"
+
+    about: Vector | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about is not None:
+            object.__setattr__(self, "about", direction(self.about))
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        yield from _direction_faults("about", self.about)
+
+    def __str__(self) -> str:
+        return super().__str__() + _direction_text("about", self.about)
+
+
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Combination(Measurement):
+    """A value of several measurements, or of measures that were declared before, which may be given by name."""
+
+    units = ""
+
+    measurements: tuple[str | Measurement, ...]
+
+    def __init__(self, *measurements: Any) -> None:
+        operands = []
+        for operand in measurements:
+            value = operand if isinstance(operand, str | Measurement) else getattr(operand, "name", None)
+            if not isinstance(value, str | Measurement):
+                raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected a measure or its name")
+            operands.append(value)
+        object.__setattr__(self, "measurements", tuple(operands))
+
+    @property
+    def operands(self) -> tuple[str | Measurement, ...]:
+        return self.measurements
+
+    @property
+    def depth(self) -> int:
+        """The number of combinations inside each other."""
+        return 1 + max((nested.depth for nested in self._nested if isinstance(nested, Combination)), default=0)
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        if len(self.operands) < 2:
+            yield f"the {self.kind} is that of {len(self.operands)} measurement(s); expected two or more"
+        if self.depth > MAX_DEPTH:
+            yield f"its measurements are nested {self.depth} deep; expected at most {MAX_DEPTH}; declare some by themselves"
+
+    def __str__(self) -> str:
+        if len(self.operands) > MAX_LISTED:
+            return f"{self.kind} of {len(self.operands)} measurements"
+        return f"{self.kind} of {' and '.join(f'({operand})' for operand in self.operands)}"
+
+
+class Minimum(Combination):
+    """The least of several measurements."""
+
+    kind = "minimum"
+
+
+class Maximum(Combination):
+    """The largest of several measurements."""
+
+    kind = "maximum"
+
+
+class Mean(Combination):
+    """The mean of several measurements."""
+
+    kind = "mean"
+
+
+class Sum(Combination):
+    """The sum of several measurements."""
+
+    kind = "sum"
+
+
+class Difference(Combination):
+    """The first of two measurements, less the second one."""
+
+    kind = "difference"
+
+    def faults(self) -> Iterator[str]:
+        yield from super().faults()
+        if len(self.operands) > 2:
+            yield f"the difference is that of {len(self.operands)} measurements; expected two"
+
+
+MEASUREMENTS: dict[str, type[Measurement]] = {
+    measurement.kind: measurement
+    for measurement in (Gap, Flush, Clearance, AxisDistance, Angle, Minimum, Maximum, Mean, Sum, Difference)
+}
+
+
+def stations(start: Point, end: Point, count: int) -> tuple[Point, ...]:
+    """Return `count` points of a part, evenly from `start` to `end`: the stations of a seam.
+
+    Points on a feature move with its deviation. Raises TypeError or ValueError for points of two parts or features.
+    """
+    if not (isinstance(start, Point) and isinstance(end, Point) and start.position and end.position):
+        raise TypeError("stations: expected two points part.point(x, y, z), or two of a feature")
+    if start.part is not end.part or start.on is not end.on:
+        raise ValueError(f"stations: {start} and {end} are not points of one part, or of one feature")
+    if type(count) is not int or not 2 <= count <= MAX_STATIONS:
+        raise ValueError(f"stations: count is {count!r}; expected a whole number from 2 to {MAX_STATIONS}")
+    point: Callable[..., Point] = start.on.point if start.on else start.part.point
+    shares = [k / (count - 1) for k in range(count)]
+    return tuple(
+        point(*((1 - share) * a + share * b for a, b in zip(start.position, end.position, strict=True))) for share in shares
+    )
+
+
+def _direction_faults(name: str, value: Vector | None) -> Iterator[str]:
+    if value is not None and not is_finite(value):
+        yield f'{name} is neither "+x" to "-z" nor a nonzero vector of three finite numbers'
+
+
+def _direction_text(name: str, value: Vector | None) -> str:
+    return "" if value is None else " {} ({:g}, {:g}, {:g})".format(name, *value)

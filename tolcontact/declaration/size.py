@@ -1,0 +1,95 @@
+"""The size of a feature, and its limits."""
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, ClassVar
+
+from tolcontact.declaration.tolerance import Tolerance
+from tolcontact.declaration.tolerance_class import tolerance_class
+from tolcontact.declaration.values import is_length
+from tolcontact.declaration.written_tolerance import Deviations, TextFault, text_fault, written
+from tolcontact.readable import Readable
+
+MOVES = ("both", "first", "second")
+
+
+@dataclass(frozen=True, repr=False)
+class Size(Readable):
+    """The size of a feature [mm]: the diameter of a cylinder or sphere, the distance of two opposed planes.
+
+    `tc.Size(8.1, +0.05, -0.02)` has the limits 8.08 and 8.15, `tc.Size(8.1, 0.05)` has 8.05 and 8.15. The limits may be written
+    as on drawings: `tc.Size(8.1, "+0.05/-0.02")`, `tc.Size(8.1, "±0.05")`, and `tc.Size(8, "H7")` with a `tolerance_class` of
+    ISO 286-1. Sizes vary about the middle of the limits by `distribution` (see tc.Tolerance). `moves` states which of two
+    planes moves with the size: "both" by half each, or the "first" or "second" alone.
+    """
+
+    kind: ClassVar[str] = "size"
+
+    nominal: float
+    upper: float  # a text or a pair only if it is no tolerance
+    lower: float = None  # type: ignore[assignment]  # -upper by default
+    _: KW_ONLY
+    distribution: Any = "normal"
+    cp: float | None = None
+    cpk: float | None = None
+    moves: str = "both"
+    tolerance_class: str = ""
+
+    def __post_init__(self) -> None:
+        if self.lower is not None or not is_length(self.nominal):
+            return
+        with contextlib.suppress(TextFault):  # faults() reports it
+            value = written(self.upper, nominal=self.nominal)
+            if isinstance(self.upper, str) and (stated := tolerance_class(self.upper.strip())):
+                object.__setattr__(self, "tolerance_class", str(stated))
+            lower, upper = value if isinstance(value, Deviations) else (-value if is_length(value) else None, value)
+            object.__setattr__(self, "lower", lower)
+            object.__setattr__(self, "upper", upper)
+
+    @property
+    def is_for_holes(self) -> bool | None:
+        """Whether its tolerance class is one of holes; None without a class."""
+        return str(self.tolerance_class).isupper() if self.tolerance_class else None
+
+    @property
+    def tolerance(self) -> Tolerance:
+        """The tolerance of deviations from the nominal size [mm]; the limits have to be numbers."""
+        if not isinstance(self.distribution, str):
+            return Tolerance(distribution=self.distribution)
+        width, middle = self.upper - self.lower, (self.upper + self.lower) / 2
+        return Tolerance(width, self.distribution, shift=middle, cp=self.cp, cpk=self.cpk)
+
+    def faults(self) -> Iterator[str]:
+        if not is_length(self.nominal):
+            yield f"nominal is {self.nominal!r}; expected a number in mm"
+        elif fault := text_fault(self.upper, nominal=self.nominal):
+            yield f"tolerance is {fault}"
+        elif isinstance(self.upper, str | list | tuple):
+            yield f"upper is {self.upper!r}, which states both limits; leave lower={self.lower!r} out"
+        elif not (is_length(self.upper) and is_length(self.lower)):
+            name = "lower" if is_length(self.upper) else "upper"
+            yield f"{name} is {getattr(self, name)!r}; expected a number in mm"
+        else:
+            yield from self._limit_faults()
+        if self.moves not in MOVES:
+            yield f"moves is {self.moves!r}; expected one of {', '.join(MOVES)}"
+
+    def _limit_faults(self) -> Iterator[str]:
+        if not self.nominal > 0:
+            yield f"nominal is {self.nominal!r}; expected a size in mm above 0"
+        if not self.lower < self.upper:
+            yield f"the lower limit {self.lower:+g} is not below the upper one {self.upper:+g}; swap them"
+        else:
+            yield from self.tolerance.faults()
+        if self.tolerance_class and (fault := text_fault(self.tolerance_class, nominal=self.nominal)):
+            yield f"tolerance_class is {fault}"
+        elif self.tolerance_class and written(self.tolerance_class, nominal=self.nominal) != (self.lower, self.upper):
+            limits = f"{self.upper:+g} {self.lower:+g}"
+            yield f"tolerance_class is {self.tolerance_class!r}, which has other limits than {limits}; leave it out"
+
+    def __str__(self) -> str:
+        if not (is_length(self.nominal) and is_length(self.upper) and is_length(self.lower)):
+            return f"size {self.nominal!r} {self.upper!r}"
+        stated = f"{self.tolerance_class} " if self.tolerance_class else ""
+        return f"size {self.nominal:g} {stated}{self.upper:+g} {self.lower:+g} mm"

@@ -1,0 +1,177 @@
+"""Measured faces with numbers: walls, axes and directions, as measurements need them. Nominal assembly frame, mm."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.declaration import Face
+from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.errors import GeometryFault
+from tolcontact.features import AxisFeature, FaceDeviation, FeatureOfSize, PlaneFeature, feature_geometry
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
+from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.surface import Surface
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredFace:
+    """A face in its nominal place, with the number of its part and the deviation of its feature, if it has one."""
+
+    face: Face
+    part: int
+    surface: Surface
+    deviation: FaceDeviation | None
+
+    def wall(self, near: np.ndarray) -> "Wall":
+        """Return the whole surface of the face, or if no analytic one is known its tangent plane nearest to a place (3,)."""
+        if is_flat(self.surface):
+            return Wall(self.part, self.plane, 1.0, self.deviation)
+        pieces = self.surface.pieces
+        if len(pieces) == 1 and not len(self.surface.unknown.mesh.faces):
+            return Wall(self.part, pieces[0].surface, -1.0 if pieces[0].is_hollow else 1.0, self.deviation)
+        feet, normals, _ = self.surface.project(near[None])
+        return Wall(self.part, Plane(feet[0], normals[0]), 1.0, self.deviation)
+
+    @property
+    def plane(self) -> Plane:
+        """The plane of a flat face, with its outward normal. Raises GeometryFault for other faces."""
+        geometry = feature_geometry([self.surface])
+        if not isinstance(geometry, PlaneFeature):
+            raise GeometryFault(f"its face {self.face} is {geometry.in_words}; expected a plane")
+        return Plane(geometry.centre, geometry.normal)
+
+    @property
+    def axis(self) -> "Axis":
+        """The axis of a cylinder or cone, or the centre of a sphere. Raises GeometryFault for other faces."""
+        geometry = feature_geometry([self.surface])
+        if isinstance(geometry, AxisFeature):
+            direction = geometry.axis
+        elif isinstance(geometry, FeatureOfSize) and not isinstance(geometry, PlaneFeature):
+            direction = np.zeros(3)
+        else:
+            raise GeometryFault(f"its face {self.face} is {geometry.in_words}, which has no axis; choose a cylinder or a cone")
+        radius = geometry.size / 2 if isinstance(geometry, FeatureOfSize) else 0.0
+        ends = np.array([geometry.end(0), geometry.end(1)])
+        return Axis(self.part, ends, direction, radius, self.deviation)
+
+    @property
+    def direction(self) -> np.ndarray:
+        """The normal of a plane, or the direction of an axis (3,). Raises GeometryFault for other faces."""
+        geometry = feature_geometry([self.surface])
+        if isinstance(geometry, PlaneFeature):
+            return geometry.normal
+        if isinstance(geometry, AxisFeature):
+            return geometry.axis
+        raise GeometryFault(
+            f"its face {self.face} is {geometry.in_words}, which has no direction; choose a plane or a cylinder"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Station:
+    """A point (3,) [mm] of a part, and the deviation and the outward normal (3,) of the face that it is on, if any."""
+
+    part: int
+    position: np.ndarray
+    deviation: FaceDeviation | None
+    outward: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Wall:
+    """An analytic surface of a part; `side` is 1, or -1 if its free side is inside."""
+
+    part: int
+    surface: AnalyticSurface
+    side: float
+    deviation: FaceDeviation | None
+
+    def foot(self, place: np.ndarray) -> np.ndarray:
+        """Return the place on the surface (3,) nearest to a place (3,)."""
+        return np.asarray(self.surface.project(place[None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Axis:
+    """An axis with its ends (2, 3) [mm] and its direction (3,), 0 for a centre, and the radius [mm] of its face."""
+
+    part: int
+    ends: np.ndarray
+    direction: np.ndarray
+    radius: float
+    deviation: FaceDeviation | None
+
+    @property
+    def middle(self) -> np.ndarray:
+        """The middle (3,) between the ends."""
+        return np.asarray(self.ends.mean(axis=0))
+
+
+@dataclass(frozen=True, eq=False)
+class NominalMeasurement:
+    """A measurement with numbers.
+
+    lines   (line, 2, 3) [mm] the ends of the lines as which it is drawn
+    """
+
+    lines: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Crossing:
+    """An edge (end, 3) [mm] of a first face that crosses one of a second face, seen along its outward normal.
+
+    sense   1 or -1, so that sense times the cross product of the edges points outward from the second face
+    """
+
+    first: MeasuredFace
+    second: MeasuredFace
+    edges: tuple[np.ndarray, np.ndarray]
+    sense: float
+
+
+@dataclass(frozen=True, eq=False)
+class Heights(NominalMeasurement):
+    """The least height of stations over walls, and of edges over edges that they cross."""
+
+    stations: Sequence[tuple[Station, Wall]]
+    crossings: Sequence[Crossing] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class RoundClearance(NominalMeasurement):
+    """The least gap of balls and shafts beside walls, of a first (moving) and a second (reference) face."""
+
+    first: MeasuredFace
+    second: MeasuredFace
+    points: RoundPoints
+
+
+@dataclass(frozen=True, eq=False)
+class AxisPair(NominalMeasurement):
+    """The distance of two axes; `across` and `along` (3,) as AxisDistance has them, less `radii` [mm]."""
+
+    first: Axis
+    second: Axis
+    across: np.ndarray | None = None
+    along: np.ndarray | None = None
+    is_between_surfaces: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class DirectionPair(NominalMeasurement):
+    """The angle of two directions (3,) of faces, about a direction (3,) or in space."""
+
+    first: MeasuredFace
+    second: MeasuredFace
+    directions: tuple[np.ndarray, np.ndarray]
+    about: np.ndarray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Combined(NominalMeasurement):
+    """A combination of a kind; operands are numbers of measures, or measurements."""
+
+    kind: str
+    operands: Sequence[int | NominalMeasurement]

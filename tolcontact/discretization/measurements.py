@@ -1,0 +1,227 @@
+"""Measurements get numbers: faces become walls, axes and directions, and combinations refer to measures by number."""
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+import scipy
+from scipy.spatial import ConvexHull, QhullError
+
+from tolcontact.declaration import Angle, AxisDistance, Clearance, Combination, Face, Flush, Gap, Measurement
+from tolcontact.discretization.measured_geometry import (
+    Axis,
+    AxisPair,
+    Combined,
+    Crossing,
+    DirectionPair,
+    Heights,
+    MeasuredFace,
+    NominalMeasurement,
+    RoundClearance,
+    Station,
+    Wall,
+)
+from tolcontact.discretization.nominal import Nominal
+from tolcontact.discretization.round_contact import round_points
+from tolcontact.discretization.round_points import RoundPoints
+from tolcontact.errors import GeometryFault, ModelError, designation
+from tolcontact.geometry.analytic_surfaces import Cylinder
+from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.edges import rim
+from tolcontact.geometry.faces import patch
+from tolcontact.geometry.overlap import crossing_edges
+
+MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
+OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
+FACING = -0.5  # largest cosine between the outward normals of planes that face each other
+NO_LINES = np.zeros((0, 2, 3))
+
+
+def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, ...]:
+    """Return the measurement of each measure; None for measures of points and expressions.
+
+    Raises ModelError with a fault for each measurement that the faces do not have.
+    """
+    measurements: dict[str, NominalMeasurement | None] = {}
+    faults = []
+    for measure in nominal.measures:
+        measurements[measure.name] = None
+        try:
+            if isinstance(measure.of, Measurement):
+                measurements[measure.name] = _with_numbers(measure.of, nominal, measurements)
+        except GeometryFault as fault:
+            faults.append(f"{designation('measure', measure)}: {fault}")
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+    return tuple(measurements.values())
+
+
+def _with_numbers(measurement: Any, nominal: Nominal, earlier: Mapping[str, NominalMeasurement | None]) -> NominalMeasurement:
+    """Return a measurement; it may refer to the earlier measures by name."""
+    if not isinstance(measurement, Combination):
+        return BUILDERS[type(measurement)](measurement, nominal)
+    numbers = {name: number for number, name in enumerate(earlier)}
+    operands = [
+        numbers[operand] if isinstance(operand, str) else _with_numbers(operand, nominal, earlier)
+        for operand in measurement.operands
+    ]
+    lines = [_lines(nominal, operand, earlier) if isinstance(operand, int) else operand.lines for operand in operands]
+    return Combined(np.concatenate(lines), measurement.kind, operands)
+
+
+def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeasurement | None]) -> np.ndarray:
+    """Return the lines (line, 2, 3) that show a measure: of points one from the first to the last, which may be the same."""
+    measure = nominal.measures[number]
+    if (measurement := measurements[measure.name]) is not None:
+        return measurement.lines
+    ends = [nominal.position(point) for point in measure.points]
+    return np.array([[ends[0], ends[-1]]]) if ends else NO_LINES
+
+
+def _gap(gap: Gap, nominal: Nominal) -> Heights:
+    face, point = _measured_face(nominal, gap.face), gap.station
+    position, deviation = nominal.position(point), nominal.face_at(point)
+    station = Station(nominal.part_index(point.part), position, deviation, nominal.outward(point))
+    _check_varies([gap.station.part, gap.face.part], [station.deviation, face.deviation])
+    wall = face.wall(position)
+    return Heights(np.array([[position, wall.foot(position)]]), [(station, wall)])
+
+
+def _clearance(clearance: Clearance, nominal: Nominal) -> NominalMeasurement:
+    first, second = _faces(clearance, nominal)
+    if is_flat(first.surface) and is_flat(second.surface):
+        return _clearance_of_planes(first, second)
+    reach = float(np.ptp(np.vstack([first.surface.mesh.bounds, second.surface.mesh.bounds]), axis=0).sum())
+    if points := round_points(first.surface, second.surface, reach):
+        rows = [point.nominal() for point in points]
+        P_m, P_r, _ = min(rows, key=lambda row: float((row[0] - row[1]) @ row[2]))
+        return RoundClearance(np.array([[P_m, P_r]]), first, second, RoundPoints.of(points))
+    if all(_is_outer_cylinder(face) for face in (first, second)):
+        axes = first.axis, second.axis
+        return AxisPair(_nearest_places(first.axis.ends, second.axis.ends)[None], *axes, is_between_surfaces=True)
+    kinds = " and ".join(_kind(face) for face in (first, second))
+    raise GeometryFault(
+        f"the clearance of {kinds} is not known; expected two planes, a ball or a shaft beside a wall that it may touch, or "
+        "two outer cylinders; measure the gaps of stations with tc.Gap instead"
+    )
+
+
+def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
+    if not first.plane.axis @ second.plane.axis < FACING:
+        raise GeometryFault(
+            f"its planes {first.face} and {second.face} do not face each other; choose planes with material behind both"
+        )
+    stations: list[tuple[Station, Wall]] = []
+    for moving, reference in ((first, second), (second, first)):
+        corners = np.asarray(moving.surface.mesh.vertices)[np.unique(rim(np.asarray(moving.surface.mesh.faces)))]
+        _, _, is_over = reference.surface.project(corners)
+        outward, wall = moving.plane.axis, Wall(reference.part, reference.plane, 1.0, reference.deviation)
+        corners = _outline(corners[is_over], outward)
+        stations += [(Station(moving.part, corner, moving.deviation, outward), wall) for corner in corners]
+    crossings = []
+    for edges in zip(*crossing_edges(first.surface, second.surface), strict=True):
+        p, q = (end - start for start, end in edges)
+        crossings.append(Crossing(first, second, edges, float(np.sign(np.cross(p, q) @ second.plane.axis))))
+    lines = [[station.position, wall.foot(station.position)] for station, wall in stations]
+    lines += [list(_nearest_places(*crossing.edges)) for crossing in crossings]
+    if not lines:
+        raise GeometryFault(
+            f"its planes {first.face} and {second.face} lie nowhere over each other; choose faces that overlap, or measure the "
+            "gap of a point with tc.Gap"
+        )
+    shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
+    return Heights(np.array([shortest]), stations, crossings)
+
+
+def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
+    """Return the corners of the convex hull of points (point, 3) of a plane with normal n (3,): no other can be the nearest."""
+    try:
+        return points[ConvexHull(points @ np.linalg.svd(n[None])[2][1:].T).vertices] if len(points) > 3 else points
+    except QhullError:  # the points lie on one line
+        return points
+
+
+def _axis_distance(distance: AxisDistance, nominal: Nominal) -> AxisPair:
+    first, second = (face.axis for face in _faces(distance, nominal))
+    lines = np.array([first.ends, second.ends])
+    if distance.across is not None:
+        n = np.array(distance.across)
+        for axis, face in zip((first, second), distance.faces, strict=True):
+            if axis.direction.any() and abs(float(axis.direction @ n)) < MIN_SINE:
+                raise GeometryFault(
+                    f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
+                )
+        foot = second.middle + _slide(second, n, first.middle)
+        return AxisPair(np.concatenate([lines, [[first.middle, foot]]]), first, second, across=n)
+    if distance.along is not None:
+        foot = second.middle + ((first.middle - second.middle) @ second.direction) * second.direction
+        return AxisPair(np.concatenate([lines, [[first.middle, foot]]]), first, second, along=np.array(distance.along))
+    return AxisPair(np.concatenate([lines, [_nearest_places(first.ends, second.ends)]]), first, second)
+
+
+def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Return the vector (3,) along an axis from its middle to the plane across n (3,) through a place; of a centre along n."""
+    direction = axis.direction if axis.direction.any() else n
+    return np.asarray(direction * float((place - axis.middle) @ n) / float(direction @ n))
+
+
+def _angle(angle: Angle, nominal: Nominal) -> DirectionPair:
+    first, second = _faces(angle, nominal)
+    u, v = first.direction, second.direction
+    about = None if angle.about is None else np.array(angle.about)
+    across = [vector if about is None else vector - (vector @ about) * about for vector in (u, v)]
+    for vector, face in zip(across, angle.faces, strict=True):
+        if np.linalg.norm(vector) < MIN_SINE:
+            raise GeometryFault(f"the direction of {face} is parallel to the direction that the angle is about; choose another")
+    if across[0] @ across[1] < OBTUSE * np.linalg.norm(across[0]) * np.linalg.norm(across[1]):
+        v = -v
+    length = min(float(face.surface.mesh.scale) for face in (first, second)) / 2
+    starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (first, second)]
+    lines = np.array([[start, start + length * vector] for start, vector in zip(starts, (u, v), strict=True)])
+    return DirectionPair(lines, first, second, (u, v), about)
+
+
+def _faces(measurement: Measurement, nominal: Nominal) -> tuple[MeasuredFace, MeasuredFace]:
+    """Return the two faces of a measurement."""
+    first, second = (_measured_face(nominal, face) for face in measurement.faces)
+    _check_varies([face.part for face in measurement.faces], [first.deviation, second.deviation])
+    return first, second
+
+
+def _measured_face(nominal: Nominal, face: Face) -> MeasuredFace:
+    """Return a declared face. Raises GeometryFault if it has no triangles, or is partly that of a feature."""
+    part = nominal.part_index(face.part)
+    surface = patch(face, nominal.meshes).placed(*nominal.parts[part].placement)
+    return MeasuredFace(face, part, surface, nominal.deviation(face))
+
+
+def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
+    part, *others = dict.fromkeys(parts)
+    if not others and not any(deviation is not None for deviation in deviations):
+        raise GeometryFault(
+            f'it is measured within part "{part.name}", whose faces there do not deviate, so it is constant; take faces of two '
+            "parts, or features with tolerances"
+        )
+
+
+def _is_outer_cylinder(face: MeasuredFace) -> bool:
+    pieces = face.surface.pieces
+    return len(pieces) == 1 and isinstance(pieces[0].surface, Cylinder) and not pieces[0].is_hollow
+
+
+def _kind(face: MeasuredFace) -> str:
+    kinds = dict.fromkeys(piece.surface.kind for piece in face.surface.pieces)
+    return f"{face.face} ({' and '.join(kinds) or ('plane' if is_flat(face.surface) else 'general surface')})"
+
+
+def _nearest_places(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the nearest places (2, 3) of two segments, given by their ends (2, 3); of parallel ones, any that are nearest."""
+    p, q = first[1] - first[0], second[1] - second[0]
+    nearest = scipy.optimize.lsq_linear(np.column_stack([p, -q]), second[0] - first[0], bounds=(0, 1))
+    return np.array([first[0] + nearest.x[0] * p, second[0] + nearest.x[1] * q])
+
+
+Builder = Callable[[Any, Nominal], NominalMeasurement]
+BUILDERS: Mapping[type[Measurement], Builder] = {
+    Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
+}  # fmt: skip

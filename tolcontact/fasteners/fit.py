@@ -1,0 +1,106 @@
+"""The fit of a fastener in its holes in the nominal assembly. Lengths in mm."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.declaration import Face, Part
+from tolcontact.errors import GeometryFault
+from tolcontact.fasteners.placed_faces import Axis, PlacedCylinder, PlacedPlane, outer_cylinders, placed_cylinder
+
+INTO, SEAT = "into", "seat"  # labels of faces beside "through[0]" and so on
+FREE_END = 0.25  # of the diameter: how far a made shank reaches out of the parts
+ROUNDING = 1e-6  # of a diameter: what counts as nothing
+PRESSED = 1e-3  # of a diameter: how far the axis of a part may be off that of the hole that it goes into
+MAX_LEAN = 1e-4  # [rad] between the axis of a fastener and the normal of its seat
+
+Holes = Mapping[str, PlacedCylinder]  # by their labels, from the head on
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A shank in its holes.
+
+    seat     the plane under its head; None without a seat
+    radius   [mm] of the shank
+    reach    stations [mm] of its ends on its axis
+    shank    its face; None for a fastener that is to be made
+    """
+
+    holes: Holes
+    seat: PlacedPlane | None
+    axis: Axis
+    radius: float
+    reach: tuple[float, float]
+    shank: Face | None = None
+
+    def faults(self) -> Iterator[str]:
+        """Yield why the shank does not stand in its holes, or its head on the seat."""
+        if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > MAX_LEAN:
+            yield f"{SEAT}: face {self.seat.face} is not square to the axis of the holes; expected the plane under the head"
+            return
+        for label, hole in self.holes.items():
+            yield from self._hole_faults(label, hole)
+
+    def _hole_faults(self, label: str, hole: PlacedCylinder) -> Iterator[str]:
+        clearance, offset, (low, high) = hole.radius - self.radius, hole.offset(self.axis), hole.extent(self.axis)
+        limit = PRESSED * 2 * self.radius if label == INTO else clearance
+        if label != INTO and clearance < -ROUNDING * self.radius:
+            yield (
+                f"{label} has a diameter of {2 * hole.radius:.6g} mm, and the fastener {2 * self.radius:.6g} mm; expected a "
+                "fastener that is not thicker than its hole"
+            )
+        elif offset > limit + ROUNDING * self.radius:
+            yield (
+                f"{label}: its axis is {offset:.4g} mm off that of the fastener in the nominal assembly, where at most "
+                f"{limit:.4g} mm are possible; move the part, or choose another hole"
+            )
+        elif min(high, self.reach[1]) - max(low, self.reach[0]) < ROUNDING * self.radius:
+            yield f"{label}: the fastener does not reach into this hole; move it, or choose another one"
+
+
+def made_fit(diameter: float, holes: Holes, seat: PlacedPlane | None) -> Fit:
+    """Return the fit of a fastener that is to be made: on the axis of its last hole, with its origin under its head."""
+    axis = _axis_of(list(holes.values()), seat)
+    extents = {label: hole.extent(axis) for label, hole in holes.items()}
+    top = axis.station(seat.point) if seat else max(high for _, high in extents.values()) + FREE_END * diameter
+    bottom = extents[INTO][0] if INTO in extents else min(low for low, _ in extents.values()) - FREE_END * diameter
+    return Fit(holes, seat, Axis(axis.at(top), axis.head), diameter / 2, (bottom - top, 0.0))
+
+
+def part_fit(part: Part, face: Face | None, holes: Holes, seat: PlacedPlane | None) -> Fit:
+    """Return the fit of a part whose shank is a face, or the thickest outer cylinder about the middle of the first hole.
+
+    Raises GeometryFault if there is none.
+    """
+    first, *_ = holes.values()
+    if face is not None:
+        shank = placed_cylinder(face)
+        if shank.is_inner:
+            raise GeometryFault(f"face {face} is the wall of a hole; expected the outside of the shank")
+    else:
+        candidates = [cylinder for cylinder in outer_cylinders(part) if _reaches(cylinder, first)]
+        if not candidates:
+            raise GeometryFault(
+                f'no outer cylinder of part "{part.name}" stands in the first hole; move the part there, or give the face of '
+                "its shank in place of the part"
+            )
+        shank = candidates[0]
+    towards = _axis_of(list(holes.values()), seat).head
+    axis = Axis(shank.middle, shank.direction * (1.0 if shank.direction @ towards >= 0 else -1.0))
+    return Fit(holes, seat, axis, shank.radius, shank.extent(axis), shank.face)
+
+
+def _reaches(cylinder: PlacedCylinder, hole: PlacedCylinder) -> bool:
+    """Return whether the middle of a hole lies within a cylinder."""
+    axis = Axis(cylinder.middle, cylinder.direction)
+    low, high = cylinder.extent(axis)
+    return axis.distance(hole.middle) < cylinder.radius and low < axis.station(hole.middle) < high
+
+
+def _axis_of(holes: list[PlacedCylinder], seat: PlacedPlane | None) -> Axis:
+    """Return the axis of the last hole, towards the first one, or out of the seat."""
+    first, last = holes[0], holes[-1]
+    towards = seat.normal if seat else first.middle - last.middle
+    return Axis(last.middle, last.direction * (1.0 if last.direction @ towards >= 0 else -1.0))

@@ -1,0 +1,178 @@
+"""Measurements as expressions of poses and deviations: heights over walls, distances of axes, angles, and combinations."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from tolcontact.discretization.measured_geometry import (
+    AxisPair,
+    Combined,
+    Crossing,
+    DirectionPair,
+    Heights,
+    NominalMeasurement,
+    RoundClearance,
+    Station,
+    Wall,
+)
+from tolcontact.features import FaceDeviation
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
+from tolcontact.mechanics.pose import Pose, relative
+from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.setting import face_height, face_pose
+
+MIN_SQUARE = 1e-300  # of a length: keeps quotients finite where an axis has no length
+
+
+@dataclass(frozen=True, eq=False)
+class Observed:
+    """What measurements are expressions of: poses of the parts, deviations (contributor, 1), and the measures before."""
+
+    poses: Sequence[Pose]
+    deviations: ca.SX
+    measures: Sequence[ca.SX]
+
+    def pose(self, part: int, face: FaceDeviation | None) -> Pose:
+        """Return the pose that moves points of a nominal face to the actual face in the assembly."""
+        X_face = face_pose(face, self.deviations)
+        return self.poses[part] if X_face is None else self.poses[part] @ X_face
+
+    def position(self, station: Station) -> ca.SX:
+        """Return the position (3, 1) [mm] of a station, which moves with the face that it is on."""
+        height = face_height(station.deviation, self.deviations)
+        return self.pose(station.part, station.deviation).apply(ca.DM(station.position) + height * ca.DM(station.outward))
+
+
+def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
+    """Return the value of a measurement in its units."""
+    return EXPRESSIONS[type(measurement)](measurement, observed)
+
+
+def _least_height(heights: Heights, observed: Observed) -> ca.SX:
+    over_walls = [_height(station, wall, observed) for station, wall in heights.stations]
+    return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
+
+
+def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
+    """Return the height of an edge over one that it crosses: the distance of their lines along their common normal [mm]."""
+    first, second = (
+        [observed.pose(face.part, face.deviation).apply(ca.DM(end)) for end in edge]
+        for face, edge in zip((crossing.first, crossing.second), crossing.edges, strict=True)
+    )
+    n = crossing.sense * ca.cross(first[1] - first[0], second[1] - second[0])
+    return ca.dot(n, first[0] - second[0]) / ca.norm_2(n)
+
+
+def least(values: Any) -> ca.SX:
+    """Return the least of several expressions."""
+    return ca.mmin(ca.vertcat(*values))
+
+
+def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
+    """Return the height of a station over a wall, which may have grown [mm]."""
+    X = observed.pose(wall.part, wall.deviation)
+    place = X.R.T @ (observed.position(station) - X.t)
+    return wall.side * distance(wall.surface, place) - face_height(wall.deviation, observed.deviations)
+
+
+def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
+    """Return the signed distance [mm] of a place (3, 1) from a surface: AnalyticSurface.distance as an expression."""
+    offset, axis = place - ca.DM(surface.origin), ca.DM(surface.axis)
+    along = ca.dot(axis, offset)
+    across = offset - along * axis
+    if isinstance(surface, Plane):
+        return surface.height(0.0, along)  # type: ignore[no-any-return]
+    if isinstance(surface, Sphere):
+        return surface.height(ca.norm_2(offset), 0.0)  # type: ignore[no-any-return]
+    if isinstance(surface, Torus):
+        tube = ca.norm_2(ca.vertcat(ca.norm_2(across) - surface.radius, along))
+        return surface.height(tube, along)  # type: ignore[no-any-return]
+    return surface.height(ca.norm_2(across), along)  # type: ignore[no-any-return]
+
+
+def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
+    first, second = clearance.first, clearance.second
+    X_RM = relative(observed.pose(first.part, first.deviation), observed.pose(second.part, second.deviation))
+    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (first, second)))
+    gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, ca.SX.zeros(len(clearance.points)))
+    return least(ca.vertsplit(gaps))
+
+
+def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
+    first, second = (
+        [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends] for axis in (pair.first, pair.second)
+    )
+    a, b = (first[0] + first[1]) / 2, (second[0] + second[1]) / 2
+    v = observed.pose(pair.second.part, pair.second.deviation).R @ ca.DM(pair.second.direction)
+    if pair.along is not None:
+        return ca.dot(ca.DM(pair.along), b - a + ca.dot(a - b, v) * v)
+    if pair.across is not None:
+        n = ca.SX(ca.DM(pair.across))
+        v = v if pair.second.direction.any() else n
+        return ca.norm_2(b - a + ca.dot(a - b, n) / ca.dot(v, n) * v)
+    shortest = segment_distance(first, second)
+    if not pair.is_between_surfaces:
+        return shortest
+    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.first, pair.second))
+    return shortest - grown
+
+
+def segment_distance(first: Sequence[ca.SX], second: Sequence[ca.SX]) -> ca.SX:
+    """Return the shortest distance [mm] of two segments between ends (3, 1); parallel ones are no exception.
+
+    It is the least of five: from each end to the other segment, and between the places where the two lines are nearest if
+    both lie between the ends (Ericson, Real-Time Collision Detection, 5.1.9). All are distances of places of both segments, so
+    where lines are almost parallel, and these places uncertain, none is too short.
+    """
+    p, q, r = first[1] - first[0], second[1] - second[0], second[0] - first[0]
+    pp, qq, pq = ca.dot(p, p), ca.dot(q, q), ca.dot(p, q)
+
+    def squared(s: ca.SX | float, t: ca.SX | float) -> ca.SX:
+        return ca.sumsqr(r + t * q - s * p)
+
+    def on_first(t: ca.SX | float) -> ca.SX:
+        return _clipped(ca.dot(p, r + t * q) / ca.fmax(pp, MIN_SQUARE))
+
+    def on_second(s: ca.SX | float) -> ca.SX:
+        return _clipped(ca.dot(q, s * p - r) / ca.fmax(qq, MIN_SQUARE))
+
+    inner = _clipped((ca.dot(p, r) * qq - ca.dot(q, r) * pq) / ca.fmax(pp * qq - pq**2, MIN_SQUARE))
+    squares = [squared(s, on_second(s)) for s in (0.0, 1.0, inner)] + [squared(on_first(t), t) for t in (0.0, 1.0)]
+    return ca.sqrt(least(squares))
+
+
+def _clipped(share: ca.SX) -> ca.SX:
+    return ca.fmin(ca.fmax(share, 0), 1)
+
+
+def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
+    """Return the angle [rad] by atan2 of sine and cosine, which keeps its digits where the cosine is 1."""
+    faces = (pair.first, pair.second)
+    u, v = (
+        observed.pose(face.part, face.deviation).R @ ca.DM(direction)
+        for face, direction in zip(faces, pair.directions, strict=True)
+    )
+    if pair.about is None:
+        return ca.atan2(ca.norm_2(ca.cross(u, v)), ca.dot(u, v))
+    n = ca.DM(pair.about)
+    return ca.atan2(ca.dot(n, ca.cross(u, v)), ca.dot(u, v) - ca.dot(u, n) * ca.dot(v, n))
+
+
+def _combined(combined: Combined, observed: Observed) -> ca.SX:
+    values = [
+        value_of(operand, observed) if isinstance(operand, NominalMeasurement) else observed.measures[operand]
+        for operand in combined.operands
+    ]
+    return COMBINATIONS[combined.kind](ca.vertcat(*values))
+
+
+EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
+    Heights: _least_height, RoundClearance: _round_clearance, AxisPair: _axis_distance, DirectionPair: _angle,
+    Combined: _combined,
+}  # fmt: skip
+COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
+    "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,
+    "difference": lambda values: values[0] - values[1],
+}  # fmt: skip

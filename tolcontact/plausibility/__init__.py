@@ -1,0 +1,55 @@
+"""Look at the nominal assembly as an experienced colleague would, and warn of probable mistakes. A chapter of the guide.
+
+A model without faults may still not be the assembly that you mean. `tolcontact check`, `tolcontact run`, the analyses and
+`tc.build` issue a `tc.NominalWarning` for everything below. Each one names the declaration with the line of the script, states
+the number, and says what probably caused it. Nothing is changed, and the run goes on.
+
+>>> import warnings
+>>> import tolcontact as tc
+>>> stand = tc.Assembly("stand")
+>>> table = stand.part("table", tc.Box(100, 50, 10), fixed=True)
+>>> block = stand.part("block", tc.Box(50, 25, 10), at=(20, 12.5, 5))
+>>> scheme = tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"))
+>>> location = stand.locate(block, scheme, tolerance=0.2)
+>>> pair = stand.contact("interface", moving=block.face("-z"), reference=table.face("+z"))
+>>> height = stand.measure("height", block.point(50, 0, 10), along="z", limits=(14.5, 15.5))
+>>> with warnings.catch_warnings(record=True) as caught:
+...     program = tc.build(stand)
+>>> for warning in caught:
+...     print(warning.message)
+[overlap] contact pair "interface" (...): its faces overlap by 5 mm in the nominal assembly, far beyond what varies there ...
+[limits] measure "height" (...): its nominal value 0 is outside of its limits (14.5 to 15.5 mm); it measures the displacement
+from the nominal place; absolute=True measures the coordinate
+
+| kind | what is looked at |
+|---|---|
+| `[angle]` | rotations beyond a full turn, or beyond half a turn in whole numbers: these are probably degrees |
+| `[point]` | points of locators, measures and forces that lie off their part by more than a quarter of its size |
+| `[direction]` | locators whose directions would fit in the assembly frame; one-sided ones that point out of their part |
+| `[tolerance]` | zones wider than half of their part; locators that turn their part by more than 45 degrees at three sigma |
+| `[overlap]` | faces of a contact pair, or bodies that are no pair, that lie in each other |
+| `[gap]` | faces of a contact pair that are too far apart to touch |
+| `[limits]` | limits that exclude the nominal value, or that are more than 100 sigma away from it |
+
+The faces of a pair overlap if their deepest point stays inside in nearly every realization without contact: the median of its
+gap is more than three sigma below 0. They are too far apart if the smallest gap exceeds 30 sigma and the distance by which
+other contact may push them. Both come from 128 draws without contact. With the objective "seating" forces close gaps, so none
+is too large. The overlap of two bodies is the diameter of the largest ball that lies in both; it counts from a fiftieth of the
+thinner body on, and beyond the height of round faces over their triangles. Bodies that are not closed are left out.
+
+## Silence
+
+A warning that describes what you mean is silenced by its kind and its name, with Python's own filter, in the script:
+
+>>> with warnings.catch_warnings(record=True) as caught:
+...     warnings.filterwarnings("ignore", r"\\[overlap\\] contact pair .interface.", tc.NominalWarning)
+...     program = tc.build(stand)
+>>> [str(warning.message)[:8] for warning in caught]
+['[limits]']
+
+In a shell, `PYTHONWARNINGS="ignore:[overlap]" tolcontact run model.py` silences a kind for one command.
+"""
+
+from tolcontact.plausibility.nominal_check import KINDS, warn_of_nominal
+
+__all__ = ["KINDS", "warn_of_nominal"]

@@ -1,0 +1,38 @@
+"""Bodies that lie in each other, and are no contact pair."""
+
+import itertools
+from collections.abc import Iterator
+
+import numpy as np
+
+from tolcontact.errors import designation
+from tolcontact.geometry.body_overlap import SolidBody, common_ball
+from tolcontact.plausibility.trial_draws import TrialDraws
+
+MIN_SHARE = 0.02  # of the thinner body: thinner overlaps are not looked for
+FACET_FACTOR = 2.0  # times the height of round faces over their triangles
+MAX_COMPARED = 1000  # pairs of bodies whose boxes overlap
+
+
+def body_overlaps(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each two bodies without a contact pair that overlap in the nominal assembly."""
+    nominal = draws.program.nominal
+    in_contact = {frozenset((pair.moving, pair.reference)) for pair in nominal.pairs}
+    bodies = [SolidBody(part.body) for part in nominal.parts]
+    bounds = np.array([body.bounds for body in bodies])
+    thickness = (bounds[:, 1] - bounds[:, 0]).min(axis=1)
+    common = np.minimum(bounds[:, None, 1], bounds[None, :, 1]) - np.maximum(bounds[:, None, 0], bounds[None, :, 0])
+    min_overlap = MIN_SHARE * np.minimum(thickness[:, None], thickness[None])
+    candidates = np.argwhere(np.triu((common > min_overlap[..., None]).all(axis=2), 1))
+    for i, j in itertools.islice(candidates, MAX_COMPARED):
+        if {i, j} in in_contact or not (bodies[i].is_closed and bodies[j].is_closed):
+            continue
+        facets = FACET_FACTOR * (bodies[i].facet_height + bodies[j].facet_height)
+        ball = common_ball(bodies[i], bodies[j], max(float(min_overlap[i, j]), facets))
+        if ball is not None:
+            diameter, place = ball
+            yield (
+                f'{designation("part", nominal.parts[i].part)}: it overlaps part "{nominal.parts[j].name}" by about '
+                f"{diameter:.2g} mm near ({', '.join(f'{c:.4g}' for c in place)}) in the nominal assembly, and they are no "
+                "contact pair; check their places, or declare their contact"
+            )

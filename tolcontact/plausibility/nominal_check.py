@@ -1,0 +1,32 @@
+"""The look at the nominal assembly: all kinds of warnings, by their names."""
+
+import warnings
+from collections.abc import Callable, Iterator
+
+from tolcontact.compilation import Program
+from tolcontact.errors import NominalWarning, shown
+from tolcontact.plausibility.body_overlaps import body_overlaps
+from tolcontact.plausibility.declared_points import far_points, unfit_directions
+from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
+from tolcontact.plausibility.measure_limits import measure_limits
+from tolcontact.plausibility.pair_gaps import pair_clearances, pair_overlaps
+from tolcontact.plausibility.trial_draws import TrialDraws
+
+KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
+    "angle": (rotations,),
+    "point": (far_points,),
+    "direction": (unfit_directions,),
+    "tolerance": (wide_tolerances,),
+    "overlap": (pair_overlaps, body_overlaps),
+    "gap": (pair_clearances,),
+    "limits": (measure_limits,),
+}
+
+
+def warn_of_nominal(program: Program) -> None:
+    """Issue a NominalWarning for everything in the nominal assembly that is probably a mistake."""
+    draws = TrialDraws.of(program)
+    for kind, checks in KINDS.items():
+        for check in checks:
+            for sentence in check(draws):
+                warnings.warn(f"[{kind}] {shown(sentence)}", NominalWarning, stacklevel=4)

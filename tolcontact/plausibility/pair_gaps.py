@@ -1,0 +1,65 @@
+"""Nominal gaps and overlaps of contact pairs, beside what varies."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from tolcontact.discretization import ContactPoints
+from tolcontact.errors import designation
+from tolcontact.plausibility.trial_draws import SIGMAS, TrialDraws, spread
+
+FAR_SIGMAS = 30.0  # of a gap: contact beyond does not act
+MIN_SHARE = 1e-5  # of a face's size: overlaps and gaps below are rounding of coordinates
+MIN_RANGE_SHARE = 0.05  # of the smallest tolerance range
+
+
+def pair_overlaps(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each contact pair whose faces lie in each other in nearly every realization."""
+    for k, pair, noise in _face_pairs(draws):
+        gaps = draws.nominal_gaps(k)
+        deepest = int(gaps.argmin())
+        if gaps[deepest] < -noise:
+            varying = draws.gaps(k, np.array([deepest]))[:, 0]
+            sigma = float(spread(varying))
+            if float(np.median(varying)) + SIGMAS * sigma < 0:
+                yield (
+                    f"{_place(draws, k)}: its faces overlap by {-gaps[deepest]:.3g} mm in the nominal assembly, far beyond "
+                    f"what varies there (3 sigma {SIGMAS * sigma:.2g} mm); check the places and sizes of "
+                    f'"{_name(draws, pair.moving)}" and "{_name(draws, pair.reference)}"'
+                )
+
+
+def pair_clearances(draws: TrialDraws) -> Iterator[str]:
+    """Yield a sentence for each contact pair whose faces are too far apart to touch in any realization."""
+    if draws.program.method.minimizes.presses:  # forces close gaps
+        return
+    for k, pair, noise in _face_pairs(draws):
+        nominal = float(draws.nominal_gaps(k).min())
+        if nominal <= noise:
+            continue
+        least = draws.gaps(k, np.arange(len(pair.P_m))).min(axis=1)
+        sigma = float(spread(least))
+        if float(least.min()) > draws.pushed_by_others(k) + FAR_SIGMAS * sigma:
+            yield (
+                f"{_place(draws, k)}: its faces are {nominal:.3g} mm apart in the nominal assembly, and vary by "
+                f"{SIGMAS * sigma:.2g} mm (3 sigma), so they never touch; check the places of "
+                f'"{_name(draws, pair.moving)}" and "{_name(draws, pair.reference)}", or leave the pair out'
+            )
+
+
+def _face_pairs(draws: TrialDraws) -> Iterator[tuple[int, ContactPoints, float]]:
+    """Yield the pairs of faces with their numbers, and the gaps [mm] that are rounding or error of triangles."""
+    smallest = draws.program.nominal.assembly.smallest_zone()
+    for k, pair in enumerate(draws.program.nominal.pairs):
+        if pair.moving_face is not None and pair.reference_face is not None and len(draws.deviations):
+            size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
+            share = MIN_RANGE_SHARE * smallest if np.isfinite(smallest) else 0.0
+            yield k, pair, max(2 * pair.facets, pair.bulge, MIN_SHARE * size, share)
+
+
+def _place(draws: TrialDraws, k: int) -> str:
+    return designation("contact pair", draws.program.nominal.assembly.pairs[k])
+
+
+def _name(draws: TrialDraws, part: int | None) -> str:
+    return draws.program.nominal.parts[part or 0].name

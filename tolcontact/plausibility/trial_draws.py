@@ -1,0 +1,75 @@
+"""Some draws of a model without contact: how far gaps and measures vary."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Float
+from tolcontact.compilation import Program
+from tolcontact.compilation.bounded_pairs import TRIAL_SEED, push
+
+DRAWS = 128
+POINTS_AT_ONCE = 100_000
+SIGMAS = 3.0  # of a gap or a measure: as far as it varies in nearly all realizations
+
+
+@dataclass(frozen=True, eq=False)
+class TrialDraws:
+    """Draws of a program, placed without contact.
+
+    deviations   (draw, contributor)
+    relative     (draw, pair, 12): X_RM of every pair
+    measured     (draw, measure)
+    """
+
+    program: Program
+    deviations: Float[Array, "n contributor"]
+    relative: Float[Array, "n pair 12"]
+    measured: Float[Array, "n measure"]
+
+    @classmethod
+    def of(cls, program: Program) -> "TrialDraws":
+        """Return the draws of a program, without those that have no finite pose."""
+        deviations = program.draws(seed=TRIAL_SEED, start=0, stop=DRAWS)
+        observed = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)
+        relative = observed["relative"].reshape(len(deviations), len(program.nominal.pairs), pose.ENTRIES)
+        finite = np.isfinite(relative).all(axis=(1, 2)) & np.isfinite(observed["measured"]).all(axis=1)
+        return cls(program, deviations[finite], relative[finite], observed["measured"][finite])
+
+    def nominal_gaps(self, k: int) -> Float[Array, " point"]:
+        """Return the gaps (point,) [mm] of pair k in the nominal assembly."""
+        return self._gaps(k, pose.AT_REST[None], np.zeros((1, self.deviations.shape[1])))[0]
+
+    def gaps(self, k: int, points: np.ndarray) -> Float[Array, "n point"]:
+        """Return the gaps (draw, point) [mm] of some points of pair k."""
+        return self._gaps(k, self.relative[:, k], self.deviations, points)
+
+    def _gaps(self, k: int, X_RM: np.ndarray, deviations: np.ndarray, points: np.ndarray | None = None) -> np.ndarray:
+        pair = self.program.nominal.pairs[k]
+        chosen_points = np.arange(len(pair.P_m)) if points is None else points
+        if pair.round is not None:
+            return np.asarray(self.program.round_gaps[k](X_RM=X_RM, deviations=deviations)["gaps"])[:, chosen_points]
+        P_m, P_r, n_r = pair.P_m[chosen_points], pair.P_r[chosen_points], pair.n_r[chosen_points]
+        return ((pose.apply(X_RM, P_m) - P_r) * n_r).sum(axis=2) - pair.heights(deviations)[:, None]
+
+    @cached_property
+    def pushes(self) -> list[float]:
+        """How far [mm] contact of each pair may push its parts, and forces may press them."""
+        presses = self.program.method.minimizes.presses
+        return [
+            push(pair, self.relative[:, k], self.deviations, presses=presses)
+            for k, pair in enumerate(self.program.nominal.pairs)
+        ]
+
+    def pushed_by_others(self, k: int) -> float:
+        """Return how far [mm] the other contact of the group of pair k may push its parts."""
+        groups = [group.group.pairs for group in self.program.groups if k in group.group.pairs]
+        return sum(self.pushes[other] for pairs in groups for other in pairs if other != k)
+
+
+def spread(values: Float[Array, "n ..."]) -> Float[Array, "..."]:
+    """Return the standard deviation of draws (draw, ...) from the quantiles at one sigma, which far values do not move."""
+    low, high = np.quantile(values, (0.1587, 0.8413), axis=0)
+    return np.asarray((high - low) / 2)

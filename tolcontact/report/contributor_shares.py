@@ -1,0 +1,108 @@
+"""The contributors of each measurement, from the draws of the run itself: linear shares of variance, with contact."""
+
+import json
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.report.figures import grouped, percent
+from tolcontact.statistics.linear_shares import MIN_R2, LinearShares, linear_shares, required_realizations
+
+MAX_REALIZATIONS = 20_000  # that shares are estimated from; more would not change what is read
+MAX_CONTRIBUTORS = 1000  # of a regression that takes seconds
+
+
+class ContributorShares(NamedTuple):
+    """The shares of the contributors of one measurement, the largest first, and what to know about them.
+
+    groups   contributors, or features with all their freedoms, joined if they are drawn together
+    shares   (group, interval) of the variance with contact; empty if none are shown
+    note     a sentence: R^2, or the reason why no shares are shown
+    """
+
+    groups: list[str]
+    shares: np.ndarray
+    note: str
+
+
+def contributor_shares(results: xr.DataTree, realizations: int) -> list[ContributorShares]:
+    """Return the shares of each measurement of a run with this number of finished realizations."""
+    names = results.to_dataset()[terms.MEASURE].values
+    sample = results["sample"].to_dataset()
+    if terms.DEVIATION.name not in sample:
+        return [_without("The archive has no deviations of contributors (run with --keep all).")] * len(names)
+    selection = {terms.REALIZATION: slice(min(realizations, MAX_REALIZATIONS))}
+    x = sample[terms.DEVIATION.name].isel(selection).values
+    columns = np.flatnonzero(np.ptp(x, axis=0) > 0)
+    if not columns.size:
+        return [_without("No contributor varies.")] * len(names)
+    required = required_realizations(len(columns))
+    if len(x) < required or len(columns) > MAX_CONTRIBUTORS:
+        reason = f"Shares of {grouped(len(columns))} contributors cannot be estimated from {grouped(len(x))} realizations"
+        advice = f"at least {grouped(required)} are needed" if len(x) < required else "use tolcontact contributions"
+        return [_without(f"{reason}; {advice}.")] * len(names)
+    members = _groups(results, sample, columns)
+    y = results.to_dataset()[terms.MEASURED.name].isel(selection).values[:, terms.CORRECTED]
+    shares = linear_shares(x[:, columns], y, list(members.values()))
+    return [_shown(list(members), of_measure, len(x)) for of_measure in shares]
+
+
+def _shown(names: list[str], shares: LinearShares | None, count: int) -> ContributorShares:
+    if shares is None:
+        return _without("The measurement does not vary, or is not a number.")
+    r2 = percent(shares.r2)
+    if not shares.r2[0] >= MIN_R2:
+        return _without(
+            f"A linear model explains only {r2} of the variance with contact, so linear shares would mislead; "
+            "tolcontact contributions finds the shares of nonlinear measurements."
+        )
+    order = np.argsort(-shares.shares[:, 0], kind="stable")
+    note = (
+        f"Shares of the variance with contact, by linear regression on {grouped(count)} realizations, which explains {r2}; "
+        "the rest is due to contact and other nonlinearities."
+    )
+    return ContributorShares([names[k] for k in order], shares.shares[order], note)
+
+
+def _without(note: str) -> ContributorShares:
+    return ContributorShares([], np.zeros((0, len(terms.ESTIMATE))), note)
+
+
+def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the positions in `columns` of each group, by name."""
+    labels = [str(label) for label in sample[sample[terms.DEVIATION.name].dims[-1]].values]
+    is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have locators alone
+    sources = sample[terms.CONTRIBUTOR_SOURCE.name].values if is_stated else np.full(len(labels), "locator")
+    of_features = np.isin(sources, ("feature", "datum"))
+    owners = [label.rpartition(".")[0] if is_of else label for label, is_of in zip(labels, of_features, strict=True)]
+    leader = {owner: owner for owner in owners}
+
+    def find(owner: str) -> str:
+        while leader[owner] != owner:
+            owner = leader[owner]
+        return owner
+
+    owner_of = dict(zip(labels, owners, strict=True))
+    for together in _drawn_together(results):
+        known = [find(owner_of[label]) for label in together if label in owner_of]
+        for owner in known[1:]:
+            leader[find(owner)] = find(known[0])
+    members: dict[str, list[int]] = {}
+    for position, column in enumerate(columns):
+        members.setdefault(find(owners[column]), []).append(position)
+    names = {key: " + ".join(dict.fromkeys(owners[columns[k]] for k in positions)) for key, positions in members.items()}
+    return {names[key]: np.array(positions) for key, positions in members.items()}
+
+
+def _drawn_together(results: xr.DataTree) -> Iterator[list[str]]:
+    """Yield labels of contributors that the model declares to depend on each other."""
+    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+    for correlation in document.get("correlations", []):
+        yield list(correlation["labels"])
+    for variable in document.get("variables", []):
+        yield [variable["name"], *variable["drives"]]
+    for population in document.get("populations", []):
+        yield list(population["columns"] or population["values"])

@@ -1,0 +1,167 @@
+"""The tables of a declared model as its archive holds it: parts, features, locators, contact pairs and measurements."""
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.declaration.document import tolerance_of_entry
+from tolcontact.errors import ArchiveError
+from tolcontact.report.figures import plain
+
+Entry = dict[str, Any]
+Cell = str | float | None
+
+
+class ModelTable(NamedTuple):
+    """A table of declared things; numbers stay numbers, and missing cells are None."""
+
+    title: str
+    columns: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+
+    @property
+    def texts(self) -> list[list[str]]:
+        """The rows as texts."""
+        return [[cell_text(cell) for cell in row] for row in self.rows]
+
+    @property
+    def is_number(self) -> list[bool]:
+        """Whether each column has numbers."""
+        return [any(isinstance(row[k], float) for row in self.rows) for k in range(len(self.columns))]
+
+
+def cell_text(cell: Cell) -> str:
+    """Return a cell as a text."""
+    return "" if cell is None else plain(cell) if isinstance(cell, float) else cell
+
+
+def model_tables(results: xr.DataTree) -> list[ModelTable]:
+    """Return the tables of the model that have rows. Raises ArchiveError for a declaration that no run wrote."""
+    document = json.loads(str(results["model"][terms.DECLARATION.name].values))
+    makers: tuple[Callable[[Entry, xr.DataTree], ModelTable], ...] = (_parts, _features, _locators, _pairs, _measurements)
+    try:
+        tables = [make(document, results) for make in makers]
+    except (LookupError, TypeError, ValueError) as error:
+        raise ArchiveError(f"the declared model in the archive is damaged: {type(error).__name__}: {error}") from error
+    return [_filled(table) for table in tables if table.rows]
+
+
+def _filled(table: ModelTable) -> ModelTable:
+    """Return a table without columns that are empty in all rows."""
+    kept = [k for k in range(len(table.columns)) if any(row[k] not in (None, "") for row in table.rows)]
+    return ModelTable(table.title, [table.columns[k] for k in kept], [[row[k] for k in kept] for row in table.rows])
+
+
+def _parts(document: Entry, results: xr.DataTree) -> ModelTable:
+    supports = {location["part"]: location["on"] or "the ground" for location in document["locations"]}
+    rows = []
+    for part in document["parts"]:
+        geometry = part["geometry"]
+        shape = f"box {_triple(geometry['box'])} mm" if "box" in geometry else str(next(iter(geometry.values())))
+        held = "fixed" if part.get("fixed") else f"located on {supports.get(part['name'], 'nothing')}"
+        rows.append([part["name"], shape, _triple(part["at"]), held])
+    return ModelTable("Parts", ["part", "shape", "position, mm", "held"], rows)
+
+
+def _features(document: Entry, results: xr.DataTree) -> ModelTable:
+    rows = [
+        [
+            part["name"],
+            f"{feature['name']} ({len(feature['members'])} members)" if "members" in feature else feature["name"],
+            feature.get("datum") or "",
+            "\n".join(str(tolerance_of_entry(entry)) for entry in feature["tolerances"]),
+        ]
+        for part in document["parts"]
+        for feature in part.get("features", [])
+    ]
+    targets = [
+        [part["name"], f"{len(target['targets'])} datum targets", target["datum"], ""]
+        for part in document["parts"]
+        for target in part.get("datum_targets", [])
+    ]
+    return ModelTable("Features, datums and tolerances", ["part", "feature", "datum", "tolerances, mm"], rows + targets)
+
+
+def _locators(document: Entry, results: xr.DataTree) -> ModelTable:
+    sample = results["sample"].to_dataset()
+    if terms.LOCATOR_POINT.name not in sample:
+        return ModelTable("", [], [])
+    labels = [str(label) for label in sample[terms.LOCATOR].values]
+    dim = sample[terms.TOLERANCE_RANGE.name].dims[0]
+    numbers = {str(label): k for k, label in enumerate(sample[dim].values)}
+    rows: list[list[Cell]] = []
+    for k, label in enumerate(labels):
+        part, _, name = label.rpartition(".")
+        at, along = (sample[v.name].values[k] for v in (terms.LOCATOR_POINT, terms.LOCATOR_DIRECTION))
+        width = float(sample[terms.TOLERANCE_RANGE.name].values[numbers[label]])
+        is_stated = terms.DISTRIBUTION.name in sample and sample[terms.DISTRIBUTION.name].dims == (dim,)
+        distribution = str(sample[terms.DISTRIBUTION.name].values[numbers[label]]) if is_stated else ""
+        one_sided = terms.ONE_SIDED.name in sample and bool(sample[terms.ONE_SIDED.name].values[k])
+        kind = "one-sided" if one_sided else "two-sided"
+        rows.append([part, name, _triple(at), _triple(along), width if math.isfinite(width) else None, distribution, kind])
+    columns = ["part", "locator", "point, mm", "direction", f"{terms.ZONE_WIDTH}, mm", "distribution", "held"]
+    return ModelTable("Locators", columns, rows)
+
+
+def _pairs(document: Entry, results: xr.DataTree) -> ModelTable:
+    contact = results["contact"].to_dataset()
+    counts = np.zeros(0, dtype=int)
+    if terms.PAIR_OF_POINT.name in contact:
+        counts = np.bincount(contact[terms.PAIR_OF_POINT.name].values, minlength=len(document["pairs"]))
+    rows = [
+        [pair["name"], pair["moving"]["part"], pair["reference"]["part"], float(counts[k]) if k < len(counts) else None]
+        for k, pair in enumerate(document["pairs"])
+    ]
+    return ModelTable("Contact pairs", ["contact pair", "moving part", "reference part", "contact points"], rows)
+
+
+def _measurements(document: Entry, results: xr.DataTree) -> ModelTable:
+    root = results.to_dataset()
+    rows: list[list[Cell]] = []
+    for k, measure in enumerate(document["measures"]):
+        lower, upper = (
+            float(root[variable.name].values[k]) if variable.name in root else math.nan
+            for variable in (terms.LOWER_LIMIT, terms.UPPER_LIMIT)
+        )
+        scale = upper - lower if math.isfinite(upper - lower) else None
+        along = "" if measure.get("along") is None else _triple(measure["along"])
+        nominal = plain(float(root[terms.MEASURE_NOMINAL.name].values[k]), scale)
+        rows.append(
+            [
+                measure["name"], _of(measure), _end(measure.get("to")), along, str(measure["units"]),
+                *(float(text) if text else None for text in (nominal, plain(lower, scale), plain(upper, scale))),
+            ]
+        )  # fmt: skip
+    columns = [terms.MEASUREMENT, "of", "to", "along", "units", "nominal", "lower limit", "upper limit"]
+    return ModelTable("Measurements", columns, rows)
+
+
+def _of(measure: Entry) -> str:
+    if "of" not in measure:
+        return "expression of the poses"
+    return f"{measure['of']['kind']} of {', '.join(_named(measure['of']))}" if "kind" in measure["of"] else _end(measure["of"])
+
+
+def _named(entry: Any) -> list[str]:
+    """Return the parts of the faces and points of a measurement, or the names of its measures, each once."""
+    if isinstance(entry, str):
+        return [entry]
+    if "part" in entry:
+        return [str(entry["part"])]
+    operands = entry.get("measurements", [value for value in entry.values() if isinstance(value, dict)])
+    return list(dict.fromkeys(name for operand in operands for name in _named(operand)))
+
+
+def _end(point: Entry | None) -> str:
+    if point is None:
+        return ""
+    return f"{point['part']} {_triple(point['position'])}" if "position" in point else f"{point['part']}, end of an axis"
+
+
+def _triple(values: Sequence[float]) -> str:
+    return f"({', '.join(plain(float(value), 1.0) for value in values)})"

@@ -1,0 +1,144 @@
+"""The table of results: figures and a verdict for each measurement, for terminal, page and spreadsheet alike."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from tolcontact import vocabulary as terms
+from tolcontact.report.figures import grouped, number, plain
+from tolcontact.statistics.verdict import FAILS, UNDECIDED, Verdict, verdict
+
+PPM_BELOW = 0.01  # if all shares are smaller, the table states them in ppm
+DIGITS_OF_COUNTS = 2  # of a number of realizations that would decide
+STATISTICS = (terms.MEAN, terms.STANDARD_DEVIATION, terms.PPK, terms.BELOW, terms.ABOVE)
+
+
+COLUMNS = (
+    terms.MEASUREMENT, "verdict", "nominal", "lower limit", "upper limit", "contact", "mean", "sigma", terms.PPK,
+)  # fmt: skip
+SIDES = ("below", "above")
+
+
+class StateFigures(NamedTuple):
+    """The figures of a measurement in one state, as (estimate, lower, upper) of `STATISTICS`, and as texts."""
+
+    state: str
+    values: np.ndarray
+    cells: list[str]
+
+
+class ResultRow(NamedTuple):
+    """What the table says of a measurement.
+
+    verdict   "" without limits
+    states    with contact first
+    """
+
+    name: str
+    units: str
+    quantity: str
+    verdict: str
+    is_good: bool | None
+    nominal: float
+    lower: float
+    upper: float
+    limits: tuple[str, str, str]
+    states: list[StateFigures]
+
+
+def share_units(summary: xr.Dataset) -> str:
+    """Return the units of all shares out of specification in a table, "%" or "ppm"."""
+    shares = summary["statistic_value"].sel(statistic=terms.OUTSIDE, interval="estimate").values
+    return "%" if np.nan_to_num(shares).max(initial=0.0) >= PPM_BELOW else "ppm"
+
+
+def share_in(values: np.ndarray, units: str) -> str:
+    """Return a share (estimate, lower, upper) in "%" or "ppm", with its interval and without the units."""
+    if not math.isfinite(values[0]):
+        return "-"
+    if units == "ppm":
+        estimate, lower, upper = (grouped(round(1e6 * float(value))) for value in values)
+        return f"{estimate} [{lower}, {upper}]"
+    return number(100 * np.asarray(values), max_decimals=2)
+
+
+def with_units(values: np.ndarray, units: str) -> str:
+    """Return a share (estimate, lower, upper) in "%" or "ppm", with its interval and its units."""
+    return share_in(values, units).replace(" [", f" {units} [")
+
+
+def share_heading(summary: xr.Dataset) -> str:
+    """Return the heading above the last two columns of the table, `SIDES`."""
+    return f"{terms.OUT_OF_SPECIFICATION}, {share_units(summary)}"
+
+
+def result_rows(summary: xr.Dataset) -> list[ResultRow]:
+    """Return what the table says of each measurement."""
+    return [_row(summary.sel(measure=name), summary) for name in summary["measure"].values]
+
+
+def _row(measure: xr.Dataset, summary: xr.Dataset) -> ResultRow:
+    opinion = verdict_of(measure, summary.attrs["realizations"])
+    nominal, lower, upper = (float(measure[name].values) for name in (terms.MEASURE_NOMINAL.name, *terms.MEASURE_LIMITS[:2]))
+    scale = upper - lower if math.isfinite(upper - lower) else None
+    return ResultRow(
+        str(measure["measure"].values),
+        str(measure["measure_units"].values),
+        str(measure["measure_quantity"].values),
+        verdict_text(opinion),
+        None if opinion is None or opinion.word == UNDECIDED else opinion.word != FAILS,
+        nominal,
+        lower,
+        upper,
+        (plain(nominal, scale), plain(lower, scale), plain(upper, scale)),
+        [_state_figures(measure.sel(state=state), share_units(summary)) for state in reversed(terms.STATES)],
+    )
+
+
+def _state_figures(of_state: xr.Dataset, units: str) -> StateFigures:
+    values = of_state["statistic_value"].sel(statistic=list(STATISTICS)).transpose("statistic", "interval").values
+    below, above = (share_in(share, units) for share in values[3:])
+    return StateFigures(terms.WORD_OF_STATE[str(of_state["state"].values)], values, [*map(number, values[:3]), below, above])
+
+
+def verdict_of(measure: xr.Dataset, realizations: int) -> Verdict | None:
+    """Return the verdict on one measure of a summary; None without limits."""
+    return verdict(measure["statistic_value"].sel(state=terms.STATES[1], statistic=terms.OUTSIDE).values, realizations)
+
+
+def verdict_text(opinion: Verdict | None) -> str:
+    """Return a verdict in words; "" without one."""
+    if opinion is None:
+        return ""
+    if opinion.word != UNDECIDED:
+        return opinion.word
+    if not math.isfinite(opinion.more):
+        return f"{UNDECIDED}: too close to call"
+    digits = DIGITS_OF_COUNTS - len(str(int(opinion.more)))
+    return f"{UNDECIDED}: about {grouped(int(round(opinion.more, min(digits, 0))))} more realizations"
+
+
+def verdict_lines(summary: xr.Dataset) -> Iterator[str]:
+    """Yield the verdict on each measurement that has limits."""
+    for name in summary["measure"].values:
+        if text := verdict_text(verdict_of(summary.sel(measure=name), summary.attrs["realizations"])):
+            yield f"{name}: {text} its limits" if not text.startswith(UNDECIDED) else f"{name}: {text}"
+
+
+def overview_columns() -> list[str]:
+    """Return the headings of the short table of a terminal."""
+    return ["", "mean", "6 sigma", terms.PPK, terms.OUT_OF_SPECIFICATION_COLUMN]
+
+
+def overview_rows(summary: xr.Dataset) -> list[list[str]]:
+    """Return rows of each measurement and state: mean, 6 sigma, Ppk and share out of specification."""
+    rows, units = [], share_units(summary)
+    for measure, states in zip(summary["measure"].values, summary["statistic_value"], strict=True):
+        rows.append([str(measure), "", "", "", ""])
+        for word, of_state in zip(terms.STATE_WORDS, states, strict=True):
+            mean, spread, ppk, outside = of_state.sel(statistic=[terms.MEAN, terms.SIX_SIGMA, terms.PPK, terms.OUTSIDE]).values
+            rows.append([f"  {word}", number(mean), number(spread), number(ppk), with_units(outside, units)])
+    return rows

@@ -1,0 +1,80 @@
+"""Linear shares of variance: which contributors a measurement's variance comes from, by regression on the draws of the run.
+
+With deviations x (standardized), a measurement y and least squares y = b0 + b.x + e, the share of a group g of contributors is
+
+    S_g = cov(b_g . x_g, y) / var(y),     and they sum up to R^2 = 1 - var(e) / var(y).
+
+For independent groups S_g is the share of variance that the group explains linearly. Least squares on n realizations with p
+contributors explain (1 - R^2) p / (n - 1 - p) of the variance by chance; each group is relieved of its part of that. What
+contact makes nonlinear is in 1 - R^2, and in no share. Intervals are by the delete-one-block jackknife with Student's t.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.statistics import intervals
+
+BLOCKS = 20  # of the jackknife
+ROWS_PER_CONTRIBUTOR = 5  # fewer realizations give no shares
+MIN_R2 = 0.5  # below, linear shares do not describe a measurement
+
+
+class LinearShares(NamedTuple):
+    """Shares (group, interval) of the variance of a measurement, and its R^2 (interval,), as estimate, lower and upper."""
+
+    shares: np.ndarray
+    r2: np.ndarray
+
+
+def required_realizations(contributors: int) -> int:
+    """Return the smallest number of realizations from which shares are estimated."""
+    return max(ROWS_PER_CONTRIBUTOR * (contributors + 1), 10 * BLOCKS)
+
+
+def linear_shares(x: np.ndarray, y: np.ndarray, groups: Sequence[np.ndarray]) -> list[LinearShares | None]:
+    """Return the shares of groups of columns of `x` (n, contributor) for each column of `y` (n, measure).
+
+    A column of `y` that does not vary, or is not finite, has none. Raises ValueError for too few realizations.
+    """
+    n, count = x.shape
+    if n < required_realizations(count):
+        raise ValueError(f"{n} realizations of {count} contributors; expected at least {required_realizations(count)}")
+    x = (x - x.mean(axis=0)) / x.std(axis=0)
+    is_sound = np.isfinite(y).all(axis=0)
+    y = np.where(is_sound, y, 0.0)
+    y = y - y.mean(axis=0)
+    scale = np.abs(y).max(axis=0)
+    varies = is_sound & (scale > 0)
+    y = y / np.where(varies, scale, 1.0)
+    moments = np.array([_moments(*block) for block in zip(np.array_split(x, BLOCKS), np.array_split(y, BLOCKS), strict=True)])
+    total = moments.sum(axis=0)
+    membership = np.zeros((len(groups), count))
+    for k, group in enumerate(groups):
+        membership[k, group] = 1
+    estimates = _shares(total, count, membership)
+    replicates = np.array([_shares(total - block, count, membership) for block in moments])
+    half = intervals.student(BLOCKS - 1) * np.sqrt((BLOCKS - 1) * replicates.var(axis=0))
+    values = np.stack([estimates, estimates - half, estimates + half], axis=-1)
+    return [LinearShares(values[k, :-1], values[k, -1]) if varies[k] else None for k in range(y.shape[1])]
+
+
+def _moments(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the sums of products of 1, x and y, (1 + contributor + measure) squared."""
+    z = np.column_stack([np.ones(len(x)), x, y])
+    return z.T @ z
+
+
+def _shares(moments: np.ndarray, count: int, membership: np.ndarray) -> np.ndarray:
+    """Return shares (measure, group + 1) from moments; the last one is R^2 of each measure."""
+    n = moments[0, 0]
+    means = moments[0, 1:] / n
+    covariance = moments[1:, 1:] / n - np.outer(means, means)
+    of_x, with_y, of_y = covariance[:count, :count], covariance[:count, count:], covariance[count:, count:].diagonal()
+    slopes = np.linalg.lstsq(of_x, with_y, rcond=1e-10)[0]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        explained = (slopes * with_y / of_y).T  # (measure, contributor)
+        by_chance = (1 - explained.sum(axis=1, keepdims=True)) / (n - 1 - count)
+    adjusted = explained - by_chance
+    return np.column_stack([adjusted @ membership.T, adjusted.sum(axis=1)])
