@@ -93,7 +93,7 @@ def allocate(
         "effect": _effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    limits = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR}
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR}
     return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
