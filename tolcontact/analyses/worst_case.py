@@ -88,7 +88,7 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
         "deviations": region.deviations(best.point).reshape(*shape, -1),
         "bound": farthest_poses(program, region, linear),
         "random": np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1),
-        "agreeing": (values >= (best.value - tolerances)[:, None]).sum(axis=1).reshape(shape),
+        "agreeing": (values >= (values.max(axis=1) - tolerances)[:, None]).sum(axis=1).reshape(shape),
         "ends": ends.reshape(shape),
         "unseen": np.minimum(1.0, ends * (ends + 1) / (effort.random * (effort.random - 1))).reshape(shape),
         "by_status": engine.statuses,
