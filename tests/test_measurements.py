@@ -234,22 +234,29 @@ def rectangles_apart(first, second):
     return np.array(apart)
 
 
-@pytest.mark.parametrize("at", [(15, 10, 11), (-10, -5, 10.5), (20, -15, 11), (-5, -5, 12)])
-def test_the_clearance_of_planes_is_that_of_their_rectangles(at):
-    """Blocks over each other: inside, staggered, crossed, and around."""
-    sizes = {(15, 10, 11): (10, 8, 5), (-10, -5, 10.5): (40, 20, 5), (20, -15, 11): (8, 60, 5), (-5, -5, 12): (60, 60, 5)}
-    x, y, z = sizes[at]
+BLOCKS = {
+    "inside": ((15, 10, 11), (10, 8, 5)), "staggered": ((-10, -5, 10.5), (40, 20, 5)), "across": ((20, -15, 11), (8, 60, 5)),
+    "around": ((-5, -5, 12), (60, 60, 5)), "on three rims": ((20, 0, 10.5), (20, 30, 5)), "equal": ((0, 0, 11), (40, 30, 5)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+@pytest.mark.parametrize("shift", [0.01, 1.0])
+def test_the_clearance_of_planes_is_that_of_their_rectangles(name, shift):
+    """Also after shifts that change which corners lie over the other block, and which edges cross."""
+    at, (x, y, z) = BLOCKS[name]
     assembly, first, second = two(PLANE, tc.Box(x, y, z), at=at)
     assembly.measure("clearance", tc.Clearance(first.face("+z"), second.face("-z")))
     assembly.measure("back", tc.Clearance(second.face("-z"), first.face("+z")))
-    R, t = motions(turn=3e-4, shift=0.01)
+    R, t = motions(turn=3e-4, shift=shift)
+    t = (t * [1, 1, 0.01 / shift]) @ Rotation.from_rotvec(first.rotation).as_matrix().T
     expected = rectangles_apart(
         placed(first, R[:, 0], t[:, 0], [[0, 0, 10], [40, 0, 10], [0, 30, 10]]),
         placed(second, R[:, 1], t[:, 1], [[0, 0, 0], [x, 0, 0], [0, y, 0]]),
     )
     found = observed(assembly, R, t)
-    np.testing.assert_allclose(found, np.column_stack([expected] * 2), atol=3e-6)  # distance times tilt squared
-    assert np.ptp(found[:, 0]) > 0.03
+    np.testing.assert_allclose(found, np.column_stack([expected] * 2), atol=5e-6)  # distance times tilt squared
+    assert np.ptp(found[:, 0]) > 0.03 and (found > 0).all()
     check_invariance(assembly, R, t)
 
 
@@ -385,6 +392,23 @@ def test_contact_keeps_clearances_at_their_stop():
     assert (results["measured"].sel(measure="least") <= results["measured"].sel(measure="clearance")).all()
 
 
+def test_a_clearance_does_not_count_what_hangs_over_a_rim():
+    """The corners of this block are nominally over the table's rim, beyond which it sinks after a shift."""
+    model = tc.Assembly("rim")
+    table = model.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = model.part("block", tc.Box(50, 25, 10), at=(50, 12.5, 10))
+    model.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=1)
+    model.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
+    model.measure("clearance", tc.Clearance(block.face("-z"), table.face("+z")), limits=(0, None))
+    model.measure("gap", tc.Gap(block.point(50, 0, 0), table.face("+z")))
+    results = tc.run(model, samples=400, solver="daqp", surfaces=0)
+    corrected = results["measured"].sel(state="corrected")
+    clearance, gap = (corrected.sel(measure=name).values for name in ("clearance", "gap"))
+    # Contact does not resolve edges that cross at less than a degree: it may leave some micrometres there.
+    assert clearance.min() > -2e-5 and (clearance < -1e-7).mean() < 0.01
+    assert (gap < -1e-4).mean() > 0.05
+
+
 def test_what_an_error_of_gaps_does_to_measures_is_stated():
     results = tc.run(seated(), samples=10, solver="daqp", surfaces=0)
     accuracy = dict(zip(results["measure"].values, results["measure_accuracy"].values, strict=True))
@@ -476,6 +500,10 @@ def faults_of(build):
     return str(refused.value)
 
 
+def nested(depth, measurement):
+    return tc.Sum(nested(depth - 1, measurement), measurement) if depth else measurement
+
+
 BAD = {
     "unknown measure": (lambda m, a, b: m("x", tc.Minimum("earlier", "later")), 'unknown measure "later"; those declared'),
     "a cycle": (
@@ -504,6 +532,7 @@ BAD = {
     "no face": (lambda m, a, b: m("x", tc.Clearance(a.face("+z"), b.point(0, 0, 0))), "second is a Point; expected part.face"),
     "no station": (lambda m, a, b: m("x", tc.Gap(a.face("+z"), b.face(ROUND))), "station is a Face; expected part.point"),
     "no measurement": (lambda m, a, b: m("x", tc.Minimum("earlier", 3)), "int is no measurement"),
+    "nested": (lambda m, a, b: m("x", nested(9, tc.Gap(a.point(0, 0, 0), b.face(ROUND)))), "nested more than 8 deep"),
     "no triangles": (lambda m, a, b: m("x", tc.Gap(a.point(0, 0, 0), b.face("+x"))), "no triangle"),
     "everywhere": (lambda m, a, b: m("x", tc.Angle(a.face(), b.face(ROUND))), "more than one surface"),
     "beside": (

@@ -142,11 +142,12 @@ def test_rotations_that_are_probably_degrees(rotation, is_doubtful):
     assert all("[angle]" in text and "tc.degrees({:g}, {:g}, {:g})".format(*rotation) in text for text in texts)
 
 
-@pytest.mark.parametrize(("direction", "is_doubtful"), [("x", False), ("y", True)])
-def test_a_direction_of_the_assembly_on_a_turned_part(direction, is_doubtful):
+@pytest.mark.parametrize(("directions", "is_doubtful"), [(("x", "y", "-y"), False), (("y", "-x", "x"), True)])
+def test_directions_of_the_assembly_on_a_turned_part(directions, is_doubtful):
     a = tc.Assembly("turned")
-    block = a.part("block", tc.Box(50, 25, 10), rotation=(0, 0, math.pi / 2))
-    sides = [("B1", (0, 5, 5), direction), ("B2", (0, 20, 5), "x"), ("C1", (25, 0, 5), "y")]  # its x is the assembly's y
+    block = a.part("block", tc.Box(50, 25, 10), rotation=(0, 0, math.pi / 2))  # its x is the assembly's y
+    points = [("B1", (0, 5, 5)), ("B2", (25, 0, 5)), ("C1", (10, 25, 5))]
+    sides = [(*point, direction) for point, direction in zip(points, directions, strict=True)]
     a.locate(block, [tc.Locator(*locator) for locator in FEET + sides], tolerance=0.2)
     a.measure("height", block.point(0, 0, 0), along="z")
     texts = warned(a)

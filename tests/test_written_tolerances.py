@@ -195,7 +195,10 @@ def test_units_of_a_measure_are_those_of_its_tolerance():
     model = tc.Assembly("a")
     part = model.part("block", tc.Box(1, 1, 1), fixed=True)
     model.measure("tilt", tilt, units="rad", tolerance="±0.01 rad")
+    model.measure("tilt in degrees", tilt, units="rad", tolerance="+1°/-0.5°")
     assert model.measures[0].tolerance == 0.02
+    assert model.measures[1].tolerance == pytest.approx((-np.pi / 360, np.pi / 180))
+    assert written("±0.5 deg", units="rad") == pytest.approx((-np.pi / 360, np.pi / 360))
     assert tc.check(model) == ()
 
 

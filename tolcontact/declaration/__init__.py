@@ -19,8 +19,7 @@ surface. The source is a file (STL, OBJ, PLY, GLB, STEP) or a
 >>> plate
 part plate: box 60 x 40 x 8 mm at (20, 5, 10)
 
-`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z. A rotation about an oblique axis is a vector along it:
-(30, 0, 30) turns by 42.4 degrees about the bisector of x and z.
+`rotation=tc.degrees(0, 0, 90)` turns a part by 90 degrees about z.
 
 >>> tc.degrees(90), tc.degrees(0, 0, 180)
 (1.5707963267948966, (0.0, 0.0, 3.141592653589793))
@@ -68,8 +67,6 @@ pair (-0.2, 0.4). Unequal ones move the mean to their middle.
 location of plate on the ground: 3-2-1 on plate -z, plate -y, plate -x, 5 mm inside the edges; normal, full width 0.6 mm
 >>> print(tc.Locator("A1", (5, 5, 0), "z", tc.Tolerance(0.1, "uniform")))
 locator A1: (5, 5, 0) along (0, 0, 1), uniform, full width 0.1 mm
->>> print(tc.Tolerance("+0.4/-0.2"))
-normal, full width 0.6 mm, shifted by 0.1 mm
 
 `locate(..., on=other)` positions a part on another part, which then carries it along. With `on=feature` the part also follows
 a feature of the other part as it shifts and tilts: a pin, for example, the axis of the hole that it is pressed into. A part
@@ -172,9 +169,11 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
 | `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
-| `tc.AxisDistance(..., across="z")` | across a direction, at the middle of the first axis; `along="x"`: one component |
-| `tc.Angle(face, face)` | angle of planes or axes, from 0 on; with `about="y"` its sign, positive if turned counterclockwise |
-| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or of measures by name |
+| `tc.AxisDistance(..., across="z")` | their distance in the plane across a direction, through the middle of the first axis |
+| `tc.AxisDistance(..., along="x")` | component of the perpendicular from the middle of the first axis to the second one |
+| `tc.Angle(face, face)` | angle between planes or axes, from 0 on; at most a right angle nominally |
+| `tc.Angle(..., about="y")` | angle about a direction, with its sign: positive if the second face is turned counterclockwise |
+| `tc.Minimum(...)`, `tc.Maximum` | least and largest of several measurements, or measures by name |
 | `tc.Mean`, `tc.Sum`, `tc.Difference` | their mean, their sum, the first less the second |
 
 A face counts beyond its ends, as its whole plane, cylinder, cone, sphere or torus; a face of another kind as its tangent plane
@@ -186,6 +185,7 @@ of the second part, which carry the directions as they tilt.
 >>> least = clamp.measure("least gap", tc.Minimum(*gaps), limits=(-0.1, None))
 >>> play = clamp.measure("play", tc.Clearance(cover.face("-z"), plate.face("+z")))
 >>> lean = clamp.measure("lean", tc.Angle(plate.face("-z"), base.face("+z"), about="y"), tolerance=0.01)
+
 A measurement may lie within one part if it has features with tolerances there: the distance of two holes, the angle of two
 sides. Minima, clearances, and angles and distances that are nominally 0 have a kink in the nominal assembly. There they have no
 derivatives, so `sensitivities` and `contributions` state none for them by a linear model, and `worst` states no bound.

@@ -20,11 +20,13 @@ class Measurement(Readable):
     """A quantity that follows from the poses of parts and the deviations of their features.
 
     kind     its name, in documents and tables
-    units    of its value; empty for those of the measurements that it combines
+    units    of its value; a combination has those of its measurements
+    depth    number of combinations inside each other
     """
 
     kind: ClassVar[str]
     units: ClassVar[str] = "mm"
+    depth = 0
 
     @property
     def faces(self) -> tuple[Face, ...]:
@@ -59,10 +61,7 @@ class Measurement(Readable):
 
     def units_among(self, units: Mapping[str, str]) -> set[str]:
         """Return the units of the value, from those of named measures: several if measurements of unlike units are combined."""
-        if not self.operands:
-            return {self.units}
-        own = {units[operand] for operand in self.operands if isinstance(operand, str) and operand in units}
-        return own.union(*(nested.units_among(units) for nested in self._nested))
+        return {self.units}
 
     def faults(self) -> Iterator[str]:
         things: tuple[Face | Point | Measurement, ...] = (*self.faces, *self.points, *self._nested)
@@ -138,9 +137,10 @@ class _OfTwoFaces(Measurement):
 class Clearance(_OfTwoFaces):
     """The least distance of two faces of different parts, negative where they overlap.
 
-    Of planes it is the least at the corners of the region in which they face each other nominally: corners of either face over
-    the other's plane, and places where their rims cross. Of a ball or a shaft beside walls it is the least gap of contact (see
-    tolcontact.discretization), of two outer cylinders the distance of their axes less both radii.
+    Of planes it is the least height, perpendicular to the second face, in the region in which they overlap at the present pose;
+    in the region in which they overlap nominally if there is none, or if their rims have more than 2500 pairs of edges. Of a
+    ball or a shaft beside walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
+    distance of their axes, each as long as its face, less both radii.
     """
 
     kind = "clearance"
@@ -214,8 +214,6 @@ class Angle(_OfTwoFaces):
 class Combination(Measurement):
     """A value of several measurements, or of measures that were declared before, which may be given by name."""
 
-    units = ""
-
     measurements: tuple[str | Measurement, ...]
 
     def __init__(self, *measurements: Any) -> None:
@@ -226,22 +224,22 @@ class Combination(Measurement):
                 raise TypeError(f"{self.kind}: {type(operand).__name__} is no measurement; expected a measure or its name")
             operands.append(value)
         object.__setattr__(self, "measurements", tuple(operands))
+        object.__setattr__(self, "depth", 1 + max((nested.depth for nested in self._nested), default=0))
+        if self.depth > MAX_DEPTH:
+            raise ValueError(f"{self.kind}: measurements are nested more than {MAX_DEPTH} deep; declare some as measures")
+
+    def units_among(self, units: Mapping[str, str]) -> set[str]:
+        own = {units[operand] for operand in self.operands if isinstance(operand, str) and operand in units}
+        return own.union(*(nested.units_among(units) for nested in self._nested))
 
     @property
     def operands(self) -> tuple[str | Measurement, ...]:
         return self.measurements
 
-    @property
-    def depth(self) -> int:
-        """The number of combinations inside each other."""
-        return 1 + max((nested.depth for nested in self._nested if isinstance(nested, Combination)), default=0)
-
     def faults(self) -> Iterator[str]:
         yield from super().faults()
         if len(self.operands) < 2:
             yield f"the {self.kind} is that of {len(self.operands)} measurement(s); expected two or more"
-        if self.depth > MAX_DEPTH:
-            yield f"its measurements are nested {self.depth} deep; expected at most {MAX_DEPTH}; declare some by themselves"
 
     def __str__(self) -> str:
         if len(self.operands) > MAX_LISTED:

@@ -22,6 +22,7 @@ _ONE = re.compile(rf"([+-]) ?({_NUMBER})")
 _THOUSANDS = re.compile(r"(?<![\d.,])[1-9]\d{0,2}(?:,\d{3})+(?!\d)")
 _FIT = re.compile(r"([A-Z]{1,2}\d{1,2}) ?/ ?([a-z]{1,2}\d{1,2})")
 _UNIT = re.compile(r"[\d.,] ?([^\W\d_]+|[°%\"'])$")
+_DEGREES = re.compile(r" ?(?:°|deg)(?![^\W\d])")
 _SIGNS = str.maketrans({"\N{MINUS SIGN}": "-", "\N{EN DASH}": "-", "\N{FULLWIDTH PLUS SIGN}": "+"})
 _DIGITS = 12  # of widths and middles after the point: more than a double has of a deviation
 
@@ -53,8 +54,8 @@ class Deviations(NamedTuple):
 def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> Any:
     """Return Deviations for texts of limit deviations and for pairs, a number for the text of one; other values as they are.
 
-    A tolerance class such as "H7" needs a `nominal` size [mm]. Numbers of NumPy become those of Python. Raises TextFault for
-    other texts and pairs.
+    A tolerance class such as "H7" needs a `nominal` size [mm]. Degrees become radians if the `units` are "rad". Numbers of
+    NumPy become those of Python. Raises TextFault for other texts and pairs.
     """
     if isinstance(value, list | tuple):
         return _pair(value)
@@ -71,6 +72,9 @@ def written(value: Any, *, units: str = "mm", nominal: float | None = None) -> A
         raise TextFault(f'a tolerance class is for sizes, as in tc.Size(10, "{stated_class}"); expected {EXAMPLES}')
     if fit := _FIT.fullmatch(text):
         raise TextFault(f'it is a fit of two parts; give "{fit[1]}" to the hole, and "{fit[2]}" to the shaft')
+    if units == "rad" and _DEGREES.search(text):
+        value = _parsed(_DEGREES.sub("", text))
+        return Deviations(*map(math.radians, value)) if isinstance(value, Deviations) else math.radians(value)
     return _parsed(_without_units(text, units))
 
 

@@ -2,15 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from tolcontact.declaration import Face
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.errors import GeometryFault
-from tolcontact.features import AxisFeature, FaceDeviation, FeatureOfSize, PlaneFeature, feature_geometry
+from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, FeatureOfSize, PlaneFeature, feature_geometry
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.edges import rim
 from tolcontact.geometry.surface import Surface
 
 
@@ -33,10 +35,15 @@ class MeasuredFace:
         feet, normals, _ = self.surface.project(near[None])
         return Wall(self.part, Plane(feet[0], normals[0]), 1.0, self.deviation)
 
+    @cached_property
+    def geometry(self) -> FeatureGeometry:
+        """The kind of the face, with its numbers. Raises GeometryFault if it spans several surfaces."""
+        return feature_geometry([self.surface])
+
     @property
     def plane(self) -> Plane:
         """The plane of a flat face, with its outward normal. Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if not isinstance(geometry, PlaneFeature):
             raise GeometryFault(f"its face {self.face} is {geometry.in_words}; expected a plane")
         return Plane(geometry.centre, geometry.normal)
@@ -44,7 +51,7 @@ class MeasuredFace:
     @property
     def axis(self) -> "Axis":
         """The axis of a cylinder or cone, or the centre of a sphere. Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if isinstance(geometry, AxisFeature):
             direction = geometry.axis
         elif isinstance(geometry, FeatureOfSize) and not isinstance(geometry, PlaneFeature):
@@ -58,7 +65,7 @@ class MeasuredFace:
     @property
     def direction(self) -> np.ndarray:
         """The normal of a plane, or the direction of an axis (3,). Raises GeometryFault for other faces."""
-        geometry = feature_geometry([self.surface])
+        geometry = self.geometry
         if isinstance(geometry, PlaneFeature):
             return geometry.normal
         if isinstance(geometry, AxisFeature):
@@ -137,6 +144,31 @@ class Heights(NominalMeasurement):
 
     stations: Sequence[tuple[Station, Wall]]
     crossings: Sequence[Crossing] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Outline:
+    """The rim of a plane face: its corners (corner, 3) [mm], and the edges (edge, 2) between them by number."""
+
+    vertices: np.ndarray
+    edges: np.ndarray
+
+    @classmethod
+    def of(cls, surface: Surface) -> "Outline":
+        """Return the rim of a face."""
+        used, edges = np.unique(rim(np.asarray(surface.mesh.faces)), return_inverse=True)
+        return cls(np.asarray(surface.mesh.vertices)[used], edges.reshape(-1, 2))
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneClearance(NominalMeasurement):
+    """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
+
+    first: MeasuredFace
+    second: MeasuredFace
+    planes: tuple[Plane, Plane]
+    outlines: tuple[Outline, Outline]
+    heights: Heights
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,8 @@ from tolcontact.discretization.measured_geometry import (
     Heights,
     MeasuredFace,
     NominalMeasurement,
+    Outline,
+    PlaneClearance,
     RoundClearance,
     Station,
     Wall,
@@ -34,7 +36,31 @@ from tolcontact.geometry.overlap import crossing_edges
 MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
 OBTUSE = -1e-9  # cosine of an angle that counts as more than a right one
 FACING = -0.5  # largest cosine between the outward normals of planes that face each other
+MAX_EDGE_PAIRS = 2500  # of two rims, between which crossings are found at every pose; more take longer than contact itself
 NO_LINES = np.zeros((0, 2, 3))
+
+
+class MeasuredFaces:
+    """The measured faces of a model. Faces with the same criteria are made once."""
+
+    def __init__(self, nominal: Nominal) -> None:
+        self.nominal = nominal
+        self._faces: dict[tuple[Any, ...], MeasuredFace] = {}
+
+    def __getitem__(self, face: Face) -> MeasuredFace:
+        """Return a declared face. Raises GeometryFault if it has no triangles, or is partly that of a feature."""
+        key = (face.part, *face.selections)
+        if key not in self._faces:
+            part = self.nominal.part_index(face.part)
+            surface = patch(face, self.nominal.meshes).placed(*self.nominal.parts[part].placement)
+            self._faces[key] = MeasuredFace(face, part, surface, self.nominal.deviation(face))
+        return self._faces[key]
+
+    def pair(self, measurement: Measurement) -> tuple[MeasuredFace, MeasuredFace]:
+        """Return the two faces of a measurement."""
+        first, second = (self[face] for face in measurement.faces)
+        _check_varies([face.part for face in measurement.faces], [first.deviation, second.deviation])
+        return first, second
 
 
 def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, ...]:
@@ -43,12 +69,12 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
     Raises ModelError with a fault for each measurement that the faces do not have.
     """
     measurements: dict[str, NominalMeasurement | None] = {}
-    faults = []
+    faces, faults = MeasuredFaces(nominal), []
     for measure in nominal.measures:
         measurements[measure.name] = None
         try:
             if isinstance(measure.of, Measurement):
-                measurements[measure.name] = _with_numbers(measure.of, nominal, measurements)
+                measurements[measure.name] = _with_numbers(measure.of, faces, measurements)
         except GeometryFault as fault:
             faults.append(f"{designation('measure', measure)}: {fault}")
     if faults:
@@ -56,16 +82,18 @@ def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, .
     return tuple(measurements.values())
 
 
-def _with_numbers(measurement: Any, nominal: Nominal, earlier: Mapping[str, NominalMeasurement | None]) -> NominalMeasurement:
+def _with_numbers(
+    measurement: Any, faces: MeasuredFaces, earlier: Mapping[str, NominalMeasurement | None]
+) -> NominalMeasurement:
     """Return a measurement; it may refer to the earlier measures by name."""
     if not isinstance(measurement, Combination):
-        return BUILDERS[type(measurement)](measurement, nominal)
+        return BUILDERS[type(measurement)](measurement, faces)
     numbers = {name: number for number, name in enumerate(earlier)}
     operands = [
-        numbers[operand] if isinstance(operand, str) else _with_numbers(operand, nominal, earlier)
+        numbers[operand] if isinstance(operand, str) else _with_numbers(operand, faces, earlier)
         for operand in measurement.operands
     ]
-    lines = [_lines(nominal, operand, earlier) if isinstance(operand, int) else operand.lines for operand in operands]
+    lines = [_lines(faces.nominal, operand, earlier) if isinstance(operand, int) else operand.lines for operand in operands]
     return Combined(np.concatenate(lines), measurement.kind, operands)
 
 
@@ -78,8 +106,8 @@ def _lines(nominal: Nominal, number: int, measurements: Mapping[str, NominalMeas
     return np.array([[ends[0], ends[-1]]]) if ends else NO_LINES
 
 
-def _gap(gap: Gap, nominal: Nominal) -> Heights:
-    face, point = _measured_face(nominal, gap.face), gap.station
+def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
+    face, point, nominal = faces[gap.face], gap.station, faces.nominal
     position, deviation = nominal.position(point), nominal.face_at(point)
     station = Station(nominal.part_index(point.part), position, deviation, nominal.outward(point))
     _check_varies([gap.station.part, gap.face.part], [station.deviation, face.deviation])
@@ -87,8 +115,8 @@ def _gap(gap: Gap, nominal: Nominal) -> Heights:
     return Heights(np.array([[position, wall.foot(position)]]), [(station, wall)])
 
 
-def _clearance(clearance: Clearance, nominal: Nominal) -> NominalMeasurement:
-    first, second = _faces(clearance, nominal)
+def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
+    first, second = faces.pair(clearance)
     if is_flat(first.surface) and is_flat(second.surface):
         return _clearance_of_planes(first, second)
     reach = float(np.ptp(np.vstack([first.surface.mesh.bounds, second.surface.mesh.bounds]), axis=0).sum())
@@ -106,7 +134,8 @@ def _clearance(clearance: Clearance, nominal: Nominal) -> NominalMeasurement:
     )
 
 
-def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
+def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights | PlaneClearance:
+    """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
     if not first.plane.axis @ second.plane.axis < FACING:
         raise GeometryFault(
             f"its planes {first.face} and {second.face} do not face each other; choose planes with material behind both"
@@ -130,7 +159,13 @@ def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights:
             "gap of a point with tc.Gap"
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
-    return Heights(np.array([shortest]), stations, crossings)
+    heights, outlines = (
+        Heights(np.array([shortest]), stations, crossings),
+        (Outline.of(first.surface), Outline.of(second.surface)),
+    )
+    if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
+        return heights
+    return PlaneClearance(heights.lines, first, second, (first.plane, second.plane), outlines, heights)
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -141,8 +176,8 @@ def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
         return points
 
 
-def _axis_distance(distance: AxisDistance, nominal: Nominal) -> AxisPair:
-    first, second = (face.axis for face in _faces(distance, nominal))
+def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
+    first, second = (face.axis for face in faces.pair(distance))
     lines = np.array([first.ends, second.ends])
     if distance.across is not None:
         n = np.array(distance.across)
@@ -165,8 +200,8 @@ def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
     return np.asarray(direction * float((place - axis.middle) @ n) / float(direction @ n))
 
 
-def _angle(angle: Angle, nominal: Nominal) -> DirectionPair:
-    first, second = _faces(angle, nominal)
+def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
+    first, second = faces.pair(angle)
     u, v = first.direction, second.direction
     about = None if angle.about is None else np.array(angle.about)
     across = [vector if about is None else vector - (vector @ about) * about for vector in (u, v)]
@@ -179,20 +214,6 @@ def _angle(angle: Angle, nominal: Nominal) -> DirectionPair:
     starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (first, second)]
     lines = np.array([[start, start + length * vector] for start, vector in zip(starts, (u, v), strict=True)])
     return DirectionPair(lines, first, second, (u, v), about)
-
-
-def _faces(measurement: Measurement, nominal: Nominal) -> tuple[MeasuredFace, MeasuredFace]:
-    """Return the two faces of a measurement."""
-    first, second = (_measured_face(nominal, face) for face in measurement.faces)
-    _check_varies([face.part for face in measurement.faces], [first.deviation, second.deviation])
-    return first, second
-
-
-def _measured_face(nominal: Nominal, face: Face) -> MeasuredFace:
-    """Return a declared face. Raises GeometryFault if it has no triangles, or is partly that of a feature."""
-    part = nominal.part_index(face.part)
-    surface = patch(face, nominal.meshes).placed(*nominal.parts[part].placement)
-    return MeasuredFace(face, part, surface, nominal.deviation(face))
 
 
 def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
@@ -221,7 +242,7 @@ def _nearest_places(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return np.array([first[0] + nearest.x[0] * p, second[0] + nearest.x[1] * q])
 
 
-Builder = Callable[[Any, Nominal], NominalMeasurement]
+Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
 BUILDERS: Mapping[type[Measurement], Builder] = {
     Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
 }  # fmt: skip

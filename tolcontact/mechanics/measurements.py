@@ -12,13 +12,16 @@ from tolcontact.discretization.measured_geometry import (
     Crossing,
     DirectionPair,
     Heights,
+    MeasuredFace,
     NominalMeasurement,
+    PlaneClearance,
     RoundClearance,
     Station,
     Wall,
 )
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
+from tolcontact.mechanics.plane_clearance import plane_clearance
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.setting import face_height, face_pose
@@ -53,6 +56,16 @@ def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
 def _least_height(heights: Heights, observed: Observed) -> ca.SX:
     over_walls = [_height(station, wall, observed) for station, wall in heights.stations]
     return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
+
+
+def _plane_clearance(clearance: PlaneClearance, observed: Observed) -> ca.SX:
+    X_21 = _relative(clearance.first, clearance.second, observed)
+    return plane_clearance(clearance, X_21, _least_height(clearance.heights, observed))
+
+
+def _relative(first: MeasuredFace, second: MeasuredFace, observed: Observed) -> Pose:
+    """Return the pose of a first face in the frame of a second one."""
+    return relative(observed.pose(first.part, first.deviation), observed.pose(second.part, second.deviation))
 
 
 def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
@@ -94,7 +107,7 @@ def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
 
 def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
     first, second = clearance.first, clearance.second
-    X_RM = relative(observed.pose(first.part, first.deviation), observed.pose(second.part, second.deviation))
+    X_RM = _relative(first, second, observed)
     grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (first, second)))
     gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, ca.SX.zeros(len(clearance.points)))
     return least(ca.vertsplit(gaps))
@@ -169,8 +182,8 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
 
 
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
-    Heights: _least_height, RoundClearance: _round_clearance, AxisPair: _axis_distance, DirectionPair: _angle,
-    Combined: _combined,
+    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, AxisPair: _axis_distance,
+    DirectionPair: _angle, Combined: _combined,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,

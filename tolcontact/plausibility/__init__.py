@@ -25,7 +25,7 @@ from the nominal place; absolute=True measures the coordinate
 |---|---|
 | `[angle]` | rotations beyond a full turn, or beyond half a turn in whole numbers: these are probably degrees |
 | `[point]` | points of locators, measures and forces that lie off their part by more than a quarter of its size |
-| `[direction]` | locators whose directions would fit in the assembly frame; one-sided ones that point out of their part |
+| `[direction]` | locators whose directions all fit in the assembly frame alone; one-sided ones that point out of their part |
 | `[tolerance]` | zones wider than half of their part; locators that turn their part by more than 45 degrees at three sigma |
 | `[overlap]` | faces of a contact pair, or bodies that are no pair, that lie in each other |
 | `[gap]` | faces of a contact pair that are too far apart to touch |

@@ -48,31 +48,32 @@ def far_points(draws: TrialDraws) -> Iterator[str]:
 
 
 def unfit_directions(draws: TrialDraws) -> Iterator[str]:
-    """Yield a sentence for each locator on its part's surface whose direction cannot be meant.
+    """Yield a sentence for each part with locators on its surface whose directions are probably those of the assembly.
 
-    These are directions along the surface that would point into the part if they were stated in the assembly frame, and
-    directions of one-sided locators that point out of the part.
+    All of them would then point into the part, while some lie along its surface as they are stated. One-sided locators that
+    point out of the part have a sentence each.
     """
     for nominal in draws.program.nominal.parts:
         scheme = nominal.scheme
         if not isinstance(scheme, tuple):
             continue
         R_WP, place = nominal.placement[0], location_designation(draws.program.nominal.assembly, nominal.part)
-        for locator in scheme:
-            inward = -_normals_at(nominal, np.array(locator.point))
-            if not len(inward):
-                continue
+        normals = [-_normals_at(nominal, np.array(locator.point)) for locator in scheme]
+        on_surface = [(locator, inward) for locator, inward in zip(scheme, normals, strict=True) if len(inward)]
+        fits = [bool((inward @ (R_WP.T @ np.array(locator.direction))).max() > 1 - ALONG) for locator, inward in on_surface]
+        for locator, inward in on_surface:
             direction = np.array(locator.direction)
-            cosines, assembly_cosines = inward @ direction, inward @ (R_WP.T @ direction)
-            if np.abs(cosines).max() < ALONG and assembly_cosines.max() > 1 - ALONG:
+            if np.abs(inward @ direction).max() < ALONG and all(fits):
                 yield (
                     f'{place}: the direction ({_row(direction)}) of locator "{locator.name}" lies along the surface of the '
                     f"part; directions are in the part's own frame: ({_row(R_WP.T @ direction)}) is this one of the assembly"
                 )
-            elif locator.one_sided and cosines.max() < -OUTWARD:
+                break
+        for locator, inward in on_surface:
+            if locator.one_sided and (inward @ np.array(locator.direction)).max() < -OUTWARD:
                 yield (
-                    f'{place}: the direction ({_row(direction)}) of the one-sided locator "{locator.name}" points out of the '
-                    "part; it holds the part up along its direction, so state the one into the part"
+                    f'{place}: the direction ({_row(np.array(locator.direction))}) of the one-sided locator "{locator.name}" '
+                    "points out of the part; it holds the part up along its direction, so state the one into the part"
                 )
 
 

@@ -105,7 +105,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         linear = float(shares["linear"])
         rows.append([str(shares["group"].values), *cells, f"{100 * linear:.1f} %" if math.isfinite(linear) else "-"])
     if not np.isfinite(dataset["linear"].values).any():
-        missed = ["It has no linear shares: in the nominal assembly it is at a kink, or nothing changes it to first order."]
+        missed = ["no linear shares: it has a kink in the nominal assembly, or no slope there"]
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
     columns = ["", "raw", "corrected, alone", "in total", "linear"]
@@ -198,6 +198,8 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
     if beyond > GAP_ACCURACY:
         remarks.append(f"Found up to {beyond:.2g} beyond linear: sensitivities change when parts tilt that far.")
+    if not np.isfinite(dataset["bound"].values).all():
+        remarks.append("No limit: a kink in the nominal assembly, or contact alone would have to hold the part.")
     if "agreeing" in dataset and int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
         remarks.append("Where few searches met, there may be worse combinations; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"

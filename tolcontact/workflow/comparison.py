@@ -14,7 +14,7 @@ import xarray as xr
 from tolcontact import poses as pose, vocabulary as terms
 from tolcontact.archive import check_rows, open_archive
 from tolcontact.compilation import Program, compile_program
-from tolcontact.discretization import discretize
+from tolcontact.discretization import Nominal, discretize
 from tolcontact.errors import OptionError
 from tolcontact.method import USUAL_SEARCH, Method
 from tolcontact.plausibility import warn_of_nominal
@@ -66,8 +66,7 @@ def compare(
             raise OptionError(f"{option}: {', '.join(map(str, names)) or 'none'}; name at least one, and each once")
     nominal, blocks = discretize(assembly), mapping(client)
     contestants = [(solver, method) for method in resolved_by for solver in solvers]
-    programs = [compile_program(nominal, solver, method) for solver, method in contestants]
-    warn_of_nominal(programs[0])
+    programs = _programs(nominal, contestants)
     kept = 2 + 12 * len(nominal.parts) + len(nominal.measures) + len(nominal.pairs)
     for program in programs:
         check_affordable(program, samples=samples, seed=seed, threads=threads_of(client), kept=kept)
@@ -92,6 +91,13 @@ def compare(
             "objective": ", ".join(dict.fromkeys(method.objective for method in resolved_by)),
         },
     )
+
+
+def _programs(nominal: Nominal, contestants: Sequence[tuple[str, Method]]) -> list[Program]:
+    """Return the program of each solver and method, and warn of what is probably a mistake in the nominal assembly."""
+    programs = [compile_program(nominal, solver, method) for solver, method in contestants]
+    warn_of_nominal(programs[0])
+    return programs
 
 
 def _rows(programs: Sequence[Program], blocks: MapBlocks, samples: int, seed: int) -> list[dict]:
