@@ -1,5 +1,7 @@
 """Analyses kept in archives, and what the page shows of them."""
 
+import json
+
 import netCDF4
 import numpy as np
 import pytest
@@ -42,7 +44,7 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
         page = page_of(results, tc.summarize(results))
     assert "What matters" in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
-    assert "beyond the bound, which is of first order" in page
+    assert "beyond linear: sensitivities change" in page
     assert "Allocation" in page and "Cost 2 before" in page
     drawn = data_of(page)["scene"]["realizations"]
     assert drawn["names"][:2] == [f"worst case: {end} corner height" for end in ("least", "largest")]
@@ -122,3 +124,30 @@ def test_the_command_keeps_it_too(tmp_path):
     with xr.open_datatree(out) as results:
         assert results["statistics/sensitivities"].attrs["realizations"] == 4
     assert call(tmp_path, *options).returncode == 2
+
+
+@pytest.mark.slow
+def test_the_model_of_an_archive_is_analysed_by_the_method_seed_and_solver_of_its_run(tmp_path):
+    path = tmp_path / "ra1.nc"
+    method = tc.Method(resolution="exact", objective="all points", near_turn=0.9)
+    tc.run(cases.ra1(), samples=4, seed=7, out=path, surfaces=0, solver="daqp", method=method).close()
+    expected = tc.sensitivities(cases.ra1(), samples=8, seed=7, solver="daqp", method=method)
+    done = call(tmp_path, "sensitivities", path, "--samples", "8", "--json")
+    assert done.returncode == 0, done.stderr
+    found = xr.Dataset.from_dict(json.loads(done.stdout))
+    assert found.attrs["seed"] == 7 and found.attrs["solver"] == "daqp" and found.attrs["resolution"] == "exact"
+    np.testing.assert_allclose(found.sensitivity.astype(float), expected.sensitivity, atol=1e-9)
+    assert tc.build(path).method == method and tc.build(path, method={"objective": "active points"}).method.near_turn == 0.9
+    other = call(tmp_path, "sensitivities", path, "--samples", "8", "--seed", "8", "--json")
+    assert json.loads(other.stdout)["attrs"]["seed"] == 8
+
+
+def test_an_archive_without_a_usable_model_is_refused_by_name(tmp_path, archive):
+    with netCDF4.Dataset(archive, "a") as file:
+        file.resolution = "approximate"
+    for path, reason in (
+        (archive, "the model in .*ra1.nc. cannot be rebuilt.*approximate"),
+        (tmp_path / "no.nc", "does not exist"),
+    ):
+        with pytest.raises(tc.ArchiveError, match=reason):
+            tc.tails(path)

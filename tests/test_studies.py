@@ -10,6 +10,7 @@ from tests.helpers import ROOT, run
 
 STUDIES = {
     "cad/as1.py": ["--samples", "20"],
+    "cad/as1_nine.py": ["--samples", "20", "--surfaces", "2"],
     "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
     "cad/pmi_fixture.py": [ROOT / "studies" / "cad"],
     "cad/pmi_parts.py": [ROOT / "studies" / "cad"],

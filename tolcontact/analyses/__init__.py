@@ -9,7 +9,7 @@ also a command, which prints tables, JSON or CSV.
 | `contributions` | `contributions` | Which contributors cause the variance of a measure? |
 | `sensitivities` | `sensitivities` | How much does a measure change with each contributor, with contact? |
 | `worst_case` | `worst` | What are the smallest and largest values of a measure, and which deviations cause them? |
-| `tails` | `tails` | How often is a measure outside its limits, where this is rare? |
+| `tails` | `tails` | How often is a measure outside its limits (a rare-event estimate in ppm)? |
 | `allocate` | `allocate` | Which tolerance ranges suffice at the lowest cost, and which one should be tightened first? |
 | `relocate` | `relocate` | At which position of a locator does a measure vary least? |
 
@@ -17,7 +17,7 @@ also a command, which prints tables, JSON or CSV.
 
 | argument | meaning |
 |---|---|
-| `model` | an assembly, the function that declares it, the path of its script, or a `tc.Program` (not for `relocate`) |
+| `model` | an assembly, a function that declares it, the path of a script or archive, or a `tc.Program` (not for `relocate`) |
 | `samples`, `seed` | number of realizations, at least 2 (see each analysis); the same seed gives the same draws |
 | `solver`, `method` | as for `tc.build`; a `tc.Program` has its own, so leave them out with it |
 | `client` | client of dask.distributed, whose workers simulate with the same results (see `tolcontact.simulation`) |
@@ -59,9 +59,9 @@ True
 
 ## What is extreme or rare
 
-`tc.worst_case` searches everything that the drawings allow for the smallest and largest values of each measure, and returns
-the deviations that cause them. It also returns bounds: to first order, no pose without penetration lies beyond them. Where
-contact alone does not hold a part, as with a block that can be lifted off a table, there is no bound.
+`tc.worst_case` searches everything that the tolerances allow for the minimum and maximum of each measure, and returns the
+deviations that cause them. It also returns linear estimates: to first order, no pose without penetration lies beyond them.
+Where contact alone does not hold a part, as with a block that can be lifted off a table, there is none.
 
 >>> worst = tc.worst_case(assembly, samples=64, solver="daqp").sel(measure="height")
 >>> bool(worst.worst.sel(state="raw", end="largest") > 0.5), float(worst.bound.sel(state="corrected", end="least").round(2))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +12,10 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.engine import Progress
 from tolcontact.analyses.grouping import check_grouping, owners
-from tolcontact.analyses.requirement import Requirement
+from tolcontact.analyses.requirement import MIN_DECISIVE, Requirement
+from tolcontact.analyses.scaled_trials import VERIFICATION_FACTOR, ScaledTrials
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.statistics.intervals import Estimate, mean
@@ -23,12 +24,13 @@ from tolcontact.workflow.models import Choice, Model
 MIN_FACTOR, MAX_FACTOR = 0.1, 3.0  # times the present range
 STEP = 0.1  # of ranges, for differences
 BATCHES = 32  # of realizations, for intervals of effects
-MAX_STEPS = 24  # of one search
+MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
+IDLE = 1e-6  # of a measure's spread: a group that changes no decisive realization by more has no influence
+MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many
 COMMON_FACTORS = np.geomspace(0.1, 3.0, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
-VERIFICATION_FACTOR = 4  # realizations of a verification, times samples
 VERIFICATIONS = 4
 Cost = float | Callable[[float], float]
 
@@ -48,6 +50,7 @@ def allocate(
         required     (requirement)                       the share or the Ppk that is required
         met          (requirement)                       1: kept in the fresh run after; 0: it cannot be met, and `kept` is the
                                                          best that was reached
+        idle         (group)                             1: the group has no influence on any requirement, and keeps its range
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
@@ -56,11 +59,12 @@ def allocate(
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
-    Ranges stay between a tenth and three times the present ones. Each step replaces the margins of the requirements by
-    functions of squared ranges with the same values and slopes, on the same draws. scipy's SLSQP minimizes the cost under them
+    Ranges stay between a tenth and three times the present ones. Groups without influence on any requirement keep theirs. Each
+    step replaces the margins of the requirements by functions of squared ranges with the same values and slopes, on the same
+    draws; for the slopes only realizations near the limits are simulated again. scipy's SLSQP minimizes the cost under them
     within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run
-    misses a requirement, the search continues with a margin larger by as much. `progress` is called with the number of fresh
-    runs, and their largest number.
+    misses a requirement, the search continues with a margin larger by as much. `progress` is called with the number of
+    realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """
@@ -70,16 +74,13 @@ def allocate(
         progress=progress,
     )  # fmt: skip
     program = analysis.program
-    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
-    if not requirements:
-        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
-    for requirement in requirements:
-        requirement.check(samples)
+    requirements = _requirements(require, program, samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
-    trials = ScaledTrials(analysis.engine(), list(groups.values()), seed, samples)
+    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
     prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
-    logs, estimates, is_met = _allocated(trials, requirements, prices, progress)
+    search = Search(trials, requirements, prices)
+    logs, estimates, is_met = _allocated(search, _expected(samples, 0))
     factors = np.exp(np.stack([np.zeros(len(groups)), logs], axis=1))
     values = {
         "range": np.array(_ranges(program, groups))[:, None] * factors,
@@ -88,40 +89,12 @@ def allocate(
         "kept": np.array(estimates).swapaxes(0, 1),
         "met": np.array(is_met, dtype=np.int8),
         "required": [requirement.value for requirement in requirements],
+        "idle": search.idle.astype(np.int8),
         "effect": _effects(trials, program),
     }
     labels = {terms.GROUP: list(groups), terms.REQUIREMENT: [requirement.name for requirement in requirements]}
-    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by)
-
-
-@dataclass(frozen=True, eq=False)
-class ScaledTrials:
-    """Simulations with scaled ranges, on the same draws.
-
-    groups  columns of each group
-    """
-
-    engine: Engine
-    groups: Sequence[np.ndarray]
-    seed: int
-    samples: int
-
-    def corrected(self, factors: np.ndarray, *, verification: int = 0) -> np.ndarray:
-        """Return corrected measures (n, measure) with the groups' ranges times factors (group,).
-
-        A `verification` with a number above 0 has draws of its own, and more of them.
-        """
-        program = self.engine.program
-        scale = np.ones(len(program.nominal.contributors))
-        for factor, columns in zip(factors, self.groups, strict=True):
-            scale[columns] = factor
-        count = VERIFICATION_FACTOR * self.samples if verification else self.samples
-        draws, start = program.draws.scaled(scale), verification << 32
-        measured, _ = self.engine.simulate(count, start=start, seed=self.seed, draws=draws)
-        return np.ascontiguousarray(measured[:, terms.CORRECTED])
-
-    def __len__(self) -> int:
-        return len(self.groups)
+    limits: dict[str, Any] = {"floor": MIN_FACTOR, "ceiling": MAX_FACTOR}
+    return analysis.dataset(values, labels, samples=samples, fresh=VERIFICATION_FACTOR * samples, by=by, **limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +109,16 @@ class Prices:
         return math.fsum(
             _cost(curve, factor) for curve, factor, free in zip(self.curves, np.exp(logs), self.is_free, strict=True) if free
         )
+
+
+def _requirements(require: str | Sequence[str], program: Program, samples: int) -> list[Requirement]:
+    """Return what texts require. Raises OptionError if there are none, or for too few samples."""
+    requirements = [Requirement.parse(text, program) for text in ([require] if isinstance(require, str) else require)]
+    if not requirements:
+        raise OptionError('require is empty; expected a text such as "corner height: ppm 1000"')
+    for requirement in requirements:
+        requirement.check(samples)
+    return requirements
 
 
 def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
@@ -176,26 +159,29 @@ def _cost(curve: Cost, factor: float) -> float:
     return float(curve(factor)) if callable(curve) else float(curve / factor)
 
 
-def _allocated(
-    trials: ScaledTrials, requirements: Sequence[Requirement], prices: Prices, progress: Progress | None
-) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
+def _expected(samples: int, groups: int) -> int:
+    """Return the approximate number of realizations of a search and its verification, with slopes and effects of groups."""
+    effects = max(samples // EFFECT_SHARE, MIN_EFFECT_SAMPLES)
+    return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * (USUAL_STEPS * MIN_DECISIVE + effects)
+
+
+def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
     """Return logarithms of the factors (group,), and estimates of the requirements in fresh runs, before and after.
 
     The last one is whether each requirement is kept after (requirement,).
     """
-    search, logs = Search(trials, requirements, prices), np.zeros(len(trials))
+    trials, requirements, logs = search.trials, search.requirements, np.zeros(len(search.trials))
     corrected = trials.corrected(np.ones(len(trials)), verification=1)
     before = [requirement.estimate(corrected[:, requirement.measure]) for requirement in requirements]
     aims = np.zeros(len(requirements))
     for number in range(VERIFICATIONS):
         logs = search.least_cost(logs, aims)
-        if progress:
-            progress(number + 1, VERIFICATIONS)
         corrected = trials.corrected(np.exp(logs), verification=2 + number)
         margins = _margins(requirements, corrected)
         if (margins >= 0).all():
             break
         aims += np.maximum(-margins, 0.0)
+        trials.engine.total += expected
     else:
         logs = search.least_missing(logs)
         corrected = trials.corrected(np.exp(logs), verification=2 + VERIFICATIONS)
@@ -214,6 +200,15 @@ class Search:
     trials: ScaledTrials
     requirements: Sequence[Requirement]
     prices: Prices
+    idle: np.ndarray = field(init=False)  # (group,) whether a group has no influence on any requirement
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "idle", np.zeros(len(self.trials), dtype=bool))
+
+    @property
+    def is_free(self) -> np.ndarray:
+        """Whether the range of a group may change, (group,)."""
+        return self.prices.is_free & ~self.idle
 
     def least_cost(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
         """Return the logarithms of least cost with margins of at least `aims` (requirement,), from `logs` on.
@@ -221,19 +216,21 @@ class Search:
         The merit of a point is its cost plus a penalty for missed margins. A step that improves the merit is taken, and the
         region of the next one doubles; after any other step the region halves.
         """
-        margins, radius = self._margins(logs, aims), FIRST_RADIUS
-        slopes = None
+        corrected, radius = self.trials.corrected(np.exp(logs)), FIRST_RADIUS
+        margins, slopes = _margins(self.requirements, corrected) - aims, None
         for _ in range(MAX_STEPS):
             if radius < LAST_RADIUS:
                 break
             if slopes is None:
-                slopes = self._slopes(logs, aims)
+                slopes = self._slopes(logs, corrected)
                 penalty = PENALTY * self.prices.total(logs) / max(float(np.abs(slopes).sum()), 1e-300)
             candidate = self._step(margins, slopes, logs, radius)
-            candidate_margins = self._margins(candidate, aims)
+            candidate_corrected = self.trials.corrected(np.exp(candidate))
+            candidate_margins = _margins(self.requirements, candidate_corrected) - aims
             merit = self._merit(logs, margins, penalty)
             if self._merit(candidate, candidate_margins, penalty) < merit - MIN_GAIN * abs(merit):
-                logs, margins, slopes, radius = candidate, candidate_margins, None, min(2 * radius, FIRST_RADIUS)
+                logs, corrected, margins, slopes = candidate, candidate_corrected, candidate_margins, None
+                radius = min(2 * radius, FIRST_RADIUS)
             else:
                 radius /= 2
         return logs
@@ -243,25 +240,36 @@ class Search:
 
         Margins lead to where a quantile is near its limit, which may be far from where most values are.
         """
-        common = [np.where(self.prices.is_free, log, 0.0) for log in np.log(COMMON_FACTORS)]
+        common = [np.where(self.is_free, log, 0.0) for log in np.log(COMMON_FACTORS)]
         return min([logs, *common], key=self._missing)
 
     def _missing(self, logs: np.ndarray) -> float:
         corrected = self.trials.corrected(np.exp(logs))
         return math.fsum(requirement.shortfall(corrected[:, requirement.measure]) for requirement in self.requirements)
 
-    def _margins(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
-        return _margins(self.requirements, self.trials.corrected(np.exp(logs))) - aims
-
     def _merit(self, logs: np.ndarray, margins: np.ndarray, penalty: float) -> float:
         return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
 
-    def _slopes(self, logs: np.ndarray, aims: np.ndarray) -> np.ndarray:
-        """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change."""
+    def _slopes(self, logs: np.ndarray, corrected: np.ndarray) -> np.ndarray:
+        """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
+
+        A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
+        measures of the others (n, measure) stay. Groups that change none of them are idle from then on.
+        """
         slopes = np.zeros((len(self.requirements), len(logs)))
-        for group in np.flatnonzero(self.prices.is_free):
-            step = np.eye(len(logs))[group] * STEP
-            slopes[:, group] = (self._margins(logs + step, aims) - self._margins(logs - step, aims)) / (2 * STEP)
+        rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
+        measures = sorted({requirement.measure for requirement in self.requirements})
+        spreads = corrected.std(axis=0)[measures]
+        for group in np.flatnonzero(self.is_free):
+            step = STEP * np.eye(len(logs))[group]
+            wide, narrow = corrected.copy(), corrected.copy()
+            wide[rows] = self.trials.corrected_rows(np.exp(logs + step), rows)
+            changes = np.abs(wide - corrected)[:, measures]
+            if (changes.max(axis=0) <= IDLE * spreads).all():
+                self.idle[group] = True
+                continue
+            narrow[rows] = self.trials.corrected_rows(np.exp(logs - step), rows)
+            slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
@@ -276,8 +284,8 @@ class Search:
         def approximate(point: np.ndarray) -> np.ndarray:
             return np.asarray(margins + slopes @ (np.exp(2 * (point - logs)) - 1) / 2)
 
-        lower = np.where(self.prices.is_free, np.maximum(logs - radius, np.log(MIN_FACTOR)), logs)
-        upper = np.where(self.prices.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
+        lower = np.where(self.is_free, np.maximum(logs - radius, np.log(MIN_FACTOR)), logs)
+        upper = np.where(self.is_free, np.minimum(logs + radius, np.log(MAX_FACTOR)), logs)
         bounds = scipy.optimize.Bounds(lower, upper)
         solution = scipy.optimize.minimize(
             self.prices.total, logs, method="SLSQP", bounds=bounds, constraints={"type": "ineq", "fun": approximate},
@@ -291,14 +299,20 @@ class Search:
 def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
     """Return changes (measure, of_effect, group, interval) if a group's zones were a tenth narrower.
 
-    Intervals are those of means over batches of the same draws.
+    Intervals are those of means over batches of the same draws. A group that changes none of the first batches has no effect.
     """
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     ones = np.ones(len(trials))
-    present = trials.corrected(ones)
-    effects = np.empty((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
+    rows = np.arange(min(max(trials.samples // EFFECT_SHARE, MIN_EFFECT_SAMPLES), trials.samples))
+    present = trials.corrected_rows(ones, rows)
+    effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
     for group in range(len(trials)):
-        narrowed = trials.corrected(ones - STEP * np.eye(len(trials))[group])
+        factors, first = ones - STEP * np.eye(len(trials))[group], rows[:MIN_DECISIVE]
+        narrowed = trials.corrected_rows(factors, first)
+        if (np.abs(narrowed - present[: len(first)]).max(axis=0) <= IDLE * present.std(axis=0)).all():
+            continue
+        if len(rows) > len(first):
+            narrowed = np.concatenate([narrowed, trials.corrected_rows(factors, rows[len(first) :])])
         for measure, limits_of_measure in enumerate(limits):
             batches = [np.array_split(values[:, measure], BATCHES) for values in (narrowed, present)]
             spreads = [np.array([6 * x.std(ddof=1) for x in values]) for values in batches]

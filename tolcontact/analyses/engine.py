@@ -8,10 +8,13 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.designs import Design
 from tolcontact.compilation import Program
-from tolcontact.simulation import Block, outcomes
+from tolcontact.simulation import Block, block_rows, outcomes
 from tolcontact.simulation.cluster import MapBlocks
 from tolcontact.simulation.threads import Sampler
 from tolcontact.variation import GivenDraws
+
+MAX_ROWS_OF_BODIES = 2048  # realizations of a block, times the bodies that contact couples: a block ends within some seconds
+MIN_BLOCKS = 8  # of few realizations, so that these occupy all processors
 
 Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
 Observer = Callable[[Block], tuple[Any, ...]]  # gives arrays of a block; the last one is the statuses (n,)
@@ -21,13 +24,20 @@ class Engine:
     """Simulations of a program.
 
     statuses  (status_meaning,) int: number of realizations simulated so far, by their status
-    total     number of realizations that `progress` refers to
+    total     number of realizations that `progress` refers to; an analysis may revise it
     """
 
     def __init__(self, program: Program, blocks: MapBlocks, *, progress: Progress | None = None, total: int = 0) -> None:
         self.program = program
+        bodies = max((len(group.group.free) for group in program.groups), default=0)
+        self._rows = min(block_rows(program), max(MAX_ROWS_OF_BODIES // max(bodies, 1), MIN_BLOCKS))
         self.statuses = np.zeros(len(terms.STATUS_MEANINGS), dtype=int)
-        self._blocks, self._progress, self._total = blocks, progress, total
+        self._blocks, self._progress, self.total = blocks, progress, total
+
+    @property
+    def simulated(self) -> int:
+        """The number of realizations so far."""
+        return int(self.statuses.sum())
 
     @property
     def unresolved(self) -> int:
@@ -42,11 +52,14 @@ class Engine:
         By default these are measures (n, state, measure) and statuses (n,). `draws` replaces the draws of the program.
         """
         observed = []
-        for arrays in self._blocks(observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws):
+        block = min(self._rows, max(self._rows, samples) // MIN_BLOCKS)  # whatever the number of threads or workers
+        for arrays in self._blocks(
+            observe, self.program, samples=start + samples, start=start, seed=seed, draws=draws, block=block
+        ):
             observed.append(arrays)
             self.statuses += np.bincount(arrays[-1], minlength=len(self.statuses))
             if self._progress:
-                self._progress(min(int(self.statuses.sum()), self._total), self._total)
+                self._progress(min(self.simulated, self.total), self.total)
         return tuple(np.concatenate(column) for column in zip(*observed, strict=True))
 
     def simulate_deviations(self, deviations: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,18 +2,20 @@
 
 A search is a generating set search (Kolda, Lewis, Torczon, 2003). It tries points a step away along each contributor and in
 random directions, and then points on the way to the far end of the region along its slopes. It moves to the best of them if
-that gains enough; otherwise its step shrinks. It ends when its step is small.
+that gains enough; otherwise its step shrinks. It ends when its step is small. Searches that meet share what was simulated.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
-from tolcontact.analyses.engine import Engine, Progress
+from tolcontact.analyses.engine import Engine
 
-RANDOM_DIRECTIONS = 8  # that a search tries at each step
+RANDOM_DIRECTIONS = 4  # that a search tries at each step
 END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
 SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
@@ -30,22 +32,43 @@ class Effort:
     finest_step   the step at which a search ends, in shares of the ranges
     """
 
-    best: int = 4
-    random: int = 12
-    finest_step: float = 1e-7
+    best: int
+    random: int
+    finest_step: float = 0.01
+
+    @classmethod
+    def of(cls, samples: int) -> "Effort":
+        """Return the effort that goes with a number of random combinations: 4 and 8 searches for 1024."""
+        return cls(best=max(samples // 256, 1), random=max(samples // 128, 2))
+
+    @property
+    def searches(self) -> int:
+        """The number of searches for each extreme value."""
+        return self.best + self.random
+
+    @property
+    def levels(self) -> int:
+        """The number of steps of different length, from 1 to the finest one."""
+        return math.ceil(math.log(self.finest_step) / math.log(SHRINKAGE))
 
 
 class Evaluation:
-    """Measures at points of the region (see Region)."""
+    """Measures at points of the region (see Region). No point is simulated twice."""
 
     def __init__(self, engine: Engine, region: Region) -> None:
         self._engine, self._region = engine, region
+        self._known: dict[bytes, np.ndarray] = {}
 
     def corrected(self, points: np.ndarray) -> np.ndarray:
         """Return measures (..., state, measure) at points (..., contributor); NaN, corrected, where they are not certified."""
-        measured, status = self._engine.simulate_deviations(self._deviations(points))
-        measured[np.isin(status, terms.UNRESOLVED), terms.CORRECTED] = np.nan
-        return measured.reshape(*points.shape[:-1], len(terms.STATES), -1)
+        deviations = self._deviations(points) + 0.0  # no negative zeros
+        keys = [row.tobytes() for row in deviations]
+        rows = {key: row for row, key in enumerate(keys) if key not in self._known}
+        if rows:
+            measured, status = self._engine.simulate_deviations(deviations[list(rows.values())])
+            measured[np.isin(status, terms.UNRESOLVED), terms.CORRECTED] = np.nan
+            self._known.update(zip(rows, measured, strict=True))
+        return np.array([self._known[key] for key in keys]).reshape(*points.shape[:-1], len(terms.STATES), -1)
 
     def raw(self, points: np.ndarray) -> np.ndarray:
         """Return the same with raw measures alone, which takes no time; the corrected ones are NaN."""
@@ -136,8 +159,8 @@ class Searcher:
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
         self._compass = np.diag(self._ranges)[region.moves]
 
-    def search(self, searches: Searches, progress: Progress | None) -> None:
-        """Move until all steps are small. `progress` is called with the number of searches that ended, and of all."""
+    def search(self, searches: Searches, advanced: Callable[[float], None]) -> None:
+        """Move until all steps are small. `advanced` is called with the share of this that is done."""
         for _ in range(MAX_STEPS):
             rows = np.flatnonzero(searches.step > self._finest_step)
             if not rows.size:
@@ -148,8 +171,8 @@ class Searcher:
             gains |= self._move_towards(active, self._region.farthest(slopes))
             active.step[~gains] *= SHRINKAGE
             searches.put(rows, active)
-            if progress:
-                progress(int((searches.step <= self._finest_step).sum()), len(searches.step))
+            steps = np.log(np.maximum(searches.step, self._finest_step)[searches.state == terms.CORRECTED])
+            advanced(float(steps.mean() / math.log(self._finest_step)))
 
     def finish(self, searches: Searches) -> None:
         """Move along the slopes to the very end of round zones."""

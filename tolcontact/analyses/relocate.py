@@ -21,7 +21,7 @@ from tolcontact.statistics.capability import share_outside
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.question import Question
 from tolcontact.statistics.sample import Sample
-from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model, assembly_of
+from tolcontact.workflow.models import DEFAULT_SOLVER, Choice, Model
 
 GRID_POINTS = {1: 9, 2: 5, 3: 4}  # places tried along each side, by the number of sides
 MAX_TRIALS = 40  # after the grid, from its best place on
@@ -53,14 +53,13 @@ def relocate(
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     locator, a box or a measure that does not exist.
     """
-    assembly = assembly_of(model)
     analysis = Analysis(
-        terms.RELOCATION, assembly, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
+        terms.RELOCATION, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
     analysis.check_affordable(VERIFICATION_FACTOR * samples)
     goal = Goal.parse(least, analysis.program)
-    trials = RelocatedTrials(assembly, analysis, locator, goal.measure)
+    trials = RelocatedTrials(analysis.program.nominal.assembly, analysis, locator, goal.measure)
     places = Places(trials, goal, *_corners(between))
     places.try_grid()
     if not np.isfinite(places.values).any():

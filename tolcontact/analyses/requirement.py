@@ -1,5 +1,6 @@
 """Requirements on a measure: a share outside of its limits, or a capability."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from tolcontact.vocabulary import PPK, PPM
 
 TAIL, HEAD = 0.00135, 0.99865
 ROUNDING = 1e-9
+MIN_DECISIVE, DECISIVE = 64, 4  # values that decide a margin: at least, and times those beyond it
 MIN_HITS = 10  # realizations outside of limits that a share is estimated from
 EXAMPLES = ("corner height: ppm 1000", "gap: Ppk 1.33")
 
@@ -66,6 +68,15 @@ class Requirement:
             middle - self.limits.lower - self.value * (middle - tail),
         ]
         return float(min(sides))
+
+    def decisive(self, x: np.ndarray) -> np.ndarray:
+        """Return the numbers of the values (n,) that the margin follows from: those beyond it, and as many again near it.
+
+        The median of a Ppk is regarded as if it stayed.
+        """
+        count = max(math.ceil(DECISIVE * (self.value if self.is_share else TAIL) * len(x)), MIN_DECISIVE)
+        orders = [np.argsort(-self.limits.excess(x))] if self.is_share else [np.argsort(x), np.argsort(-x)]
+        return np.concatenate([order[:count] for order in orders])
 
     def shortfall(self, x: np.ndarray) -> float:
         """Return by how much of the required value values (n,) miss it; 0 if they keep it."""

@@ -9,7 +9,7 @@ import xarray as xr
 from tolcontact import poses, vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.analysis import Analysis
-from tolcontact.analyses.engine import Progress
+from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
 from tolcontact.analyses.farthest_pose import farthest_poses
 from tolcontact.analyses.linear_model import LinearModel, linear_model
@@ -19,60 +19,68 @@ from tolcontact.simulation import simulate_blocks
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Choice, Model
 
-END_TOLERANCE = 1e-4  # of a measure's spread: searches that end at values closer than this have the same end
+SHARED = 1.0  # realizations that a search needs for a contributor at each length of its steps; it shares some with others
+END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 
 
 def worst_case(
-    model: Model | Program, *, samples: int = 4096, seed: int = 1, solver: str | None = None, method: Choice | None = None,
+    model: Model | Program, *, samples: int = 512, seed: int = 1, solver: str | None = None, method: Choice | None = None,
     into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Return the least and the largest value of each measure over all that the drawings allow.
+    """Return the worst-case minimum and maximum of each measure over all that the tolerances allow.
 
         worst       (measure, state, end)               found by searches on the engine, nonlinear and with contact
         deviations  (measure, state, end, contributor)  the combination that gives it
-        bound       (measure, state, end)               no pose free of penetration lies beyond, in the linear model (see
-                                                        tolcontact.analyses.farthest_pose); infinite if contact alone would
-                                                        have to hold the part
+        bound       (measure, state, end)               linear estimate. Raw: the sum of all tolerances times their nominal
+                                                        sensitivities. Corrected: in the linear model no pose free of
+                                                        penetration lies beyond (see tolcontact.analyses.farthest_pose);
+                                                        infinite if contact alone would have to hold the part
         random      (measure, state, end)               the worst of `samples` random combinations
-        ends        (measure, state, end)               number of different values that twelve searches ended at
+        agreeing    (measure, state, end)               number of searches that ended at this value
+        ends        (measure, state, end)               number of different values that searches from random combinations
+                                                        ended at
         unseen      (measure, state, end)               expected share of starts that lead to an end which no search found
         by_status   (status_meaning)                    number of realizations, of all that were simulated
         measured, rotation, translation, gap_min, kkt_residual, status  (case, ...)  corrected worst cases in the form in which
                                                         archives hold realizations; a case is "least" or "largest" of a measure
 
     tolcontact.analyses.allowed_space describes the region that combinations lie in. With contact a measure is neither smooth
-    nor concave, and the linearized resolution jumps: the searches may miss a worse combination. Four searches begin at the
-    best random combinations, twelve at any of them (see tolcontact.analyses.extreme_search). `unseen` is the estimate
-    w (w + 1) / (n (n - 1)) for w different ends of n = 12 searches (Boender, Rinnooy Kan, 1987).
-    Only certified realizations count. `progress` is called with the number of searches that ended, and of all.
+    nor concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` says how many
+    of them met. `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal
+    sensitivities, and those along the slopes of a regression; `samples` / 128 begin at any of them (see
+    tolcontact.analyses.extreme_search). `unseen` is the estimate w (w + 1) / (n (n - 1)) for w different ends of n searches
+    from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first order in the deviations: large tilts
+    may exceed it.
+    Only certified realizations count. `progress` is called with the number of realizations simulated, and with the
+    approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
     """
     analysis = Analysis(
         terms.WORST_CASE, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
         progress=progress,
     )  # fmt: skip
-    return search_worst_case(analysis, Effort())
+    return search_worst_case(analysis, Effort.of(analysis.samples))
 
 
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     """Return the dataset of `worst_case`, by searches of some effort."""
-    program, engine = analysis.program, analysis.engine()
+    program, engine = analysis.program, analysis.engine(analysis.samples)
     region = Region(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
-    starts = _starts(region, linear, rng, analysis.samples)
-    measured = evaluation.corrected(starts)
+    forecast = Forecast(engine, analysis.samples, effort, program, region)
+    starts, measured = _starts(region, linear, rng, analysis.samples, evaluation)
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
     searches = Searches.begin(starts, measured, effort, rng)
     searcher = Searcher(region, evaluation, spread, rng, effort.finest_step)
-    searcher.search(searches, analysis.progress)
-    values = searches.value.reshape(-1, effort.best + effort.random)
+    searcher.search(searches, forecast.advanced)
+    values = searches.value.reshape(-1, effort.searches)
     best = searches.take(values.argmax(axis=1) + values.shape[1] * np.arange(len(values)))
     searcher.finish(best)
-    random_values = values[:, effort.best :]
-    ends = np.array([_count_ends(row, END_TOLERANCE * spread[k]) for row, k in zip(random_values, best.measure, strict=True)])
+    tolerances = END_TOLERANCE * spread[best.measure]
+    ends = np.array([_count_ends(row[effort.best :], tolerance) for row, tolerance in zip(values, tolerances, strict=True)])
     corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
     shape = (len(program.nominal.measures), len(terms.STATES), len(terms.ENDS))
     arrays = {
@@ -80,21 +88,57 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
         "deviations": region.deviations(best.point).reshape(*shape, -1),
         "bound": farthest_poses(program, region, linear),
         "random": np.stack([np.nanmin(measured, axis=0), np.nanmax(measured, axis=0)], axis=-1).swapaxes(0, 1),
+        "agreeing": (values >= (values.max(axis=1) - tolerances)[:, None]).sum(axis=1).reshape(shape),
         "ends": ends.reshape(shape),
         "unseen": np.minimum(1.0, ends * (ends + 1) / (effort.random * (effort.random - 1))).reshape(shape),
         "by_status": engine.statuses,
         **_as_realizations(program, region.deviations(corrected.point)),
     }
     cases = [f"{end} {measure.name}" for measure in program.nominal.measures for end in terms.ENDS]
-    searches_of_each = effort.best + effort.random
-    return analysis.dataset(arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=searches_of_each)
+    return analysis.dataset(arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches)
 
 
-def _starts(region: Region, linear: LinearModel, rng: np.random.Generator, samples: int) -> np.ndarray:
-    """Return points (n, contributor): the middle, the far ends along linear slopes, and `samples` random ones."""
-    slopes = region.slopes(linear.by_deviations)
-    far_ends = [region.exactly_farthest(sense * row) for row in slopes for sense in terms.SENSES]
-    return np.vstack([region.middle, *far_ends, region.scattered(rng, samples)])
+class Forecast:
+    """The number of realizations that searches will need, as the engine reports it."""
+
+    def __init__(self, engine: Engine, samples: int, effort: Effort, program: Program, region: Region) -> None:
+        searches = effort.searches * len(terms.ENDS) * len(program.nominal.measures)
+        self._engine, self._samples = engine, samples
+        self._expected = SHARED * searches * effort.levels * region.moves.size
+        self.advanced(0.0)
+
+    def advanced(self, share: float) -> None:
+        """Revise the total when a share of the searches is done."""
+        searched = max(self._engine.simulated - self._samples, 0)
+        expected = (1 - share) * self._expected + share * searched
+        self._engine.total = max(self._engine.simulated, self._samples) + round((1 - share) * expected)
+
+
+def _starts(
+    region: Region, linear: LinearModel, rng: np.random.Generator, samples: int, evaluation: Evaluation
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (n, contributor), and their measures (n, state, measure).
+
+    The points are the middle, `samples` random ones, and the far ends along nominal slopes and along those of a regression of
+    the corrected measures.
+    """
+    nominal_ends = _far_ends(region, region.slopes(linear.by_deviations))
+    points = np.vstack([region.middle, nominal_ends, region.scattered(rng, samples)])
+    measured = evaluation.corrected(points)
+    corrected = measured[:, terms.CORRECTED]
+    resolved = np.isfinite(corrected).all(axis=1)
+    offsets, values = (points - region.middle)[resolved], corrected[resolved]
+    if not len(values):
+        return points, measured
+    slopes = np.linalg.lstsq(np.column_stack([np.ones(len(offsets)), offsets]), values, rcond=None)[0][1:].T
+    further = _far_ends(region, slopes)
+    return np.vstack([points, further]), np.concatenate([measured, evaluation.corrected(further)])
+
+
+def _far_ends(region: Region, slopes: np.ndarray) -> np.ndarray:
+    """Return the points (n, contributor) farthest along slopes (measure, contributor), in both senses."""
+    ends = [region.exactly_farthest(sense * row) for row in slopes for sense in terms.SENSES]
+    return np.array(ends).reshape(-1, slopes.shape[1])
 
 
 def _as_realizations(program: Program, deviations: np.ndarray) -> dict[str, np.ndarray]:

@@ -136,7 +136,7 @@ arguments are numbers.
 from tolcontact.archive.analyses import check_room_for, keep
 from tolcontact.archive.archive_lock import taken
 from tolcontact.archive.disk_space import bytes_of_rows, size_in_words
-from tolcontact.archive.reader import model_of, open_archive, opened
+from tolcontact.archive.reader import method_of_run, model_of, open_archive, opened
 from tolcontact.archive.settings import Run, run_settings
 from tolcontact.archive.stored_rows import check_rows, row_values, stored
 from tolcontact.archive.variables import labelled, sizes_of_rows
@@ -150,6 +150,7 @@ __all__ = [
     "check_rows",
     "keep",
     "labelled",
+    "method_of_run",
     "model_of",
     "open_archive",
     "opened",

@@ -1,6 +1,7 @@
 """Reading an archive with xarray, and rebuilding its model."""
 
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
+from tolcontact.method import Method
 
 CACHE_BYTES = 1 << 22  # a chunk; the library's own size would add up to as much memory as all else takes together
 
@@ -61,6 +63,12 @@ def model_of(results: xr.DataTree) -> Assembly:
             # Groups of format 1 do not say the part's name: it was their own.
             meshes[str(mesh.attrs.get("part", name))] = _mesh(mesh)
     return from_document(document, meshes)
+
+
+def method_of_run(results: xr.DataTree) -> Method:
+    """Return the method of a run; choices that an earlier format does not state are the usual ones."""
+    choices: dict[str, Any] = {field.name: results.attrs[field.name] for field in fields(Method) if field.name in results.attrs}
+    return Method(**{name: value if isinstance(value, str) else float(value) for name, value in choices.items()})  # type: ignore[arg-type]
 
 
 class _Triangles:

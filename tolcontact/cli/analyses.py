@@ -17,14 +17,14 @@ from tolcontact.analyses.relocate import relocate
 from tolcontact.analyses.sensitivities import sensitivities
 from tolcontact.analyses.tails import tails
 from tolcontact.analyses.worst_case import worst_case
+from tolcontact.archive import open_archive
 from tolcontact.cli import app as common
 from tolcontact.cli.output import console, print_data
 from tolcontact.cli.progress import shown_progress
-from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError
 from tolcontact.report import analysis_text
 from tolcontact.simulation.cluster import client_of
-from tolcontact.workflow.models import DEFAULT_SOLVER
+from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive
 
 SHARED = {  # options of every analysis, with their defaults
     "seed": (common.Seed, 1), "solver": (common.Solver, DEFAULT_SOLVER), "resolution": (common.Resolution, None),
@@ -62,7 +62,13 @@ class AnalysisCommand:
         """Add the command to the application."""
         samples = Annotated[int, typer.Option(help=self.samples)]
         default = inspect.signature(self.analysis).parameters["samples"].default
-        options = {"model": (common.Model, REQUIRED), **self.options, "samples": (samples, default), **SHARED}
+        options = {
+            "context": (typer.Context, REQUIRED),
+            "model": (common.AnalysedModel, REQUIRED),
+            **self.options,
+            "samples": (samples, default),
+            **SHARED,
+        }
         command = functools.partial(self._run)
         command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
             [
@@ -74,16 +80,16 @@ class AnalysisCommand:
         common.app.command(self.name, help=self.purpose, epilog=common.examples(*self.examples))(command)
 
     def _run(
-        self, *, model: Path, resolution: str | None, objective: str | None, as_json: bool, as_csv: bool, workers: int | None,
-        scheduler: str | None, quiet: bool, **options: Any,
+        self, *, context: typer.Context, model: Path, resolution: str | None, objective: str | None, as_json: bool,
+        as_csv: bool, workers: int | None, scheduler: str | None, quiet: bool, **options: Any,
     ) -> None:  # fmt: skip
         common.only_one(json=as_json, csv=as_csv)
+        if is_archive(model):
+            options |= _settings_of_run(model, context)
         arguments = self.arguments(options)
         with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
             method = common.chosen(resolution=resolution, objective=objective)
-            dataset = self.analysis(
-                functools.partial(load_model, model), method=method, client=client, progress=show, **arguments
-            )
+            dataset = self.analysis(model, method=method, client=client, progress=show, **arguments)
         if as_json:
             print_data(dataset)
         elif as_csv:
@@ -94,6 +100,13 @@ class AnalysisCommand:
             names = ", ".join(f'"{name}"' for name in dataset["requirement"].values[dataset["met"].values == 0])
             typer.echo(f"error: not met: {names}", err=True)
             raise typer.Exit(1)
+
+
+def _settings_of_run(archive: Path, context: typer.Context) -> dict[str, Any]:
+    """Return the seed and the solver of an archive's run, unless options of the command line replace them."""
+    with open_archive(archive) as results:
+        settings = {"seed": int(results.attrs["seed"]), "solver": str(results.attrs["solver"])}
+    return {name: value for name, value in settings.items() if name not in common.set_options(context)}
 
 
 def _intervals(name: str) -> Frame:
@@ -155,7 +168,7 @@ COMMANDS = (
         contributions,
         terms.CONTRIBUTIONS,
         "Number of base realizations; each is simulated again for every group.",
-        ("contributions model.py", "contributions model.py --by part", "contributions model.py --csv > shares.csv"),
+        ("contributions model.py", "contributions run.nc --by part", "contributions model.py --csv > shares.csv"),
         _columns(["first", "total"], "interval"),
         options={"by": (By, "contributor")},
     ),
@@ -170,7 +183,7 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "tails",
-        "Print how often measures are outside their limits, or parts cannot be assembled, where that is rare.",
+        "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
         tails,
         terms.TAILS,
         "Approximate number of realizations for each event.",
@@ -179,12 +192,12 @@ COMMANDS = (
     ),
     AnalysisCommand(
         "worst",
-        "Print the least and the largest value of each measure that the drawings allow, and the deviations that give them.",
+        "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
         worst_case,
         terms.WORST_CASE,
-        "Number of random combinations; searches begin at the best of them.",
+        "Number of random combinations; a search for each extreme begins at one in 85 of them.",
         ("worst model.py", "worst model.py --samples 20000 --json > worst.json"),
-        lambda dataset: dataset[["worst", "bound", "random", "ends", "unseen"]].to_dataframe(),
+        lambda dataset: dataset[["worst", "bound", "random", "agreeing", "ends", "unseen"]].to_dataframe(),
     ),
     AnalysisCommand(
         "allocate",

@@ -62,6 +62,10 @@ def or_(names: Iterable[str]) -> str:
 
 
 Model = Annotated[Path, typer.Argument(metavar="MODEL.py", help="Model script with a function assembly(), or a JSON model.")]
+AnalysedModel = Annotated[
+    Path,
+    typer.Argument(metavar="MODEL.py|RUN.nc", help="Model script, JSON model, or the archive of a run, for its model."),
+]
 StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")]
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]
@@ -87,6 +91,11 @@ Scheduler = Annotated[
     typer.Option(metavar="ADDRESS", help="Simulate on the workers of a dask scheduler, such as tcp://host:8786."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print results only: no progress, no notices.")]
+
+
+def set_options(context: typer.Context) -> set[str]:
+    """Return the parameters that the command line sets."""
+    return {name for name in context.params if context.get_parameter_source(name).name == "COMMANDLINE"}  # type: ignore[union-attr]
 
 
 def only_one(**options: bool) -> None:

@@ -9,7 +9,7 @@ import typer
 import xarray as xr
 
 from tolcontact.archive import open_archive, replacing_archive, taken
-from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_
+from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_, set_options
 from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
@@ -58,7 +58,7 @@ def compare(
     are_archives = [path.suffix.lower() == ".nc" for path in inputs]
     if not all(are_archives) and len(inputs) > 1:
         raise OptionError(f"{', '.join(map(str, inputs))} are neither one model nor archives (.nc)")
-    options = [name for name in MODEL_OPTIONS if context.get_parameter_source(name).name == "COMMANDLINE"]  # type: ignore[union-attr]
+    options = [name for name in MODEL_OPTIONS if name in set_options(context)]
     if all(are_archives) and options:
         raise OptionError(f"--{options[0]} applies to a model; archives have their own")
     if report is not None:

@@ -3,6 +3,7 @@
 import contextlib
 import logging
 import time
+from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -18,18 +19,26 @@ from tolcontact.workflow.forecast import duration
 LINE_INTERVAL = 10.0  # s
 
 
+WINDOW, MIN_REPORTS = 60.0, 4  # s of the latest reports that the rate follows from, and how many a forecast needs
+
+
 class Pace:
-    """The rate of finished realizations, and the time that the others will take."""
+    """The rate of finished realizations of late, and the time that the others will take.
+
+    What took no time (realizations of a resumed run) or long ago (compiling) does not count.
+    """
 
     def __init__(self) -> None:
-        self.began: tuple[float, int] | None = None  # [s], and realizations of a resumed run, which took no time
+        self._reports: deque[tuple[float, int]] = deque()  # [s], realizations
 
     def text(self, done: int, total: int) -> str:
+        """Return the rate and the remaining time in words; nothing before there are enough reports."""
         now = time.monotonic()
-        if self.began is None:
-            self.began = now, done
-        seconds, rows = now - self.began[0], done - self.began[1]
-        if not (rows and seconds > 0):
+        self._reports.append((now, done))
+        while now - self._reports[0][0] > WINDOW and len(self._reports) > MIN_REPORTS:
+            self._reports.popleft()
+        seconds, rows = now - self._reports[0][0], done - self._reports[0][1]
+        if len(self._reports) < MIN_REPORTS or not (rows > 0 and seconds > 0):
             return ""
         return f"{grouped(round(rows / seconds))} a second, {duration((total - done) * seconds / rows)} left"
 

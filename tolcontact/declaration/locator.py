@@ -174,10 +174,12 @@ class Location(Readable):
                 "if contact holds it in the other directions"
             )
         elif len(two_sided) > 6:
-            idle = ", ".join(locator.name for locator in _repeating(two_sided))
+            idle = [locator.name for locator in _repeating(two_sided)]
+            sufficient = ", ".join(locator.name for locator in two_sided if locator.name not in idle)
+            verb = "is" if len(idle) == 1 else "are"
             yield (
-                f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {idle} hold what those before "
-                "them hold already; make them one_sided=True, or leave them out"
+                f"it is over-constrained: {len(two_sided)} of its {count} hold it both ways, and {', '.join(idle)} {verb} "
+                f"redundant with {sufficient}; make the redundant ones one_sided=True, or leave them out"
             )
         elif self.floating and len(two_sided) == 6:
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"

@@ -15,7 +15,10 @@ from tolcontact.report.figures import grouped, number, percent, share
 
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
-LARGE_UNSEEN = 0.1  # share of unseen starts from which on a remark states that there may be worse ends
+AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
+FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
+EXTREMES = ("minimum", "maximum")  # on pages, for "least" and "largest" in archives
+CONTACT_OF = dict(zip(terms.STATES, ("without contact", "with contact"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -164,8 +167,10 @@ def _slopes(dataset: xr.Dataset) -> AnalysisTable:
 
 def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Found by searches over all that the drawings allow; `bound`: no pose free of penetration",
-        "lies beyond, to first order; `random`: the worst of random combinations.",
+        "Worst-case minimum and maximum over all combinations that the tolerances allow.",
+        "found: the worst combination that searches found; `searches` says how many of them met there.",
+        "linear: tolerances times sensitivities at the nominal assembly, as in a stack-up; with contact,",
+        "the farthest that parts can be without penetration, if contact or locators hold them.",
     ]
     counts = dataset["by_status"].values
     for status in terms.UNRESOLVED:
@@ -180,30 +185,33 @@ def _worst_case(dataset: xr.Dataset) -> AnalysisReport:
 
 def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     """Yield both ends of a measure in both states, and the combinations that give the corrected ends."""
-    rows = []
+    rows, searches = [], int(dataset.attrs["searches"])
     for state in terms.STATES:
-        for end in terms.ENDS:
+        for end, word in zip(terms.ENDS, EXTREMES, strict=True):
             extreme = dataset.sel(state=state, end=end)
-            values = [float(extreme[word]) for word in ("worst", "bound", "random")]
-            cells = [f"{value:.6g}" if math.isfinite(value) else "none" for value in values]
-            rows.append([f"{state}, {end}", *cells, f"{100 * float(extreme['unseen']):.0f} %"])
+            found, linear = float(extreme["worst"]), float(extreme["bound"])
+            cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
+            if "agreeing" in dataset:  # older archives do not state it
+                cells.append(f"{int(extreme['agreeing'])} of {searches}")
+            rows.append([f"{word}, {CONTACT_OF[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
     if beyond > GAP_ACCURACY:
-        remarks.append(f"Up to {beyond:.2g} beyond the bound, which is of first order in the deviations.")
+        remarks.append(f"Found up to {beyond:.2g} beyond linear: sensitivities change when parts tilt that far.")
     if not np.isfinite(dataset["bound"].values).all():
-        remarks.append("No bound: a kink in the nominal assembly, or contact alone would have to hold the part.")
-    if float(dataset["unseen"].max()) > LARGE_UNSEEN:
-        remarks.append("Searches ended at several values, so there may be worse ones; more --samples find more.")
+        remarks.append("No limit: a kink in the nominal assembly, or contact alone would have to hold the part.")
+    if "agreeing" in dataset and int(dataset["agreeing"].min()) <= FEW_SEARCHES * searches:
+        remarks.append("Where few searches met, there may be worse combinations; more --samples find more.")
     title = f"{dataset['measure'].values} [{dataset['measure_units'].values}]"
-    yield AnalysisTable(title, ["", "found", "bound", "random", "unseen ends"], rows, remarks)
+    columns = ["", "found", "linear", "searches"][: len(rows[0])]
+    yield AnalysisTable(title, columns, rows, remarks)
     deviations = dataset["deviations"].isel(state=terms.CORRECTED).transpose("contributor", "end").values
     combination = [
         [str(label), *(f"{value:+.4g}" for value in values)]
         for label, values in zip(dataset["contributor"].values, deviations, strict=True)
         if np.abs(values).max() > 0
     ]
-    yield AnalysisTable("", ["corrected", *terms.ENDS], combination, is_detail=True)
+    yield AnalysisTable("", ["deviations, with contact", *EXTREMES], combination, is_detail=True)
 
 
 def _tails(dataset: xr.Dataset) -> AnalysisReport:
@@ -234,21 +242,34 @@ def _allocation(dataset: xr.Dataset) -> AnalysisReport:
     for group in dataset["group"].values:
         row = dataset.sel(group=group)
         widths = [f"{width:.4g}" if math.isfinite(width) else "several" for width in row["range"].values]
-        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}"])
+        ranges.append([str(group), *widths, f"{float(row['factor']):.3g}", _remark_on(row, dataset.attrs)])
     before, after = dataset["cost"].sum("group").values
     tables = [
         AnalysisTable("", ["required", *terms.STAGES], requirements),
-        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["range", *terms.STAGES, "factor"], ranges),
+        AnalysisTable(f"Cost {before:.4g} before, {after:.4g} after", ["tolerance", *terms.STAGES, "factor", ""], ranges),
         *(_effects(dataset["effect"].sel(measure=measure)) for measure in dataset["measure"].values),
     ]
-    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals.\n"]
+    notes = [f"Requirements in fresh runs of {grouped(dataset.attrs['fresh'])} realizations; 95 % intervals."]
+    if "floor" in dataset.attrs:
+        notes.append("Tolerances may be a tenth (smallest allowed) to three times (largest allowed) of before.\n")
     met = dataset["met"].values if "met" in dataset else np.ones(len(requirements))  # older archives do not state it
     for name, values in zip(dataset["requirement"].values[met == 0], dataset["kept"].values[met == 0], strict=True):
         text = share if f": {terms.PPM}" in str(name) else number
         notes.append(
-            f'"{name}" is not met by ranges from a tenth to three times the present ones; the best found: {text(values[1])}.\n'
+            f'"{name}" is not met by tolerances from a tenth to three times those before; the best found: {text(values[1])}.\n'
         )
     return AnalysisReport("Allocation", f"{grouped(dataset.attrs['samples'])} realizations", notes, tables)
+
+
+def _remark_on(row: xr.Dataset, attributes: dict) -> str:
+    """Return why a tolerance did not change further, if there is a reason; older archives do not state any."""
+    if "idle" not in row:
+        return ""
+    if int(row["idle"]):
+        return "no influence"
+    factor = float(row["factor"])
+    at_floor, at_ceiling = factor <= attributes["floor"] * AT_END, factor * AT_END >= attributes["ceiling"]
+    return "smallest allowed" if at_floor else "largest allowed" if at_ceiling else ""
 
 
 def _effects(effect: xr.DataArray) -> AnalysisTable:

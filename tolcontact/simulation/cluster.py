@@ -182,18 +182,12 @@ class Workers:
         self._model: _Model | None = None
 
     def __call__(
-        self,
-        function: Callable[[Block], T],
-        program: Program,
-        *,
-        samples: int,
-        seed: int,
-        start: int = 0,
-        draws: Sampler | None = None,
-    ) -> Iterator[T]:
+        self, function: Callable[[Block], T], program: Program, *, samples: int, seed: int, start: int = 0,
+        block: int | None = None, draws: Sampler | None = None,
+    ) -> Iterator[T]:  # fmt: skip
         """Yield what `function` makes of each block of `simulate_blocks` where it is simulated; in order."""
         job = Packed.of((draws or program.draws, function), program.nominal)
-        shards = _Shards(self._client, self._sent(program), job, seed, samples, block_rows(program), self._timeout)
+        shards = _Shards(self._client, self._sent(program), job, seed, samples, block or block_rows(program), self._timeout)
         try:
             begin = start
             while begin < samples or shards:

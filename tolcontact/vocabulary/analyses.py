@@ -104,10 +104,11 @@ WORST_CASE = AnalysisRecord(
     "worst_case",
     "worst cases of the measures of {assembly}",
     (
-        ArchiveVariable("worst", _EXTREME, "f8", "worst case found: the least and the largest value"),
+        ArchiveVariable("worst", _EXTREME, "f8", "worst-case minimum and maximum, found by searches"),
         ArchiveVariable("deviations", (*_EXTREME, CONTRIBUTOR), "f8", "combination of deviations that gives it"),
-        ArchiveVariable("bound", _EXTREME, "f8", "no pose free of penetration lies beyond, to first order"),
+        ArchiveVariable("bound", _EXTREME, "f8", "linear estimate of the worst case, which large tilts may exceed"),
         ArchiveVariable("random", _EXTREME, "f8", "worst of the random combinations"),
+        ArchiveVariable("agreeing", _EXTREME, "i8", "number of searches that ended at the worst case", "1"),
         ArchiveVariable("ends", _EXTREME, "i8", "number of different values that searches ended at", "1"),
         ArchiveVariable("unseen", _EXTREME, "f8", "expected share of starts that lead to ends not seen", "1"),
         replace(_by_status(), long_name="number of realizations simulated"),
@@ -140,6 +141,7 @@ ALLOCATION = AnalysisRecord(
         ),
         ArchiveVariable("met", (REQUIREMENT,), "i1", "1: kept in the fresh run after; 0: not, by any ranges found", "1"),
         ArchiveVariable("required", (REQUIREMENT,), "f8", "share outside of the limits at most, or Ppk at least", "1"),
+        ArchiveVariable("idle", (GROUP,), "i1", "1: no influence on any requirement, so the ranges stay; 0: not so", "1"),
         ArchiveVariable("effect", (MEASURE, OF_EFFECT, GROUP, INTERVAL), "f8", "change if zones were a tenth narrower"),
     ),
 )

@@ -1,4 +1,4 @@
-"""Models: what `run` and the analyses take, from a script's path to the compiled program."""
+"""Models: what `run` and the analyses take, from the path of a script or an archive to the compiled program."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import fields
@@ -9,12 +9,13 @@ import numpy as np
 import xarray as xr
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive import method_of_run, model_of, open_archive
 from tolcontact.compilation import Program, compile_program
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.json_model import write_json
 from tolcontact.declaration.script import load_model
 from tolcontact.discretization import discretize
-from tolcontact.errors import ModelError, OptionError
+from tolcontact.errors import ArchiveError, ModelError, OptionError, TolcontactError
 from tolcontact.method import Method
 from tolcontact.plausibility import warn_of_nominal
 from tolcontact.statistics.intervals import proportion_of
@@ -29,14 +30,15 @@ Choice = Method | Mapping[str, Any]  # a method, or some of its choices; the mod
 
 
 def build(model: Model, *, solver: str = DEFAULT_SOLVER, method: Choice | None = None) -> Program:
-    """Discretize and compile a model: an assembly, the function that declares it, or the path of its script.
+    """Discretize and compile a model: an assembly, the function that declares it, or the path of its script or archive.
 
-    `method` replaces the model's own; a mapping, such as {"resolution": "exact"}, replaces single choices.
+    The model of an archive has the method of its run. `method` replaces the model's own; a mapping, such as
+    {"resolution": "exact"}, replaces single choices.
     A NominalWarning names what is probably a mistake in the nominal assembly (see tolcontact.plausibility).
     Raises ModelError with all faults of the model, and OptionError for a solver or a method that cannot be used.
     """
-    assembly = assembly_of(model)
-    program = compile_program(discretize(assembly), solver, method_of(assembly, method))
+    assembly, method_of_run = _loaded(model) if isinstance(model, str | Path) else (assembly_of(model), None)
+    program = compile_program(discretize(assembly), solver, method_of(assembly, method, method_of_run))
     warn_of_nominal(program)
     return program
 
@@ -79,7 +81,7 @@ def check_program(model: Model | Program, solver: str | None, method: Choice | N
 def assembly_of(model: Model) -> Assembly:
     """Return the assembly that a model declares. Raises OptionError for what is no model."""
     if isinstance(model, str | Path):
-        return load_model(Path(model))
+        return _loaded(model)[0]
     if not isinstance(model, Assembly) and callable(model):
         model = model()
     if not isinstance(model, Assembly):
@@ -89,9 +91,30 @@ def assembly_of(model: Model) -> Assembly:
     return model
 
 
-def method_of(assembly: Assembly, method: Choice | None) -> Method:
-    """Return the method that resolves an assembly. Raises OptionError for a choice that no method has."""
-    default = assembly.method or Method()
+def _loaded(path: str | Path) -> tuple[Assembly, Method | None]:
+    """Return the assembly of a script, a JSON file or an archive, and the method of the archive's run."""
+    if not is_archive(path):
+        return load_model(Path(path)), None
+    with open_archive(path) as results:
+        try:
+            return model_of(results), method_of_run(results)
+        except TolcontactError as error:
+            raise ArchiveError(
+                f'the model in "{path}" cannot be rebuilt, so name its script instead of the archive: {error}'
+            ) from error
+
+
+def is_archive(path: str | Path) -> bool:
+    """Return whether a path is that of an archive, by its ending."""
+    return Path(path).suffix.lower() == ".nc"
+
+
+def method_of(assembly: Assembly, method: Choice | None, default: Method | None = None) -> Method:
+    """Return the method that resolves an assembly. Raises OptionError for a choice that no method has.
+
+    `default` replaces the assembly's own method.
+    """
+    default = default or assembly.method or Method()
     if method is None or isinstance(method, Method):
         return method or default
     if not isinstance(method, Mapping):

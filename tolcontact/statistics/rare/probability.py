@@ -12,6 +12,7 @@ from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
 from tolcontact.statistics.rare.searches import INFLATIONS, Found, Score, by_inflation, by_levels, first_inflation
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
+SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
 REPLICATES = 4  # of each search
@@ -37,8 +38,11 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
 
     leads   whether scores outside of the event say how near it is; otherwise inflation alone is searched by
     """
-    pilot = score(rng.standard_normal((max(int(PILOT * samples), MIN_LEVEL_SAMPLES), dimensions))) > 0
-    if pilot.sum() >= MIN_COUNTED:
+    is_small = samples < SEARCHABLE
+    pilot = (
+        score(rng.standard_normal((MIN_PILOT if is_small else max(int(PILOT * samples), MIN_LEVEL_SAMPLES), dimensions))) > 0
+    )
+    if pilot.sum() >= (MIN_FEW if is_small else MIN_COUNTED):
         return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
     budgets = [int(share * samples) for share in SEARCHES]
     searches = [_replicates(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
