@@ -208,3 +208,10 @@ def test_things_may_be_called_like_dimensions_of_the_archive(name, tmp_path):
         assert set(groups) == {name, f"{name}_"} and len(set(groups.values())) == 2
     assert str(model_in(path)) == str(a)
     tc.run(a, samples=200, solver="daqp", out=path, resume=True).close()
+
+
+def test_a_file_that_is_no_archive_is_refused_with_what_is_expected(tmp_path):
+    path = tmp_path / "part.step"
+    path.write_text("ISO-10303-21;")
+    with pytest.raises(ArchiveError, match=r"part\.step.*expected an undamaged archive, as tolcontact run writes it"):
+        tc.summarize(path)

@@ -107,3 +107,13 @@ def test_headings_of_several_lines_stand_at_the_bottom(archive):
         "────────",
         "x      1",
     ]
+
+
+def test_a_label_stands_beside_the_first_line_of_its_figures_in_tables_that_are_too_wide():
+    console = Console(width=80, file=StringIO(), highlight=False)
+    label = "a label of many words that is wrapped since the table is too wide"
+    console.print(FigureTable(["", "mean", "two\nlines"], [[label, "1 [0, 2]", "3 [2, 4]"], ["b", f"{'9' * 40} [0, 2]", ""]]))
+    lines = [line.rstrip() for line in console.file.getvalue().splitlines()]
+    assert lines[0].endswith("two") and lines[1].split() == ["mean", "lines"]
+    first = next(line for line in lines if line.startswith("a label"))
+    assert first.split()[-2:] == ["1", "3"] and lines[lines.index(first) + 1].endswith("[0, 2]   [2, 4]")

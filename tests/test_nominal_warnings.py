@@ -94,6 +94,17 @@ def test_a_mistake_is_one_warning_that_names_it(mistake):
     assert re.match(r"\[(\w+)\]", text)[1] in KINDS
 
 
+@pytest.mark.parametrize(("limits", "is_doubtful"), [((89, 91), True), ((tc.degrees(89), tc.degrees(91)), False)])
+def test_limits_of_angles_that_are_probably_degrees(limits, is_doubtful):
+    assembly = model()
+    block, table = (next(part for part in assembly.parts if part.name == name) for name in ("block", "table"))
+    assembly.measure("corner", tc.Angle(block.face("+x"), table.face("+z")), limits=limits)
+    texts = [text for text in warned(assembly) if '"corner"' in text]
+    assert [bool(re.search(r"89 to 91 rad\); they are probably in degrees: .*tc\.degrees", text)) for text in texts] == [
+        True
+    ] * is_doubtful
+
+
 def test_a_sound_model_is_silent():
     assert not warned(model())
 

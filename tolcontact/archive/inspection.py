@@ -85,7 +85,7 @@ def _fault(path: Path) -> str:
     try:
         file = netCDF4.Dataset(path)
     except (OSError, RuntimeError, ValueError, AttributeError) as error:
-        return f"cannot be read as netCDF: {error}"
+        return f"cannot be read as netCDF: {error}; expected an undamaged archive, as tolcontact run writes it"
     try:
         _check_format(file)
         groups = list(_groups(file))

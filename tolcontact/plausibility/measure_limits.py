@@ -40,6 +40,9 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
 def _cause(program: Program, k: int, value: float) -> str:
     """Return the likely cause of the limits of measure k that exclude its nominal value."""
     measure = program.nominal.measures[k]
+    limits = program.limits(k)
+    if measure.units == "rad" and limits.lower <= math.degrees(value) <= limits.upper:
+        return "they are probably in degrees: write tc.degrees(...) around each limit"
     if not isinstance(measure.of, Point) or measure.along is None:
         return "check the limits and the declared points"
     lower, upper = measure.bounds(value)

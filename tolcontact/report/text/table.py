@@ -31,11 +31,9 @@ class FigureTable:
             yield from self._lines(rows)
             return
         table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1), show_edge=False)
-        for k, (column, least) in enumerate(zip(self.columns, self._widths(rows), strict=True)):
+        for k, (heading, least) in enumerate(zip(zip(*self._headings(), strict=True), self._widths(rows), strict=True)):
             min_width = min(least, NAME_WIDTH) if k == 0 else None
-            table.add_column(
-                column, justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width, vertical="bottom"
-            )
+            table.add_column("\n".join(heading), justify="left" if k == 0 else "right", no_wrap=k > 0, min_width=min_width)
         for row in rows:
             table.add_row(*map("\n".join, row))
         yield table
@@ -48,12 +46,16 @@ class FigureTable:
     def _full_width(self, rows: Sequence[Sequence[Sequence[str]]]) -> int:
         return sum(self._widths(rows)) + len(BETWEEN) * (len(self.columns) - 1)
 
+    def _headings(self) -> list[tuple[str, ...]]:
+        """Return the lines of the heading, whose columns end on the last one."""
+        headings = [column.split("\n") for column in self.columns]
+        height = max(map(len, headings))
+        return list(zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True))
+
     def _lines(self, rows: Sequence[Sequence[Sequence[str]]]) -> Iterator[Text]:
         """Yield what a rich table would show, which takes a hundred times as long for cells that it need not wrap."""
         widths = self._widths(rows)
-        headings = [column.split("\n") for column in self.columns]
-        height = max(map(len, headings))
-        for cells in zip(*([""] * (height - len(lines)) + lines for lines in headings), strict=True):
+        for cells in self._headings():
             yield Text(_line(cells, widths), style="table.header", no_wrap=True)
         yield Text("─" * self._full_width(rows), no_wrap=True)
         if rows:
