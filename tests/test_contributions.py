@@ -275,7 +275,7 @@ def test_a_model_in_which_nothing_varies_is_refused():
 def test_what_only_contact_moves_has_no_linear_percentages(tmp_path):
     """The clutch's roller floats: without contact its angle does not vary."""
     done = call(tmp_path, "contributions", cases.MODELS / "clutch.py", "--samples", "64", "--solver", "daqp")
-    assert done.returncode == 0 and "nan" not in done.stdout and "raw -, corrected" in done.stdout
+    assert done.returncode == 0 and "nan" not in done.stdout and "without contact -, with contact" in done.stdout
     shares = tc.contributions(cases.MODELS / "clutch.py", samples=2048, solver="daqp").isel(measure=0).sel(state="corrected")
     # Root sum square of CASES C7, which is nearly linear: sensitivities times a sixth of the tolerances.
     parts = np.array([11.910 * 0.1, 23.732 * 0.02, 11.821 * 0.025]) ** 2

@@ -164,7 +164,7 @@ def test_features_of_the_script_stay_and_can_be_datums(tmp_path):
     part.feature("bottom", part.face(tc.Brep(UNDER)), tc.Flatness(0.02), datum="A")
     part.features_from_pmi()
     assert [str(feature) for feature in part.toleranced if feature.datum == "A"] == [
-        "feature bottom of cover (datum A): cover B-rep face 5; flatness 0.02 mm"
+        "feature bottom of cover (datum A): cover B-rep face 5; flatness 0.02"
     ]
     assert DECLARED[6] in map(str, part.toleranced)
 
@@ -343,7 +343,7 @@ def test_each_body_of_a_file_gets_its_features(tmp_path):
             "feature A of body 1 (datum A): body 1 B-rep face 1",
             "feature plane 2 of body 1: body 1 B-rep face 2; profile 0.2 A",
         ],
-        ["feature plane 1 of body 2: body 2 B-rep face 1; flatness 0.1 mm"],
+        ["feature plane 1 of body 2: body 2 B-rep face 1; flatness 0.1"],
     ]  # fmt: skip
     assert [(one.features, one.reason) for one in declared.annotations] == [
         (("body 1.A",), ""), (("body 1.plane 2",), "body 2: datum A is not declared"), (("body 2.plane 1",), ""),

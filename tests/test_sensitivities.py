@@ -119,7 +119,7 @@ def test_steps_do_not_depend_on_blocks():
 def test_the_command_prints_a_table_json_and_csv(tmp_path):
     options = ("sensitivities", cases.MODELS / "ra1.py", "--samples", "32", "--solver", "daqp")
     done = call(tmp_path, *options)
-    assert done.returncode == 0 and "touched" in done.stdout, done.stderr
+    assert done.returncode == 0 and "touching" in done.stdout, done.stderr
     said = json.loads(call(tmp_path, *options, "--json").stdout, parse_constant=pytest.fail)
     assert said["attrs"]["simulated"] == 32 * 25
     table = pd.read_csv(io.StringIO(call(tmp_path, *options, "--csv").stdout))

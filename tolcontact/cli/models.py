@@ -12,6 +12,7 @@ import typer
 from tolcontact.archive import open_archive
 from tolcontact.cli.app import Model, Objective, Overwrite, Resolution, Seed, Solver, app, chosen, examples, show_warnings
 from tolcontact.cli.output import check_page, console
+from tolcontact.cli.progress import waiting
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.script import load_model
@@ -65,7 +66,7 @@ def check(
     """Check a model and its options without a run, and list all faults, and what is probably a mistake."""
     assembly, doubts = None, list[warnings.WarningMessage]()
     try:
-        with warnings.catch_warnings(record=True) as doubts:
+        with waiting(f"checking {model}"), warnings.catch_warnings(record=True) as doubts:
             assembly = load_model(model)
             program = build(assembly, solver=solver, method=chosen(resolution=resolution, objective=objective))
     except ModelError as error:
@@ -111,16 +112,17 @@ def view(
     if out is not None:
         check_page(out, overwrite=overwrite)
     path = out or temporary_page(source)
-    if source.suffix.lower() == ".nc":
-        with open_archive(source) as results:
-            write_page(results, summarize(results), path)
-    elif source.suffix.lower() in STEP:
-        model = Assembly(source.stem)
-        parts_from(model, source)
-        write_view(model, None, [], path)
-    else:
-        model = load_model(source)
-        write_view(model, *nominal_and_faults(model), path)
+    with waiting(f"reading {source}"):
+        if source.suffix.lower() == ".nc":
+            with open_archive(source) as results:
+                write_page(results, summarize(results), path)
+        elif source.suffix.lower() in STEP:
+            model = Assembly(source.stem)
+            parts_from(model, source)
+            write_view(model, None, [], path)
+        else:
+            model = load_model(source)
+            write_view(model, *nominal_and_faults(model), path)
     typer.echo(f"page: {shown(str(path))}")
     if out is None:
         typer.launch(str(path))

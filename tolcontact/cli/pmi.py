@@ -18,6 +18,7 @@ from rich.text import Text
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples, only_one
 from tolcontact.cli.output import console
+from tolcontact.cli.progress import waiting
 from tolcontact.errors import OptionError, clipped, shown
 from tolcontact.geometry.step_listing import FacesOfRecords
 from tolcontact.pmi import Datum, Dimension, Pmi, Tolerance, read_pmi
@@ -50,8 +51,9 @@ def pmi(file: StepFile, as_json: AsJson = False, as_csv: AsCsv = False, as_scrip
     The CAD kernel's own reading is compared with the list, and differences are told.
     """
     only_one(json=as_json, csv=as_csv, script=as_script)
-    information = read_pmi(file)
-    declared = _declared(file, information)
+    with waiting(f"reading {file}"):
+        information = read_pmi(file)
+        declared = _declared(file, information)
     if as_script and information.is_empty:
         raise OptionError(f"{_reason(information, shown(str(file)))}, so there is nothing to declare")
     if as_script and not declared.parts:

@@ -1,7 +1,8 @@
-"""Progress on standard error, and the message of a run that a user stops."""
+"""Progress on standard error, what a command waits for, and the message of a run that a user stops."""
 
 import contextlib
 import logging
+import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -9,7 +10,7 @@ from pathlib import Path
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
 from tolcontact import interrupts
 from tolcontact.errors import shown
@@ -17,7 +18,7 @@ from tolcontact.report import grouped
 from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s
-
+WAIT = 2.0  # s before a terminal shows what a command is waiting for
 
 WINDOW, MIN_REPORTS = 60.0, 4  # s of the latest reports that the rate follows from, and how many a forecast needs
 
@@ -72,6 +73,25 @@ def shown_progress(
 
     with bar, _log_shown(console, lambda message: bar.update(task, description=message), quiet=quiet):
         yield show
+
+
+@contextlib.contextmanager
+def waiting(text: str) -> Iterator[None]:
+    """Show on a terminal what a command is waiting for, and for how long, once that takes more than WAIT."""
+    columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
+    display = Progress(*columns, console=Console(stderr=True), transient=True)
+    display.add_task(shown(text), total=None)
+    timer = threading.Timer(WAIT, display.start)
+    timer.daemon = True
+    if display.console.is_terminal:
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        if display.console.is_terminal:
+            timer.join()
+        display.stop()
 
 
 @contextlib.contextmanager

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from tolcontact.cli.app import AsJson, StepFile, app, examples
+from tolcontact.cli.progress import waiting
 from tolcontact.errors import shown
 from tolcontact.geometry import bodies_in, faces_in
 
@@ -17,7 +18,8 @@ Body = Annotated[str | None, typer.Option(help="Name or number of the body. Not 
 @app.command(epilog=examples("bodies parts.stp"))
 def bodies(file: StepFile, as_json: AsJson = False) -> None:
     """List the bodies of a STEP file in its product tree: numbers, names, sizes in mm, faces; and its units of length."""
-    listing = bodies_in(file)
+    with waiting(f"reading {file}"):
+        listing = bodies_in(file)
     if as_json:
         _print_rows(listing)
         return
@@ -36,7 +38,8 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
 @app.command(epilog=examples("faces parts.stp --body lid"))
 def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
     """List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them."""
-    listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
+    with waiting(f"reading {file}"):
+        listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
     if as_json:
         _print_rows(listing)
         return

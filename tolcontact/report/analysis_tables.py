@@ -18,7 +18,6 @@ SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are c
 AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
 FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
 EXTREMES = ("minimum", "maximum")  # on pages, for "least" and "largest" in archives
-CONTACT_OF = dict(zip(terms.STATES, ("without contact", "with contact"), strict=True))
 
 
 @dataclass(frozen=True)
@@ -89,7 +88,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     """Yield shares of groups, the largest total share first; and Shapley effects, if there are any."""
     measure = str(dataset["measure"].values)
     raw, corrected = (percent(dataset["missed"].sel(state=state).values) for state in terms.STATES)
-    missed = [f"missed by linear sensitivities:\n  raw {raw}, corrected {corrected}"]
+    missed = [f"missed by linear sensitivities:\n  {terms.WITHOUT_CONTACT} {raw}, {terms.WITH_CONTACT} {corrected}"]
     largest = dataset["total"].sel(interval="estimate").max("state", skipna=True)
     rows = []
     for group in _by_size(dataset["total"]):
@@ -108,7 +107,7 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
-    columns = ["", "raw", "corrected, alone", "in total", "linear"]
+    columns = ["", "without\ncontact", "with contact,\nalone", "in total", "linear"]
     if not dataset.sizes["unit"]:
         yield AnalysisTable(measure, columns, rows, [*remarks, *missed], is_detail=True)
         return
@@ -120,18 +119,19 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         if not abs(float(effects.isel(unit=k).max())) < SMALL_SHARE
     ]
     title = f"{measure}: Shapley effects, which divide what is correlated"
-    yield AnalysisTable(title, ["", *terms.STATES], rows, missed, is_detail=True)
+    yield AnalysisTable(title, ["", *terms.STATE_WORDS], rows, missed, is_detail=True)
 
 
 def _by_size(shares: xr.DataArray) -> np.ndarray:
-    """Return positions of shares (state, group, interval), the largest corrected estimate first."""
+    """Return positions of shares (state, group, interval), the largest estimate with contact first."""
     return shares.sel(interval="estimate").isel(state=terms.CORRECTED).argsort()[::-1].values
 
 
 def _sensitivities(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
-        "Mean derivatives, 95 % intervals: without contact and with it, where they are smooth; and of",
-        "all, with kinks and jumps, whose share is stated.",
+        "Mean derivatives, 95 % intervals: where parts stay apart, and where they touch,",
+        "both where they are smooth; and of all, with kinks and jumps, whose share is",
+        "stated.",
         *_lost(_unresolved(dataset)),
     ]
     tables = [_slopes(dataset.sel(measure=measure)) for measure in dataset["measure"].values]
@@ -161,7 +161,7 @@ def _slopes(dataset: xr.Dataset) -> AnalysisTable:
         rows.append([str(slopes["contributor"].values), nominal, *by_contact, corrected, spread, kinks])
     small = dataset.sizes["contributor"] - len(rows)
     title = f"{dataset['measure'].values} ({dataset['measure_units'].values} for a unit of each)"
-    columns = ["", "nominal", *terms.CONTACT_STATES, "corrected", "spread", "kinks"]
+    columns = ["", "nominal", "apart", "touching", "all", "spread", "kinks"]
     return AnalysisTable(title, columns, rows, [f"and {small} with next to no effect"] if small else [])
 
 
@@ -193,7 +193,7 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
             cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
             if "agreeing" in dataset:  # older archives do not state it
                 cells.append(f"{int(extreme['agreeing'])} of {searches}")
-            rows.append([f"{word}, {CONTACT_OF[state]}", *cells])
+            rows.append([f"{word}, {terms.WORD_OF_STATE[state]}", *cells])
     remarks = []
     beyond = float((np.array(terms.SENSES) * (dataset["worst"] - dataset["bound"]).values).max())
     if beyond > GAP_ACCURACY:
