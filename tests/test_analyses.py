@@ -43,11 +43,11 @@ def test_an_archive_keeps_what_was_asked_of_its_model(archive):
                 assert there[each].dims == found[each].dims and "long_name" in there[each].attrs
             assert there.attrs.items() >= {"title": found.attrs["title"]}.items()
         page = page_of(results, tc.summarize(results))
-    assert "What matters" in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
+    assert '<h2 id="answers">Contributors' in page and "Worst cases: corner height [mm]" in page and "Rare events" in page
     assert "beyond linear: sensitivities change" in page
     assert "Allocation" in page and "Cost 2 before" in page
     drawn = data_of(page)["scene"]["realizations"]
-    assert drawn["names"][:2] == [f"worst case: {end} corner height" for end in ("least", "largest")]
+    assert drawn["names"][:2] == [f"worst-case {end}: corner height" for end in ("minimum", "maximum")]
     measured, worst = unpacked(drawn["measured"]), kept["worst_case"].worst.sel(state="corrected").values[0]
     assert measured[:2, 1, 0] == pytest.approx(worst, rel=1e-6) and len(unpacked(drawn["motions"])) == len(drawn["names"])
     case = kept["worst_case"].sel(case="least corner height", state="corrected", part="top")

@@ -17,7 +17,6 @@ SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are cou
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
 AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
 FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
-EXTREMES = ("minimum", "maximum")  # on pages, for "least" and "largest" in archives
 
 
 @dataclass(frozen=True)
@@ -187,7 +186,7 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
     """Yield both ends of a measure in both states, and the combinations that give the corrected ends."""
     rows, searches = [], int(dataset.attrs["searches"])
     for state in terms.STATES:
-        for end, word in zip(terms.ENDS, EXTREMES, strict=True):
+        for end, word in terms.WORD_OF_END.items():
             extreme = dataset.sel(state=state, end=end)
             found, linear = float(extreme["worst"]), float(extreme["bound"])
             cells = [f"{found:.6g}", f"{linear:.6g}" if math.isfinite(linear) else "no limit"]
@@ -211,7 +210,7 @@ def _extremes(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         for label, values in zip(dataset["contributor"].values, deviations, strict=True)
         if np.abs(values).max() > 0
     ]
-    yield AnalysisTable("", ["deviations, with contact", *EXTREMES], combination, is_detail=True)
+    yield AnalysisTable("", ["deviations, with contact", *terms.EXTREME_WORDS], combination, is_detail=True)
 
 
 def _tails(dataset: xr.Dataset) -> AnalysisReport:

@@ -2,10 +2,13 @@
 
 from typing import NamedTuple
 
+from tolcontact.vocabulary.analyses import ENDS
 from tolcontact.vocabulary.labels import STATES
 
 WITHOUT_CONTACT, WITH_CONTACT = STATE_WORDS = ("without contact", "with contact")  # of `STATES`
 WORD_OF_STATE = dict(zip(STATES, STATE_WORDS, strict=True))
+EXTREME_WORDS = ("minimum", "maximum")  # of `ENDS`
+WORD_OF_END = dict(zip(ENDS, EXTREME_WORDS, strict=True))
 MEASUREMENT = "measurement"
 OUT_OF_SPECIFICATION = "out of specification"
 OUT_OF_SPECIFICATION_COLUMN = "out of\nspecification"  # heading of a narrow column

@@ -88,7 +88,8 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
     rank[order] = np.arange(len(order))
     rows = results.to_dataset().isel({terms.REALIZATION: np.array([single.row for single in singles], dtype=int)[order]})
     worst = archived_analysis(results, terms.WORST_CASE)
-    names = [] if worst is None else [f"worst case: {case}" for case in worst[terms.CASE].values]
+    cases = [] if worst is None else [str(case).split(" ", 1) for case in worst[terms.CASE].values]
+    names = [f"worst-case {terms.WORD_OF_END[end]}: {measure}" for end, measure in cases]
 
     def values_of(variable: terms.ArchiveVariable) -> np.ndarray:
         values = rows[variable.name].values[rank]
