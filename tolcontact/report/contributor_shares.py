@@ -53,7 +53,7 @@ def contributor_shares(results: xr.DataTree, realizations: int) -> list[Contribu
 def _shown(names: list[str], shares: LinearShares | None, count: int) -> ContributorShares:
     if shares is None:
         return _without("The measurement does not vary, or is not a number.")
-    r2 = percent(shares.r2)
+    r2 = percent(np.maximum(shares.r2, 0.0))  # adjusted for the number of contributors, which may leave less than none
     if not shares.r2[0] >= MIN_R2:
         return _without(
             f"A linear model explains only {r2} of the variance with contact, so linear shares would mislead; "
