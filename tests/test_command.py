@@ -163,6 +163,17 @@ def test_without_a_terminal_a_line_says_at_intervals_how_far_a_run_is(interval, 
     assert not lines or re.fullmatch(r"ra1: 16 384 of 20 000, [\d ]+ a second, \d+ s left", said[3])
 
 
+@pytest.mark.parametrize(("long_wait", "quiet", "lines"), [(0.0, False, 1), (0.0, True, 0), (1e6, False, 0)])
+def test_a_long_run_is_told_once_what_takes_less_time(long_wait, quiet, lines, capsys):
+    with shown_progress("ra1", 20_000, quiet=quiet, interval=1e9, long_wait=long_wait) as show:
+        for done in range(1000, 9000, 1000):
+            show(done, 20_000)
+            time.sleep(0.01)
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == lines
+    assert not lines or re.fullmatch(r"ra1: about \d+ s left; fewer --samples take less time, with wider intervals", said[0])
+
+
 @pytest.mark.slow
 def test_on_a_terminal_a_bar_shows_how_far_a_run_is(tmp_path):
     command = [*COMMAND, "run", MODELS / "ra1.py", "--samples", "20000", "--solver", "daqp", "--surfaces", "0"]

@@ -18,6 +18,7 @@ from tolcontact.report import grouped
 from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s
+LONG_WAIT = 300.0  # s that are left when advice is given
 WAIT = 2.0  # s before a terminal shows what a command is waiting for
 
 WINDOW, MIN_REPORTS = 60.0, 4  # s of the latest reports that the rate follows from, and how many a forecast needs
@@ -32,25 +33,24 @@ class Pace:
     def __init__(self) -> None:
         self._reports: deque[tuple[float, int]] = deque()  # [s], realizations
 
-    def text(self, done: int, total: int) -> str:
-        """Return the rate and the remaining time in words; nothing before there are enough reports."""
+    def rate(self, done: int) -> float:
+        """Return how many realizations are finished in a second; 0 before there are enough reports."""
         now = time.monotonic()
         self._reports.append((now, done))
         while now - self._reports[0][0] > WINDOW and len(self._reports) > MIN_REPORTS:
             self._reports.popleft()
         seconds, rows = now - self._reports[0][0], done - self._reports[0][1]
-        if len(self._reports) < MIN_REPORTS or not (rows > 0 and seconds > 0):
-            return ""
-        return f"{grouped(round(rows / seconds))} a second, {duration((total - done) * seconds / rows)} left"
+        return rows / seconds if len(self._reports) >= MIN_REPORTS and rows > 0 and seconds > 0 else 0.0
 
 
 @contextlib.contextmanager
 def shown_progress(
-    name: str, total: int, *, quiet: bool, interval: float = LINE_INTERVAL
+    name: str, total: int, *, quiet: bool, interval: float = LINE_INTERVAL, long_wait: float = LONG_WAIT
 ) -> Iterator[Callable[[int, int], None]]:
     """Yield a function of the finished and the total number of realizations that shows progress; also show announcements.
 
-    Progress is a bar on a terminal, and elsewhere a line after each `interval` [s]. With `quiet` nothing is shown.
+    Progress is a bar on a terminal, and elsewhere a line after each `interval` [s]. With more than `long_wait` [s] left at the
+    first forecast, a line states what takes less time. With `quiet` nothing is shown.
     """
     console = Console(stderr=True)
     columns = (
@@ -60,12 +60,19 @@ def shown_progress(
         TextColumn("{task.fields[pace]}"),
     )
     bar = Progress(*columns, console=console, transient=True, disable=quiet or not console.is_terminal)
-    pace, last = Pace(), time.monotonic()
+    pace, last, is_advised = Pace(), time.monotonic(), quiet
     task = bar.add_task(shown(name), total=total, pace="")
 
     def show(done: int, total: int) -> None:
-        nonlocal last
-        speed = pace.text(done, total)
+        nonlocal last, is_advised
+        rate = pace.rate(done)
+        left = (total - done) / rate if rate else 0.0
+        speed = f"{grouped(round(rate))} a second, {duration(left)} left" if rate else ""
+        if rate and not is_advised:
+            is_advised = True
+            if left > long_wait:
+                advice = f"{shown(name)}: about {duration(left)} left; fewer --samples take less time, with wider intervals"
+                console.print(advice, markup=False, highlight=False, soft_wrap=True)
         bar.update(task, completed=done, total=total, description=shown(name), pace=speed)
         if bar.disable and not quiet and time.monotonic() - last > interval:
             last = time.monotonic()
