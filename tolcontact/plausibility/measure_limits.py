@@ -28,7 +28,8 @@ def measure_limits(draws: TrialDraws) -> Iterator[str]:
         if limits.outside(np.array(nominal)):
             yield f"{place}: its nominal value {_number(nominal)} is outside of its {stated}; {_cause(program, k, nominal)}"
             continue
-        sigma = float(spread(draws.measured[:, k])) if len(draws.measured) else 0.0
+        values = draws.measured[np.isfinite(draws.measured[:, k]), k]
+        sigma = float(spread(values)) if len(values) else 0.0
         distance = min(side for side in (nominal - limits.lower, limits.upper - nominal) if math.isfinite(side))
         if MIN_SHARE * distance < sigma and distance > FAR_SIGMAS * sigma + pushed:
             yield (

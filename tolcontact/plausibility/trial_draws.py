@@ -21,7 +21,7 @@ class TrialDraws:
 
     deviations   (draw, contributor)
     relative     (draw, pair, 12): X_RM of every pair
-    measured     (draw, measure)
+    measured     (draw, measure); a function of poses may return what is no number
     """
 
     program: Program
@@ -35,7 +35,7 @@ class TrialDraws:
         deviations = program.draws(seed=TRIAL_SEED, start=0, stop=DRAWS)
         observed = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)
         relative = observed["relative"].reshape(len(deviations), len(program.nominal.pairs), pose.ENTRIES)
-        finite = np.isfinite(relative).all(axis=(1, 2)) & np.isfinite(observed["measured"]).all(axis=1)
+        finite = np.isfinite(relative).all(axis=(1, 2))
         return cls(program, deviations[finite], relative[finite], observed["measured"][finite])
 
     def nominal_gaps(self, k: int) -> Float[Array, " point"]:
