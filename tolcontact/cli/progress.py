@@ -85,19 +85,21 @@ def shown_progress(
 @contextlib.contextmanager
 def waiting(text: str) -> Iterator[None]:
     """Show on a terminal what a command is waiting for, and for how long, once that takes more than WAIT."""
+    console = Console(stderr=True)
+    if not console.is_terminal:
+        yield
+        return
     columns = SpinnerColumn(), TextColumn("{task.description}", markup=False), TimeElapsedColumn()
-    display = Progress(*columns, console=Console(stderr=True), transient=True)
+    display = Progress(*columns, console=console, transient=True)
     display.add_task(shown(text), total=None)
     timer = threading.Timer(WAIT, display.start)
     timer.daemon = True
-    if display.console.is_terminal:
-        timer.start()
+    timer.start()
     try:
         yield
     finally:
         timer.cancel()
-        if display.console.is_terminal:
-            timer.join()
+        timer.join()
         display.stop()
 
 
