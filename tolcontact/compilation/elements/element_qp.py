@@ -35,7 +35,7 @@ from tolcontact.mechanics.setting import face_heights, face_poses
 from tolcontact.method import Method
 
 MANY_MOVERS = 4  # from which on a group is assembled from elements
-MAX_ENTRIES = 4_000_000  # of the terms of all elements of a batch of realizations
+MAX_ENTRIES = 500_000  # of the terms of all elements of a batch of realizations
 POINT_OBJECTIVES = ("active points", "all points")
 
 
