@@ -1,8 +1,9 @@
 """The elements of one kind, evaluated together: their numbers in the whole group, and their constants."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,21 @@ from tolcontact.mechanics.pose import ENTRIES, Number
 Arrays = dict[str, np.ndarray]
 
 
+class Numbers(NamedTuple):
+    """The number of the first row, deviating face, slot and bend of each pair among those of the whole group, (pair,)."""
+
+    row: Int[Array, " pair"]
+    face: Int[Array, " pair"]
+    slot: Int[Array, " pair"]
+    bend: Int[Array, " pair"]
+
+    @classmethod
+    def of(cls, elements: Sequence[Element]) -> "Numbers":
+        """Return the numbers of all pairs of a group, in their order."""
+        counts = [(e.rows, sum(e.deviating), e.rows * e.has_slots, int(e.has_slots)) for e in elements]
+        return cls(*(np.cumsum([0, *column[:-1]]) for column in zip(*counts, strict=True)))
+
+
 class ElementBatch:
     """Elements of one kind in a group; arrays of theirs are (realization, element, ...).
 
@@ -23,18 +39,21 @@ class ElementBatch:
     parts, movers, sides, rows   (element, ...) numbers of what belongs to each element
     """
 
-    def __init__(self, elements: Sequence[Element], functions: ElementFunctions, first_rows: Int[Array, " pair"]) -> None:
+    def __init__(self, elements: Sequence[Element], functions: ElementFunctions, numbers: Numbers) -> None:
         self._elements, self._functions = elements, functions
         self.pairs = np.array([element.pair for element in elements])
         self.parts = np.array([element.parts for element in elements])
         self.movers = np.array([element.movers for element in elements])
         self.sides = np.array([element.sides for element in elements], dtype=int)
-        self.rows = first_rows[self.pairs][:, None] + np.arange(elements[0].rows)
         self.size, self.row_count = elements[0].size, elements[0].rows
+        self.rows = numbers.row[self.pairs][:, None] + np.arange(self.row_count)
+        self._faces = numbers.face[self.pairs][:, None] + np.arange(sum(elements[0].deviating))
+        self._slots = numbers.slot[self.pairs][:, None] + np.arange(self.row_count)
+        self._bends = numbers.bend[self.pairs]
         self._constants = np.array([element.constants for element in elements])
         # Columns of a matrix stand one after the other in the arrays of CasADi.
         self._idle = np.array([
-            np.array([idle_row(row, self.size).full().ravel() for row in rows]).T.ravel() for rows in self.rows
+            np.array([idle_row(row, self.size).full().ravel() for row in rows]).T.ravel() for rows in self.rows.tolist()
         ])  # fmt: skip
 
     def terms(self, inputs: Arrays, shared: Arrays) -> Arrays:
@@ -61,7 +80,8 @@ class ElementBatch:
 
     def linearized(self, relative: np.ndarray, by_z: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Return X_RM to first order (realization, element, 12) after steps (realization, mover, 6)."""
-        local = {"X": relative, "by_z": by_z, "step": step[:, self.movers]}
+        shape = (len(step), len(self.pairs), -1)
+        local = {"X": relative.reshape(shape), "by_z": by_z.reshape(shape), "step": step[:, self.movers]}
         return self._call(self._functions.advance, local)["linearized"]
 
     def relative(self, poses: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -73,13 +93,6 @@ class ElementBatch:
         """Return the objective of each element (realization, element, 1)."""
         common = self._common(inputs, shared)
         return self._call(self._functions.energy, {name: common[name] for name in ENERGY_INPUTS})["energy"]
-
-    def number(self, faces: Mapping[int, Sequence[int]], slots: Sequence[int], bends: Sequence[int]) -> None:
-        """Take the numbers of the pairs' deviating faces, of their first slots and of their bends, by pair."""
-        self._faces = np.array([faces[pair] for pair in self.pairs], dtype=int)
-        if self._elements[0].has_slots:
-            self._slots = np.array([slots[pair] for pair in self.pairs])[:, None] + np.arange(self.row_count)
-            self._bends = np.array([bends[pair] for pair in self.pairs])
 
     @cached_property
     def _standing(self) -> Arrays:

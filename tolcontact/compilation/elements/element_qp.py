@@ -2,19 +2,18 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_qp import Evaluators, Standing, row_spans
 from tolcontact.compilation.contact_rows import standing_points
+from tolcontact.compilation.elements.corrected_poses import CorrectedPoses
 from tolcontact.compilation.elements.element import elements_of
-from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, evaluated
+from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Numbers, evaluated
 from tolcontact.compilation.elements.element_functions import (
-    advance_function,
     element_functions,
     function_of,
     mover_functions,
@@ -63,11 +62,16 @@ class ElementQP:
         self._term_names = [name for name in term_names(method, projects=self._projects) if name not in ("pull", "hold")]
         self._batches = _batches(nominal, group, method, self.standing, projects=self._projects)
         self._movers, self._size = mover_functions(), FREEDOMS * len(group.free)
-        self._advances = _advances(group, method)
+        self._corrected_poses = CorrectedPoses(group, method)
         self._shared = _shared_function(nominal, group)
         self._share = _share_function(self._size)
         self._number_movers()
         self._lay_out()
+
+    @property
+    def kinds(self) -> int:
+        """The number of kinds of elements, each with functions of its own."""
+        return len(self._batches)
 
     @property
     def max_batch(self) -> int:
@@ -109,11 +113,12 @@ class ElementQP:
             a[:, places], a[:, opening_places] = row["a"], row["opening"]
             by_row["lba"][:, batch.rows], by_row["row_length"][:, batch.rows] = row["lower"], row["row_length"]
             by_row["filled"][:, batch.rows] = local["filled"]
-        kept = {f"{name} {k}": local[name] for k, local in enumerate(terms) for name in ("relative", "by_z")}
+        kept = {f"{name} {k}": local[name].reshape(count, -1) for k, local in enumerate(terms) for name in ("relative", "by_z")}
         prices = np.full((count, self.slacks), length)
         return {
             "h": h, "g": np.concatenate([g.reshape(count, -1), prices], axis=1), "a": a,
-            "uba": np.full(by_row["lba"].shape, np.inf), "V": V, "faces": shared["faces"], "scale": shared["scale"],
+            "uba": np.full(by_row["lba"].shape, np.inf), "V": V.reshape(count, -1),
+            "faces": shared["faces"], "scale": shared["scale"],
             **by_row, **kept,
         }  # fmt: skip
 
@@ -121,7 +126,7 @@ class ElementQP:
         """Return the outputs of contact_qp."""
         count, x, lam_x = len(arrays["x"]), arrays["x"], arrays["lam_x"]
         y, slack = x[:, : self._size].reshape(count, -1, FREEDOMS), x[:, self._size :]
-        step = _of_blocks(self._movers.step, V=arrays["V"], y=y)["step"]
+        step = _of_blocks(self._movers.step, V=arrays["V"].reshape(count, -1, FREEDOMS**2), y=y)["step"]
         stride = arrays["stride"] if self._method.is_exact else np.full((count, 1), np.inf)
         length = np.full((count, 1), self._group.length)
         share = self._share(step=step.reshape(count, -1), y=y.reshape(count, -1), stride=stride, length=length)
@@ -138,7 +143,7 @@ class ElementQP:
             np.abs(stationarity), np.abs(np.minimum(slack, -lam_x[:, self._size :])),
             *(local["residual"][:, :, 0] for local in checked),
         ]  # fmt: skip
-        corrected = self._corrected(arrays["poses"].reshape(count, -1, ENTRIES), step * share["share"][:, :, None])
+        corrected = self._corrected_poses(arrays["poses"].reshape(count, -1, ENTRIES), step * share["share"][:, :, None])
         linearized, relative = (np.empty((count, self.slacks, ENTRIES)) for _ in range(2))
         faces = arrays["faces"].reshape(count, -1, ENTRIES)
         for k, batch in enumerate(self._batches):
@@ -226,19 +231,6 @@ class ElementQP:
         local |= {name: arrays[name][:, batch.rows] for name in ("row_length", "filled")}
         return batch.checked(local | {"slack": slack[:, batch.pairs, None], "scale": arrays["scale"][:, :, None]})
 
-    def _corrected(self, poses: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Return the poses (n, part, 12) after steps (n, mover, 6)."""
-        corrected, length = poses.copy(), np.full((1, 1, 1), self._group.length)
-        for advance in self._advances:
-            inputs = {
-                "pose": poses[:, advance.parts],
-                "movers": poses[:, advance.mover_parts],
-                "steps": step[:, advance.movers],
-            }
-            inputs |= {"centre": advance.centre[None], "centres": advance.centres[None], "length": length}
-            corrected[:, advance.parts] = _of_blocks(advance.function, **inputs)["corrected"]
-        return corrected
-
     def _number_movers(self) -> None:
         """Find out which movers are coupled, and where contributions of elements to movers are summed."""
         count = self._size // FREEDOMS
@@ -279,57 +271,16 @@ class ElementQP:
         self._layouts = {"h": h, "a": a}
 
 
-@dataclass(frozen=True, eq=False)
-class Advance:
-    """The parts that chains of equally many movers move: how a step changes their poses.
-
-    parts         (part,) positions of the parts
-    movers        (part, mover) numbers of the movers, and the positions `mover_parts` of these
-    centre        (part, 3) and `centres` (part, 3 * mover): nominal centres of part and movers [mm]
-    """
-
-    function: NamedFunction
-    parts: Int[Array, " part"]
-    movers: Int[Array, "part mover"]
-    mover_parts: Int[Array, "part mover"]
-    centre: Float[Array, "part 3"]
-    centres: Float[Array, "part _"]
-
-
-def _advances(group: Group, method: Method) -> list[Advance]:
-    kinds: dict[tuple[int, bool], list[int]] = {}
-    for part, mobility in enumerate(group.mobilities):
-        if mobility.movers:
-            kinds.setdefault((len(mobility.movers), mobility.is_reference), []).append(part)
-    of_movers = np.array([group.position(part) for part in group.free])
-    centres = np.array([np.asarray(mobility.centre) for mobility in group.mobilities])
-    advances = []
-    for parts in kinds.values():
-        movers = np.array([group.mobilities[part].movers for part in parts])
-        function, mover_parts = advance_function(group.mobilities[parts[0]], method), of_movers[movers]
-        centres_of_movers = centres[mover_parts].reshape(len(parts), -1)
-        advances.append(Advance(function, np.array(parts), movers, mover_parts, centres[parts], centres_of_movers))
-    return advances
-
-
 def _batches(nominal: Nominal, group: Group, method: Method, standing: Standing, *, projects: bool) -> list[ElementBatch]:
     """Return the elements by their kinds."""
     elements = elements_of(nominal, group, standing)
     kinds: dict[object, list] = {}
     for element in elements:
         kinds.setdefault(element.kind, []).append(element)
-    first_rows = np.array([span.start for span in row_spans(standing)])
-    face_counts = [sum(element.deviating) for element in elements]
-    first_faces = np.cumsum([0, *face_counts])
-    slots = np.cumsum([0, *(element.rows if element.has_slots else 0 for element in elements)])
-    bends = np.cumsum([0, *(element.has_slots for element in elements)])
-    batches = []
-    for members in kinds.values():
-        batch = ElementBatch(members, element_functions(members[0], method, projects=projects), first_rows)
-        faces = {k: range(first_faces[k], first_faces[k + 1]) for k in batch.pairs}
-        batch.number(faces, slots.tolist(), bends.tolist())
-        batches.append(batch)
-    return batches
+    numbers = Numbers.of(elements)
+    return [
+        ElementBatch(members, element_functions(members[0], method, projects=projects), numbers) for members in kinds.values()
+    ]
 
 
 def _shared_function(nominal: Nominal, group: Group) -> NamedFunction:
@@ -341,7 +292,11 @@ def _shared_function(nominal: Nominal, group: Group) -> NamedFunction:
     pairs = [nominal.pairs[index] for index in group.pairs]
     poses = [pose.vector() for pair in pairs for pose in face_poses(pair, inputs["deviations"]) if pose is not None]
     heights = [face_heights(pair, inputs["deviations"]) for pair in pairs]
-    outputs = {"faces": ca.vertcat(*poses), "heights": ca.vertcat(*heights), "scale": points_scale(inputs["moments"])}
+    outputs = {
+        "faces": ca.vertcat(ca.SX(0, 1), *poses),
+        "heights": ca.vertcat(*heights),
+        "scale": points_scale(inputs["moments"]),
+    }
     return function_of("shared", inputs, outputs)
 
 
