@@ -18,6 +18,7 @@ import numpy as np
 
 from tolcontact.compilation.conditioning import conditioned
 from tolcontact.compilation.contact_rows import Rows, contact_rows, standing_points
+from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.plugins import Plugin, solver
 from tolcontact.discretization import Nominal
@@ -86,8 +87,13 @@ class ContactQP:
     standing: Standing
 
     def solver(self, plugin: Plugin) -> ca.Function:
-        """Return a new solver of a plugin, without memory of any problem."""
+        """Return a new solver of a plugin of CasADi, without memory of any problem."""
         return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
+
+    def graph_solver(self) -> GraphSolver:
+        """Return a new solver that follows the graph of bodies."""
+        sparsities = {name: self.assemble.sparsity_out(name) for name in ("h", "g", "a", "lba")}
+        return GraphSolver(sparsities, slacks=self.slacks, equations=self.equations)
 
     @property
     def spans(self) -> list[slice]:

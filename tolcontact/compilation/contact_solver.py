@@ -8,6 +8,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.functions import InterpretedFunction, NamedFunction, flat
+from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
@@ -94,8 +95,8 @@ class ContactSolver:
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
-        self._solver: _PluginSolver = _PluginSolver(self._qp, self._plugin)
-        self._fallbacks: dict[str, _PluginSolver] = {}
+        self._solver = _new_solver(self._qp, self._plugin)
+        self._fallbacks: dict[str, _Solver] = {}
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
@@ -111,7 +112,7 @@ class ContactSolver:
             if not lost.size:
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _PluginSolver(self._qp, PLUGINS[name])
+                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name])
             retry = self._solved(self._fallbacks[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
             retry["second"] = np.ones((len(lost), 1))
             better = retry["residual"][:, 0] < answer["residual"][lost, 0]
@@ -128,12 +129,12 @@ class ContactSolver:
         """Return X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
         return self._relate(**arrays)["relative"]
 
-    def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+    def _solved(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])
         parts = [self._solved_batch(solver, _of(inputs, slice(k, k + MAX_BATCH))) for k in range(0, max(count, 1), MAX_BATCH)]
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def _solved_batch(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+    def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
         solution, failed = solver(problem, inputs["reactions"])
         outputs = self._finished(inputs | problem | solution)
@@ -202,6 +203,13 @@ class _PluginSolver:
         solved, failed = self._solve([array[order] for array in inputs])
         back = np.argsort(order)
         return {name: solved[i][back] for name, i in zip(SOLUTION, self._results, strict=True)}, failed[back]
+
+
+_Solver = _PluginSolver | GraphSolver
+
+
+def _new_solver(qp: ContactQP, plugin: Plugin) -> _Solver:
+    return _PluginSolver(qp, plugin) if plugin.is_conic else qp.graph_solver()
 
 
 def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:
