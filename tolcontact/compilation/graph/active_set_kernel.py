@@ -8,6 +8,21 @@ rows comes back. Equations always carry, with multipliers of any sign.
 import numpy as np
 
 from tolcontact.compilation.graph.factor_kernel import (
+    BOUND,
+    CHANGE,
+    CHANGED,
+    COUNT,
+    DIRECTION,
+    FRESH,
+    GRADIENT,
+    MULTIPLIER,
+    OPEN,
+    OPENING,
+    PRICE,
+    SCATTER,
+    STEP,
+    VALUE,
+    Y,
     add_row,
     append,
     factorize,
@@ -17,112 +32,119 @@ from tolcontact.compilation.graph.factor_kernel import (
     solve,
     squared_length,
 )
-from tolcontact.compiled import inlined_uncounted, uncounted
+from tolcontact.compilation.graph.layout import JOINT, NEAR, POSITION, ROW, SLACK
+from tolcontact.compiled import inlined_inner, inner
 
 FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
 ROUNDING = 1e-15  # of the largest multiplier
+RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
 INDEPENDENT = 1e-11  # of the square of a row: what remains of it beside the rows that carry
 EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
 
 
-@uncounted
+@inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
     """Compute the multipliers of the rows that carry, as equations, and the solution; return the largest multiplier."""
-    positions, counts, multipliers = layout.positions, work.counts, work.multipliers
-    for j in range(counts.size):
-        for t in range(positions[j], positions[j] + counts[j]):
+    multipliers = work.positions[MULTIPLIER]
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
             row = work.carrying[t]
-            multipliers[t] = work.bounds[row] + product(layout, work.slopes, row, work.gradient)
-            if work.is_open[j]:
-                multipliers[t] += work.openings[row] * work.prices[j]
+            multipliers[t] = work.rows[row, BOUND] + product(layout.blocks, work.slopes, row, work.vectors[GRADIENT])
+            if work.joints[j, OPEN]:
+                multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
     solve(layout, work, multipliers)
     return _move(layout, work)
 
 
-@uncounted
+@inner
 def _move(layout, work):  # type: ignore[no-untyped-def]
     """Compute the solution of the multipliers, and return the largest multiplier."""
-    for body in range(work.y.shape[0]):
+    for body in range(work.vectors[Y].shape[0]):
         for c in range(6):
-            work.y[body, c] = -work.gradient[body, c]
+            work.vectors[Y, body, c] = -work.vectors[GRADIENT, body, c]
     largest = 0.0
-    for j in range(work.counts.size):
-        pull = -work.prices[j]
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            row, multiplier = work.carrying[t], work.multipliers[t]
-            add_row(layout, work.slopes, row, multiplier, work.y)
-            pull += work.openings[row] * multiplier
+    for j in range(work.joints.shape[0]):
+        pull = -work.slacks[PRICE, j]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            row, multiplier = work.carrying[t], work.positions[MULTIPLIER, t]
+            add_row(layout.blocks, work.slopes, row, multiplier, work.vectors[Y])
+            pull += work.rows[row, OPENING] * multiplier
             largest = max(largest, abs(multiplier))
-        work.slack[j] = pull  # of a closed slack: its multiplier, with the other sign
+        work.slacks[VALUE, j] = pull  # of a closed slack: its multiplier, with the other sign
     return largest
 
 
-@uncounted
+@inner
 def refine(layout, work):  # type: ignore[no-untyped-def]
     """Correct the multipliers by what the rows that carry miss their bounds by."""
-    for j in range(work.counts.size):
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            work.right_side[t] = -excess(layout, work, work.carrying[t])
-    solve(layout, work, work.right_side)
-    for j in range(work.counts.size):
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            work.multipliers[t] += work.right_side[t]
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
+    solve(layout, work, work.positions[STEP])
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            work.positions[MULTIPLIER, t] += work.positions[STEP, t]
     _move(layout, work)
 
 
-@inlined_uncounted
+@inlined_inner
 def excess(layout, work, row):  # type: ignore[no-untyped-def]
     """Return by how much a row exceeds its bound."""
-    j = layout.joint[row]
-    value = product(layout, work.slopes, row, work.y) - work.bounds[row]
-    if work.is_open[j]:
-        value += work.openings[row] * work.slack[j]
+    j = layout.rows[row, JOINT]
+    value = product(layout.blocks, work.slopes, row, work.vectors[Y]) - work.rows[row, BOUND]
+    if work.joints[j, OPEN]:
+        value += work.rows[row, OPENING] * work.slacks[VALUE, j]
     return value
 
 
-@uncounted
-def set_open(layout, work, j, is_open):  # type: ignore[no-untyped-def]
-    """Open or close the slack of a joint."""
-    work.is_open[j] = is_open
-    work.fresh[j] = 0
-    work.changed[j] = True
+@inner
+def toggle(layout, work, j):  # type: ignore[no-untyped-def]
+    """Open the slack of a joint, or close it."""
+    work.joints[j, OPEN] = 1 - work.joints[j, OPEN]
+    work.joints[j, FRESH] = 0
+    work.joints[j, CHANGED] = 1
 
 
-@uncounted
-def release(layout, work, tolerance, closes):  # type: ignore[no-untyped-def]
-    """Drop the row of each joint that pulls most, open slacks whose price is too low, and close negative ones.
-
-    Returns the number of changes. Without `closes`, negative slacks stay open.
-    """
+@inner
+def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
+    """Drop the row of each joint that pulls most, and open slacks whose price is too low; return the number of changes."""
     changes = 0
-    for j in range(work.counts.size):
-        if layout.slack[j] < 0:
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] < 0:
             continue
-        lowest, position = -tolerance, -1
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            if work.multipliers[t] < lowest:
-                lowest, position = work.multipliers[t], t
-        if position >= 0:
+        lowest, position = -tolerance, layout.joints[j, POSITION]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            if work.positions[MULTIPLIER, t] < lowest:
+                lowest, position = work.positions[MULTIPLIER, t], t
+        if lowest < -tolerance:
             remove(layout, work, position)
             changes += 1
-        if not work.is_open[j] and work.slack[j] > tolerance:
-            set_open(layout, work, j, True)
-            changes += 1
-        elif closes and work.is_open[j] and work.slack[j] < -tolerance:
-            set_open(layout, work, j, False)
+        if not work.joints[j, OPEN] and work.slacks[VALUE, j] > tolerance:
+            toggle(layout, work, j)
             changes += 1
     return changes
 
 
-@uncounted
+@inner
+def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
+    """Close negative slacks, and return their number."""
+    changes = 0
+    for j in range(work.joints.shape[0]):
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < -tolerance:
+            toggle(layout, work, j)
+            changes += 1
+    return changes
+
+
+@inner
 def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Write the most violated row of each joint, or -1, and its excess; return whether there is one."""
     violated = False
-    for j in range(work.counts.size):
+    for j in range(work.joints.shape[0]):
         depths[j], deepest[j] = -tolerance, -1
-        if layout.slack[j] < 0:
+        if layout.joints[j, SLACK] < 0:
             continue
-        for row in range(layout.row_starts[j], layout.row_starts[j + 1]):
+        for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
             if work.place[row] < 0:
                 value = excess(layout, work, row)
                 if value < depths[j]:
@@ -130,20 +152,20 @@ def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-d
     return violated
 
 
-@uncounted
+@inner
 def search_joints(layout, work, rounds, depths, deepest):  # type: ignore[no-untyped-def]
     """Let rows enter and leave in all joints at once; return the rounds that this took, or -1 if there is no end."""
     for number in range(rounds):
         factorize(layout, work)
         tolerance = FEASIBLE + ROUNDING * multiply(layout, work)
-        if release(layout, work, tolerance, True):
+        if release(layout, work, tolerance) + close_slacks(layout, work, tolerance):
             continue
         if not scan(layout, work, tolerance, depths, deepest):
             return number + 1
         for j in range(deepest.size):
             enters = deepest[j] >= 0
             if number >= EAGER_ROUNDS:
-                for q in range(layout.near_starts[j], layout.near_starts[j + 1]):
+                for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
                     k = layout.near[q]
                     enters = enters and (depths[k] > depths[j] or (depths[k] == depths[j] and k > j))
             if enters:
@@ -151,31 +173,25 @@ def search_joints(layout, work, rounds, depths, deepest):  # type: ignore[no-unt
     return -1
 
 
-@uncounted
+@inner
 def make_dual_feasible(layout, work):  # type: ignore[no-untyped-def]
     """Drop rows and open slacks until no multiplier is negative."""
     while True:
         factorize(layout, work)
         multiply(layout, work)
-        if not release(layout, work, 0.0, False):
+        if not release(layout, work, 0.0):
             return
 
 
-@uncounted
+@inner
 def search_rows(layout, work, steps, depths, deepest):  # type: ignore[no-untyped-def]
     """Let rows enter one by one, from multipliers that are not negative; return whether none is violated in the end."""
     tolerance = FEASIBLE + ROUNDING * multiply(layout, work)
     while steps > 0:
-        scan(layout, work, tolerance, depths, deepest)
-        lowest, row, closing = -tolerance, -1, -1
-        for j in range(deepest.size):
-            if depths[j] < lowest:
-                lowest, row, closing = depths[j], deepest[j], -1
-            if work.is_open[j] and work.slack[j] < lowest:
-                lowest, row, closing = work.slack[j], -1, j
-        if row < 0 and closing < 0:
+        target = _most_violated(layout, work, tolerance, depths, deepest)
+        if target < 0:
             return True
-        used = _enter(layout, work, row, closing, steps)
+        used = _enter(layout, work, target, steps)
         if used == 0:
             return False
         steps -= used
@@ -184,90 +200,105 @@ def search_rows(layout, work, steps, depths, deepest):  # type: ignore[no-untype
     return False
 
 
-@uncounted
-def _aim(layout, work, row, closing):  # type: ignore[no-untyped-def]
-    """Compute the direction in which the multiplier of a row grows, or of a slack that closes: of y, slacks and multipliers."""
-    change = work.right_side
-    target = layout.joint[row] if row >= 0 else closing
-    opening = work.openings[row] if row >= 0 else 1.0
-    if row >= 0:
-        set_row(layout, work.slopes, row, 1.0, work.scatter)
-    for body in range(work.direction.shape[0]):
+@inner
+def _most_violated(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+    """Return the row that is violated most, or the number of rows and of the joint whose slack is more negative, or -1."""
+    scan(layout, work, tolerance, depths, deepest)
+    lowest, target = -tolerance, -1
+    for j in range(deepest.size):
+        if depths[j] < lowest:
+            lowest, target = depths[j], deepest[j]
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < lowest:
+            lowest, target = work.slacks[VALUE, j], work.place.size + j
+    return target
+
+
+@inner
+def _aim(layout, work, target):  # type: ignore[no-untyped-def]
+    """Compute the direction of y, slacks and multipliers (times -1) as that of the target grows; return the target's change.
+
+    The change is zero if the target depends on the rows that carry.
+    """
+    change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
+    is_row = target < work.place.size
+    joint = layout.rows[target, JOINT] if is_row else target - work.place.size
+    opening = work.rows[target, OPENING] if is_row else 1.0
+    square = opening * opening if work.joints[joint, OPEN] else 0.0
+    if is_row:
+        set_row(layout.blocks, work.slopes, target, 1.0, scatter)
+        square += squared_length(layout.blocks, work.slopes, target)
+    for body in range(direction.shape[0]):
         for c in range(6):
-            work.direction[body, c] = work.scatter[body, c]
-    for j in range(work.counts.size):
-        work.slack_direction[j] = opening if j == target else 0.0
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            change[t] = product(layout, work.slopes, work.carrying[t], work.scatter)
-            if work.is_open[j] and j == target:
-                change[t] += opening * work.openings[work.carrying[t]]
-    if row >= 0:
-        set_row(layout, work.slopes, row, 0.0, work.scatter)
+            direction[body, c] = scatter[body, c]
+    for j in range(work.joints.shape[0]):
+        work.slacks[CHANGE, j] = opening if j == joint else 0.0
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            change[t] = product(layout.blocks, work.slopes, work.carrying[t], scatter)
+            if work.joints[j, OPEN] and j == joint:
+                change[t] += opening * work.rows[work.carrying[t], OPENING]
     solve(layout, work, change)
-    for j in range(work.counts.size):
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            add_row(layout, work.slopes, work.carrying[t], -change[t], work.direction)
-            work.slack_direction[j] -= work.openings[work.carrying[t]] * change[t]
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            add_row(layout.blocks, work.slopes, work.carrying[t], -change[t], direction)
+            work.slacks[CHANGE, j] -= work.rows[work.carrying[t], OPENING] * change[t]
+    rate = opening * work.slacks[CHANGE, joint] if work.joints[joint, OPEN] else 0.0
+    if is_row:
+        rate += product(layout.blocks, work.slopes, target, direction)
+        set_row(layout.blocks, work.slopes, target, 0.0, scatter)
+    return rate if rate > INDEPENDENT * square else 0.0
 
 
-@uncounted
+@inner
 def _block(layout, work):  # type: ignore[no-untyped-def]
-    """Return the longest step that leaves multipliers not negative, the position of the row that stops it, and the joint."""
-    step, position, joint = np.inf, -1, -1
-    for j in range(work.counts.size):
-        if layout.slack[j] < 0:
+    """Return the longest step that leaves multipliers not negative, and the target (see `_aim`) that stops it."""
+    step, blocking = np.inf, -1
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] < 0:
             continue
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            change = work.right_side[t]
-            if change > 1e-14 and work.multipliers[t] < step * change:
-                step, position, joint = max(work.multipliers[t], 0.0) / change, t, -1
-        # The slack of a closed joint, with the other sign, is the multiplier of its bound.
-        change = work.slack_direction[j]
-        if not work.is_open[j] and change > 1e-14 and -work.slack[j] < step * change:
-            step, position, joint = max(-work.slack[j], 0.0) / change, -1, j
-    return step, position, joint
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            change = work.positions[STEP, t]
+            if change > RELIEVED and work.positions[MULTIPLIER, t] < step * change:
+                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.carrying[t]
+        change = work.slacks[CHANGE, j]
+        if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
+            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.place.size + j
+    return step, blocking
 
 
-@uncounted
+@inner
 def _advance(layout, work, length):  # type: ignore[no-untyped-def]
     """Take a step of this length in the direction of `_aim`."""
-    for body in range(work.y.shape[0]):
+    for body in range(work.vectors[Y].shape[0]):
         for c in range(6):
-            work.y[body, c] += length * work.direction[body, c]
-    for j in range(work.counts.size):
-        work.slack[j] += length * work.slack_direction[j]
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            work.multipliers[t] -= length * work.right_side[t]
+            work.vectors[Y, body, c] += length * work.vectors[DIRECTION, body, c]
+    for j in range(work.joints.shape[0]):
+        work.slacks[VALUE, j] += length * work.slacks[CHANGE, j]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            work.positions[MULTIPLIER, t] -= length * work.positions[STEP, t]
 
 
-@uncounted
-def _enter(layout, work, row, closing, steps):  # type: ignore[no-untyped-def]
+@inner
+def _enter(layout, work, target, steps):  # type: ignore[no-untyped-def]
     """Let a row carry, or close a slack, and drop what this relieves; return the number of steps, 0 without success."""
+    rows = work.place.size
     for number in range(steps):
-        _aim(layout, work, row, closing)
-        if row >= 0:
-            j = layout.joint[row]
-            gap, opening = excess(layout, work, row), work.openings[row] if work.is_open[j] else 0.0
-            rate = product(layout, work.slopes, row, work.direction) + opening * work.slack_direction[j]
-            square = squared_length(layout, work.slopes, row)
-        else:
-            gap, rate, square = work.slack[closing], work.slack_direction[closing], 1.0
-        step, position, joint = _block(layout, work)
-        whole = -gap / rate if rate > INDEPENDENT * square else np.inf
-        length = min(step, whole)
-        if length == np.inf:
+        rate = _aim(layout, work, target)
+        gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
+        step, blocking = _block(layout, work)
+        whole = -gap / rate if rate > 0.0 else np.inf
+        if min(step, whole) == np.inf:
             return 0
-        _advance(layout, work, length)
+        _advance(layout, work, min(step, whole))
         if whole <= step:
-            if row >= 0:
-                append(layout, work, row)
+            if target < rows:
+                append(layout, work, target)
             else:
-                set_open(layout, work, closing, False)
+                toggle(layout, work, target - rows)
             return number + 1
-        if position >= 0:
-            remove(layout, work, position)
+        if blocking < rows:
+            remove(layout, work, work.place[blocking])
         else:
-            set_open(layout, work, joint, True)
+            toggle(layout, work, blocking - rows)
         if factorize(layout, work):
             return 0
     return 0

@@ -8,56 +8,51 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.compiled import inlined_uncounted, uncounted
+from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
+from tolcontact.compiled import inlined_inner, inner
 
 DEPENDENT = 1e-11  # of the square of a row: what remains of it beside the others is rounding
+
+
+OPENING, BOUND = range(2)  # columns of Work.rows
+GRADIENT, Y, SCATTER, DIRECTION = range(4)  # of Work.vectors
+COUNT, FRESH, CHANGED, OPEN = range(4)  # columns of Work.joints
+PRICE, VALUE, CHANGE = range(3)  # of Work.slacks
+MULTIPLIER, STEP, COLUMN = range(3)  # of Work.positions
 
 
 class Work(NamedTuple):
     """The numbers of one QP: min y'y/2 + gradient'y + sum (price s + s^2/2), slopes y + openings s >= bounds, s >= 0.
 
-    slopes       (row, block, 6), openings (row,), bounds (row,)
-    gradient     (body, 6), prices (joint,)
-    y            (body, 6), slack (joint,): the solution
-    is_open      (joint,) whether the slack of the joint may differ from zero
-    counts       (joint,) number of rows of the joint that carry; they have the first positions of the joint
-    carrying     (position,) these rows
-    place        (row,) their positions, or -1
-    fresh        (joint,) number of these rows whose entries of the factor are valid
-    changed      (joint,) whether the factorization changed entries of the joint
-    factor       (position, position) the Cholesky factor, below its diagonal
-    multipliers, right_side, column (position,)
-    scatter, direction (body, 6), slack_direction (joint,)
+    slopes      (row, block, 6)
+    rows        (row, 2) openings and bounds
+    place       (row,) positions of the rows that carry, or -1
+    vectors     (4, body, 6) the gradient, the solution y, one row among zeros, the direction of y
+    joints      (joint, 4) number of rows of the joint that carry, which have its first positions; number of those whose entries
+                of the factor are valid; whether factorization changed others; whether the slack may differ from zero
+    slacks      (3, joint) price, value and direction; the value of a closed slack is the multiplier of its bound, times -1
+    factor      (position, position) the Cholesky factor, below its diagonal
+    carrying    (position,) rows that carry
+    positions   (3, position) their multipliers, a step of these, the next row of the factor
     """
 
     slopes: np.ndarray
-    openings: np.ndarray
-    bounds: np.ndarray
-    gradient: np.ndarray
-    prices: np.ndarray
-    y: np.ndarray
-    slack: np.ndarray
-    is_open: np.ndarray
-    counts: np.ndarray
-    carrying: np.ndarray
+    rows: np.ndarray
     place: np.ndarray
-    fresh: np.ndarray
-    changed: np.ndarray
+    vectors: np.ndarray
+    joints: np.ndarray
+    slacks: np.ndarray
     factor: np.ndarray
-    multipliers: np.ndarray
-    right_side: np.ndarray
-    column: np.ndarray
-    scatter: np.ndarray
-    direction: np.ndarray
-    slack_direction: np.ndarray
+    carrying: np.ndarray
+    positions: np.ndarray
 
 
-@inlined_uncounted
-def product(layout, slopes, row, vectors):  # type: ignore[no-untyped-def]
+@inlined_inner
+def product(blocks, slopes, row, vectors):  # type: ignore[no-untyped-def]
     """Return the product of a row with vectors (body, 6)."""
     total = 0.0
-    for q in range(layout.block_count[row]):
-        body = layout.blocks[row, q]
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
         total += (
             (slopes[row, q, 0] * vectors[body, 0] + slopes[row, q, 1] * vectors[body, 1])
             + (slopes[row, q, 2] * vectors[body, 2] + slopes[row, q, 3] * vectors[body, 3])
@@ -65,144 +60,145 @@ def product(layout, slopes, row, vectors):  # type: ignore[no-untyped-def]
     return total
 
 
-@inlined_uncounted
-def squared_length(layout, slopes, row):  # type: ignore[no-untyped-def]
+@inlined_inner
+def squared_length(blocks, slopes, row):  # type: ignore[no-untyped-def]
     """Return the squared length of a row."""
     total = 0.0
-    for q in range(layout.block_count[row]):
+    for q in range(blocks[row, 0]):
         for c in range(6):
             total += slopes[row, q, c] * slopes[row, q, c]
     return total
 
 
-@inlined_uncounted
-def add_row(layout, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
+@inlined_inner
+def add_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
     """Add a multiple of a row to vectors (body, 6)."""
-    for q in range(layout.block_count[row]):
-        body = layout.blocks[row, q]
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
         for c in range(6):
             vectors[body, c] += weight * slopes[row, q, c]
 
 
-@inlined_uncounted
-def set_row(layout, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
+@inlined_inner
+def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
     """Set the bodies of a row in vectors (body, 6) to a multiple of it."""
-    for q in range(layout.block_count[row]):
-        body = layout.blocks[row, q]
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
         for c in range(6):
             vectors[body, c] = weight * slopes[row, q, c]
 
 
-@uncounted
+@inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Let a row carry, behind the others of its joint."""
-    j = layout.joint[row]
-    position = layout.positions[j] + work.counts[j]
+    j = layout.rows[row, JOINT]
+    position = layout.joints[j, POSITION] + work.joints[j, COUNT]
     work.carrying[position], work.place[row] = row, position
-    work.multipliers[position] = 0.0
-    work.counts[j] += 1
+    work.positions[MULTIPLIER, position] = 0.0
+    work.joints[j, COUNT] += 1
 
 
-@uncounted
+@inner
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Let the row at a position carry no longer."""
-    j = layout.joint[work.carrying[position]]
+    j = layout.rows[work.carrying[position], JOINT]
     work.place[work.carrying[position]] = -1
-    work.counts[j] -= 1
-    for s in range(position, layout.positions[j] + work.counts[j]):
-        work.carrying[s], work.multipliers[s] = work.carrying[s + 1], work.multipliers[s + 1]
+    work.joints[j, COUNT] -= 1
+    for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
+        work.carrying[s], work.positions[MULTIPLIER, s] = work.carrying[s + 1], work.positions[MULTIPLIER, s + 1]
         work.place[work.carrying[s]] = s
-    work.fresh[j] = min(work.fresh[j], position - layout.positions[j])
-    work.changed[j] = True
+    work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
+    work.joints[j, CHANGED] = 1
 
 
-@inlined_uncounted
+@inlined_inner
 def _eliminated(layout, work, j, position, value):  # type: ignore[no-untyped-def]
     """Return an entry of the factor's next row, in a column of joint j, for its Gram entry."""
-    factor, column = work.factor, work.column
-    for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-        start = layout.positions[layout.prior[q]]
-        for t in range(start, start + work.counts[layout.prior[q]]):
+    factor, column = work.factor, work.positions[COLUMN]
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        start = layout.joints[layout.prior[q, 0], POSITION]
+        for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
             value -= factor[position, t] * column[t]
-    for t in range(layout.positions[j], position):
+    for t in range(layout.joints[j, POSITION], position):
         value -= factor[position, t] * column[t]
     return value
 
 
-@uncounted
+@inner
 def _factor_row(layout, work, j, position):  # type: ignore[no-untyped-def]
     """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
-    factor, column, carrying, counts, scatter = work.factor, work.column, work.carrying, work.counts, work.scatter
-    row, start = carrying[position], layout.positions[j]
-    opening = work.openings[row] if work.is_open[j] else 0.0
-    set_row(layout, work.slopes, row, 1.0, scatter)
-    square = squared_length(layout, work.slopes, row) + opening * opening
+    factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
+    row, start = carrying[position], layout.joints[j, POSITION]
+    opening = work.rows[row, OPENING] if work.joints[j, OPEN] else 0.0
+    set_row(layout.blocks, work.slopes, row, 1.0, scatter)
+    square = squared_length(layout.blocks, work.slopes, row) + opening * opening
     rest = square
-    for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-        k, adjacent = layout.prior[q], layout.adjacent[q]
-        for t in range(layout.positions[k], layout.positions[k] + counts[k]):
-            value = product(layout, work.slopes, carrying[t], scatter) if adjacent else 0.0
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
+        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
+            value = product(layout.blocks, work.slopes, carrying[t], scatter) if adjacent else 0.0
             column[t] = _eliminated(layout, work, k, t, value) / factor[t, t]
             rest -= column[t] * column[t]
     for t in range(start, position):
-        value = product(layout, work.slopes, carrying[t], scatter)
-        if work.is_open[j]:
-            value += opening * work.openings[carrying[t]]
+        value = product(layout.blocks, work.slopes, carrying[t], scatter)
+        if work.joints[j, OPEN]:
+            value += opening * work.rows[carrying[t], OPENING]
         column[t] = _eliminated(layout, work, j, t, value) / factor[t, t]
         rest -= column[t] * column[t]
-    for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-        k = layout.prior[q]
-        for t in range(layout.positions[k], layout.positions[k] + counts[k]):
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        k = layout.prior[q, 0]
+        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
             factor[position, t], column[t] = column[t], 0.0
     for t in range(start, position):
         factor[position, t], column[t] = column[t], 0.0
-    set_row(layout, work.slopes, row, 0.0, scatter)
+    set_row(layout.blocks, work.slopes, row, 0.0, scatter)
     factor[position, position] = np.sqrt(max(rest, 0.0))
     return rest > DEPENDENT * square
 
 
-@uncounted
+@inner
 def factorize(layout, work):  # type: ignore[no-untyped-def]
     """Complete the factor, and return the number of rows that carry no longer, since they depend on those before them."""
     dropped = 0
-    for j in range(work.counts.size):
-        for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-            if work.changed[layout.prior[q]]:
-                work.fresh[j], work.changed[j] = 0, True
-        if work.fresh[j] < work.counts[j]:
-            work.changed[j] = True
-        while work.fresh[j] < work.counts[j]:
-            position = layout.positions[j] + work.fresh[j]
+    for j in range(work.joints.shape[0]):
+        for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+            if work.joints[layout.prior[q, 0], CHANGED]:
+                work.joints[j, FRESH], work.joints[j, CHANGED] = 0, 1
+        if work.joints[j, FRESH] < work.joints[j, COUNT]:
+            work.joints[j, CHANGED] = 1
+        while work.joints[j, FRESH] < work.joints[j, COUNT]:
+            position = layout.joints[j, POSITION] + work.joints[j, FRESH]
             if _factor_row(layout, work, j, position):
-                work.fresh[j] += 1
+                work.joints[j, FRESH] += 1
             else:
                 remove(layout, work, position)
                 dropped += 1
-    work.changed[:] = False
+    for j in range(work.joints.shape[0]):
+        work.joints[j, CHANGED] = 0
     return dropped
 
 
-@uncounted
+@inner
 def solve(layout, work, values):  # type: ignore[no-untyped-def]
     """Solve with the Gram matrix of the rows that carry, in place; values (position,)."""
-    factor, positions, counts = work.factor, layout.positions, work.counts
-    for j in range(counts.size):
-        for position in range(positions[j], positions[j] + counts[j]):
+    factor = work.factor
+    for j in range(work.joints.shape[0]):
+        for position in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
             value = values[position]
-            for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-                start = positions[layout.prior[q]]
-                for t in range(start, start + counts[layout.prior[q]]):
+            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+                start = layout.joints[layout.prior[q, 0], POSITION]
+                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
                     value -= factor[position, t] * values[t]
-            for t in range(positions[j], position):
+            for t in range(layout.joints[j, POSITION], position):
                 value -= factor[position, t] * values[t]
             values[position] = value / factor[position, position]
-    for j in range(counts.size - 1, -1, -1):
-        for position in range(positions[j] + counts[j] - 1, positions[j] - 1, -1):
+    for j in range(work.joints.shape[0] - 1, -1, -1):
+        for position in range(layout.joints[j, POSITION] + work.joints[j, COUNT] - 1, layout.joints[j, POSITION] - 1, -1):
             value = values[position] / factor[position, position]
             values[position] = value
-            for q in range(layout.prior_starts[j], layout.prior_starts[j + 1]):
-                start = positions[layout.prior[q]]
-                for t in range(start, start + counts[layout.prior[q]]):
+            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+                start = layout.joints[layout.prior[q, 0], POSITION]
+                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
                     values[t] -= factor[position, t] * value
-            for t in range(positions[j], position):
+            for t in range(layout.joints[j, POSITION], position):
                 values[t] -= factor[position, t] * value

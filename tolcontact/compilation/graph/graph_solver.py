@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Bool, Float
+from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation.graph.factor_kernel import Work
-from tolcontact.compilation.graph.layout import Layout, layout
+from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layout
 from tolcontact.compilation.graph.solve_kernel import solve_batch
 from tolcontact.mechanics.correction import FREEDOMS
 
@@ -41,17 +41,18 @@ class GraphSolver:
         count = len(reactions)
         answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
         failed = np.zeros(count, dtype=np.bool_)
+        arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
+        results = (*answer.values(), failed)
         coupled = (problem["h"] != self._identity).any(axis=1)
         for is_coupled in (False, True):
             rows = np.flatnonzero(coupled == is_coupled)
             if len(rows) == count:
-                self._search(is_coupled)(problem, self._full, reactions, (*answer.values(), failed))
+                self._search(is_coupled)(arrays, reactions, results)
             elif rows.size:
-                part = {name: problem[name][rows] for name in ("h", "g", "a", "lba")}
-                results = (*(values[rows] for values in answer.values()), failed[rows])
-                self._search(is_coupled)(part, self._full, reactions[rows], results)
-                for values, result in zip((*answer.values(), failed), results, strict=True):
-                    values[rows] = result
+                part = tuple(array[rows] for array in results)
+                self._search(is_coupled)(tuple(array[rows] for array in arrays), reactions[rows], part)
+                for array, values in zip(results, part, strict=True):
+                    array[rows] = values
         return answer, failed
 
     def _sizes(self) -> dict[str, int]:
@@ -61,7 +62,7 @@ class GraphSolver:
     def _full(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of a vector, (realization, entry)."""
         if self._is_full[name]:
-            return np.ascontiguousarray(stored)
+            return stored
         entries = np.zeros((len(stored), self._sparsities[name].numel()))
         entries[:, self._nonzeros[name]] = stored
         return entries
@@ -70,7 +71,7 @@ class GraphSolver:
         if coupled not in self._searches:
             sparsities = self._sparsities["h"], self._sparsities["a"]
             self._searches[coupled] = _Search(
-                layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled), coupled
+                *layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled), coupled=coupled
             )
         return self._searches[coupled]
 
@@ -78,51 +79,39 @@ class GraphSolver:
 class _Search:
     """The layout of QPs, with buffers for their solution; `coupled` if H has blocks beside its diagonal."""
 
-    def __init__(self, layout: Layout, coupled: bool) -> None:
-        self._layout, self._coupled = layout, coupled
-        rows, width = layout.blocks.shape
-        bodies, joints, positions = len(layout.body_order), len(layout.slack), int(layout.positions[-1])
-        self._buffer = np.zeros(rows * width * FREEDOMS + rows)
+    def __init__(self, layout: Layout, storage: Storage, *, coupled: bool) -> None:
+        self._layout, self._storage, self._coupled = layout, storage, coupled
+        rows, width = len(layout.blocks), layout.blocks.shape[1] - 1
+        bodies, joints, positions = len(storage.bodies), len(layout.joints) - 1, int(layout.joints[-1, POSITION])
         cut = rows * width * FREEDOMS
+        self._buffer = np.zeros(cut + 2 * rows)
         self._work = Work(
             slopes=self._buffer[:cut].reshape(rows, width, FREEDOMS),
-            openings=self._buffer[cut:],
-            bounds=np.zeros(rows),
-            gradient=np.zeros((bodies, FREEDOMS)),
-            prices=np.zeros(joints),
-            y=np.zeros((bodies, FREEDOMS)),
-            slack=np.zeros(joints),
-            is_open=np.zeros(joints, dtype=np.bool_),
-            counts=np.zeros(joints, dtype=np.int64),
-            carrying=np.zeros(positions, dtype=np.int64),
+            rows=self._buffer[cut:].reshape(rows, 2),
             place=np.zeros(rows, dtype=np.int64),
-            fresh=np.zeros(joints, dtype=np.int64),
-            changed=np.zeros(joints, dtype=np.bool_),
+            vectors=np.zeros((4, bodies, FREEDOMS)),
+            joints=np.zeros((joints, 4), dtype=np.int64),
+            slacks=np.zeros((3, joints)),
             factor=np.zeros((positions, positions)),
-            multipliers=np.zeros(positions),
-            right_side=np.zeros(positions),
-            column=np.zeros(positions),
-            scatter=np.zeros((bodies, FREEDOMS)),
-            direction=np.zeros((bodies, FREEDOMS)),
-            slack_direction=np.zeros(joints),
+            carrying=np.zeros(positions, dtype=np.int64),
+            positions=np.zeros((3, positions)),
         )
-        self._blocks = np.zeros((len(layout.columns) if coupled else 0, FREEDOMS, FREEDOMS))
-        self._block_of = np.full((bodies, bodies) if coupled else (0, 0), -1, dtype=np.int64)
-        if coupled:
-            rows_of_blocks = np.repeat(np.arange(bodies), np.diff(layout.body_starts))
-            self._block_of[rows_of_blocks, layout.columns] = np.arange(len(layout.columns))
+        self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))
         self._guesses = np.zeros(joints), np.zeros(joints, dtype=np.int64)
         self._limits = np.array([ROUNDS if bodies > FEW_BODIES else ROUNDS_OF_FEW, STEPS_PER_ROW * (rows + FREEDOMS)])
 
-    def __call__(self, problem: Arrays, full, reactions: np.ndarray, answer: tuple[np.ndarray, ...]) -> np.ndarray:  # type: ignore[no-untyped-def]
-        """Solve QPs into `answer`: x, lam_a, lam_x, failed; return the counters of `solve_batch`."""
-        hessian = problem["h"] if self._coupled else np.zeros((len(reactions), 0))
-        counters = np.zeros((len(reactions), 2), dtype=np.int64)
+    def __call__(
+        self, problem: tuple[np.ndarray, ...], reactions: np.ndarray, answer: tuple[np.ndarray, ...]
+    ) -> Int[Array, "realization 2"]:
+        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); return the counters of `solve_batch`."""
+        h, *vectors = (np.ascontiguousarray(array) for array in problem)
+        counters = np.zeros((len(h), 2), dtype=np.int64)
         solve_batch(
             self._layout,
+            self._storage,
             self._work,
-            (np.ascontiguousarray(hessian), self._blocks, self._block_of),
-            (np.ascontiguousarray(problem["a"]), full("g", problem["g"]), full("lba", problem["lba"]), self._buffer),
+            (h if self._coupled else h[:, :0].copy(), self._blocks),
+            (*vectors, self._buffer),
             np.ascontiguousarray(reactions),
             self._limits,
             (*self._guesses, counters),

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from tolcontact.compiled import inlined_uncounted, uncounted
+from tolcontact.compiled import inlined_inner, inner
 
 
-@inlined_uncounted
+@inlined_inner
 def _cholesky(block):  # type: ignore[no-untyped-def]
     """Replace a block (6, 6) by its Cholesky factor; return whether it is positive definite."""
     for i in range(6):
@@ -22,7 +22,7 @@ def _cholesky(block):  # type: ignore[no-untyped-def]
     return True
 
 
-@inlined_uncounted
+@inlined_inner
 def _divide(block, triangle):  # type: ignore[no-untyped-def]
     """Replace a block by its product with the inverse transpose of a lower triangle."""
     for i in range(6):
@@ -33,41 +33,41 @@ def _divide(block, triangle):  # type: ignore[no-untyped-def]
             block[i, j] = value / triangle[j, j]
 
 
-@inlined_uncounted
-def _subtract(block, left, right, is_diagonal):  # type: ignore[no-untyped-def]
+@inlined_inner
+def _subtract(block, left, right):  # type: ignore[no-untyped-def]
     """Subtract left right' from a block."""
     for i in range(6):
-        for j in range(i + 1 if is_diagonal else 6):
+        for j in range(6):
             value = block[i, j]
             for c in range(6):
                 value -= left[i, c] * right[j, c]
             block[i, j] = value
 
 
-@uncounted
-def load_hessian(layout, nonzeros, k, blocks, block_of):  # type: ignore[no-untyped-def]
+@inner
+def load_hessian(storage, nonzeros, k, blocks):  # type: ignore[no-untyped-def]
     """Write the factor of problem k into its blocks; return whether H is positive definite."""
     blocks[:] = 0.0
-    for entry in range(layout.hessian_entries.size):
-        if layout.hessian_entries[entry] >= 0:
-            block, place = divmod(layout.hessian_entries[entry], 36)
+    for entry in range(storage.hessian_entries.size):
+        if storage.hessian_entries[entry] >= 0:
+            block, place = divmod(storage.hessian_entries[entry], 36)
             blocks[block, place // 6, place % 6] = nonzeros[k, entry]
-    starts, columns = layout.body_starts, layout.columns
+    starts, columns, block_of = storage.starts, storage.columns, storage.block_of
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
         for b in range(starts[body], diagonal):
             column = columns[b]
             for e in range(starts[body], b):
                 if block_of[column, columns[e]] >= 0:
-                    _subtract(blocks[b], blocks[e], blocks[block_of[column, columns[e]]], False)
+                    _subtract(blocks[b], blocks[e], blocks[block_of[column, columns[e]]])
             _divide(blocks[b], blocks[starts[column + 1] - 1])
-            _subtract(blocks[diagonal], blocks[b], blocks[b], True)
+            _subtract(blocks[diagonal], blocks[b], blocks[b])
         if not _cholesky(blocks[diagonal]):
             return False
     return True
 
 
-@inlined_uncounted
+@inlined_inner
 def _forward(triangle, vector):  # type: ignore[no-untyped-def]
     """Solve with a lower triangle, in place."""
     for i in range(6):
@@ -77,10 +77,10 @@ def _forward(triangle, vector):  # type: ignore[no-untyped-def]
         vector[i] = value / triangle[i, i]
 
 
-@uncounted
-def vectors_to_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
+@inner
+def vectors_to_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
     """Replace vectors (body, 6) by C^-1 times them."""
-    starts, columns = layout.body_starts, layout.columns
+    starts, columns = storage.starts, storage.columns
     for body in range(starts.size - 1):
         diagonal = starts[body + 1] - 1
         for b in range(starts[body], diagonal):
@@ -90,10 +90,10 @@ def vectors_to_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
         _forward(blocks[diagonal], vectors[body])
 
 
-@uncounted
-def from_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
+@inner
+def from_unit(storage, blocks, vectors):  # type: ignore[no-untyped-def]
     """Replace vectors (body, 6) by C'^-1 times them."""
-    starts, columns = layout.body_starts, layout.columns
+    starts, columns = storage.starts, storage.columns
     for body in range(starts.size - 2, -1, -1):
         diagonal = starts[body + 1] - 1
         for i in range(5, -1, -1):
@@ -107,16 +107,16 @@ def from_unit(layout, blocks, vectors):  # type: ignore[no-untyped-def]
                     vectors[columns[b], c] -= blocks[b, i, c] * vectors[body, i]
 
 
-@uncounted
-def rows_to_unit(layout, blocks, block_of, slopes):  # type: ignore[no-untyped-def]
-    """Replace the slopes (row, block, 6) of all rows by C^-1 times them; each touches the bodies that this needs."""
-    starts = layout.body_starts
-    for row in range(layout.row_order.size):
-        for q in range(layout.block_count[row]):
-            body = layout.blocks[row, q]
+@inner
+def rows_to_unit(bodies, storage, blocks, slopes):  # type: ignore[no-untyped-def]
+    """Replace the slopes (row, block, 6) of all rows by C^-1 times them; `bodies` are those of Layout.blocks."""
+    starts = storage.starts
+    for row in range(slopes.shape[0]):
+        for q in range(bodies[row, 0]):
+            body = bodies[row, q + 1]
             _forward(blocks[starts[body + 1] - 1], slopes[row, q])
-            for p in range(q + 1, layout.block_count[row]):
-                b = block_of[layout.blocks[row, p], body]
+            for p in range(q + 1, bodies[row, 0]):
+                b = storage.block_of[bodies[row, p + 1], body]
                 if b >= 0:
                     for i in range(6):
                         for c in range(6):

@@ -12,52 +12,52 @@ import numpy as np
 from tolcontact.compilation.graph.elimination import elimination, least_degree, least_depth
 from tolcontact.mechanics.correction import FREEDOMS
 
+JOINT, SOURCE = range(2)  # columns of Layout.rows
+ROW, POSITION, PRIOR, NEAR, SLACK = range(5)  # columns of Layout.joints
+
 
 class Layout(NamedTuple):
-    """Constant arrays of all QPs of a group. Bodies, joints and rows are numbered in the order of their elimination.
+    """Constant arrays for the search for the rows that carry. Bodies, joints and rows are numbered in the order of elimination.
 
-    body_order      (body,) number of each body in the QP
-    row_order       (row,) number of each row in the QP, the rows of a joint one after the other
-    block_count     (row,) number of bodies that the row touches
-    blocks          (row, block) these bodies, in ascending order
-    entries         (nonzero of a) place of each nonzero in the buffer of the rows: slopes (row, block, 6), then openings (row,)
-    joint           (row,) joint of each row
-    row_starts      (joint + 1,) first row of each joint
-    positions       (joint + 1,) first position of each joint in the Gram matrix of the rows that carry
-    slack           (joint,) slack of the joint, or -1
-    prior_starts    (joint + 1,) first entry of each joint in `prior`
-    prior           earlier joints with which a joint has entries in the factor of the Gram matrix
-    adjacent        whether these joints share a body, so that the Gram matrix has entries, too
-    near_starts     (joint + 1,) first entry of each joint in `near`
-    near            joints that share a body with a joint
-    hessian_entries (nonzero of h) place of each nonzero in the buffer of blocks (block, 6, 6), or -1
-    body_starts     (body + 1,) first block of each body's row in the factor of H
-    columns         (block,) body of each block's column; the last block of a row is on the diagonal
+    blocks   (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
+    rows     (row, 2) its joint, and its number in the QP; the rows of a joint come one after the other
+    joints   (joint + 1, 5) the first row of the joint, its first position in the Gram matrix of the rows that carry, its first
+             rows of `prior` and `near`, and its slack, or -1 for equations
+    prior    (_, 2) earlier joints with which the joint has entries in the factor of the Gram matrix, and whether the two share
+             a body, so that the Gram matrix has entries, too
+    near     (_,) joints that share a body with the joint
     """
 
-    body_order: np.ndarray
-    row_order: np.ndarray
-    block_count: np.ndarray
     blocks: np.ndarray
-    entries: np.ndarray
-    joint: np.ndarray
-    row_starts: np.ndarray
-    positions: np.ndarray
-    slack: np.ndarray
-    prior_starts: np.ndarray
+    rows: np.ndarray
+    joints: np.ndarray
     prior: np.ndarray
-    adjacent: np.ndarray
-    near_starts: np.ndarray
     near: np.ndarray
+
+
+class Storage(NamedTuple):
+    """Where the entries of a QP are stored.
+
+    bodies          (body,) number of each body in the QP
+    entries         (nonzero of a) place of each nonzero in a buffer: slopes (row, block, 6), then openings and bounds (row, 2)
+    hessian_entries (nonzero of h) place of each nonzero in the blocks (block, 6, 6) of H below its diagonal, or -1
+    starts          (body + 1,) first block of each body's row; its last block is on the diagonal
+    columns         (block,) body of each block's column
+    block_of        (body, body) block of a row and column, or -1
+    """
+
+    bodies: np.ndarray
+    entries: np.ndarray
     hessian_entries: np.ndarray
-    body_starts: np.ndarray
+    starts: np.ndarray
     columns: np.ndarray
+    block_of: np.ndarray
 
 
-def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> Layout:
-    """Return the layout of QPs with these sparsities; if `coupled`, of QPs whose H has blocks beside its diagonal.
+def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> tuple[Layout, Storage]:
+    """Return the layout and the storage of QPs with these sparsities.
 
-    Such a H = C C' is taken to the rows: they become C^-1 a, and touch the bodies that follow theirs in the order as well.
+    If `coupled`, H = C C' has blocks beside its diagonal. Rows become C^-1 a, and touch the bodies that follow theirs as well.
     """
     bodies, count = (h.size1() - slacks) // FREEDOMS, a.size1()
     rows, columns = (np.array(indices, dtype=np.int64) for indices in a.get_triplet())
@@ -84,27 +84,18 @@ def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupl
     blocks = [sorted(int(body_rank[body]) for body in touched[row]) for row in row_order]
     width = max([1, *map(len, blocks)])
     sizes = [len(joints[j]) if j < equation_joints else min(len(joints[j]), FREEDOMS * len(joint_bodies[j]) + 2) for j in order]
-    adjacent = [order[k] in near[order[j]] for j, nodes in enumerate(prior) for k in nodes]
-    body_starts, block_columns, hessian_entries = _hessian_blocks(h, bodies, later, body_rank)
+    positions = np.cumsum([0, *sizes])
+    slack_of_joint = [*(slack_of_row[rows_of_joint[0]] for rows_of_joint in members), -1]
+    adjacent = [(k, order[k] in near[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
     return Layout(
-        body_order=np.array(body_order, dtype=np.int64),
-        row_order=row_order,
-        block_count=np.array([len(nodes) for nodes in blocks], dtype=np.int64),
-        blocks=np.array([nodes + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64).reshape(count, width),
-        entries=_entries(rows, columns, np.argsort(row_order), body_rank, blocks, width),
-        joint=np.repeat(np.arange(len(order)), [len(rows_of_joint) for rows_of_joint in members]),
-        row_starts=_starts(members),
-        positions=np.cumsum([0, *sizes]),
-        slack=np.array([slack_of_row[rows_of_joint[0]] for rows_of_joint in members], dtype=np.int64),
-        prior_starts=_starts(prior),
-        prior=np.array([k for nodes in prior for k in nodes], dtype=np.int64),
-        adjacent=np.array(adjacent, dtype=np.bool_),
-        near_starts=_starts([near[j] for j in order]),
+        blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
+        rows=np.stack([np.repeat(np.arange(len(order)), list(map(len, members))), row_order], axis=1),
+        joints=np.stack(
+            [_starts(members), positions, _starts(prior), _starts([near[j] for j in order]), slack_of_joint], axis=1
+        ),
+        prior=np.array(adjacent, dtype=np.int64).reshape(-1, 2),
         near=np.array([rank[k] for j in order for k in sorted(near[j])], dtype=np.int64),
-        hessian_entries=hessian_entries,
-        body_starts=body_starts,
-        columns=block_columns,
-    )
+    ), _storage(h, body_order, later, _entries(rows, columns, np.argsort(row_order), body_rank, blocks, width))
 
 
 def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
@@ -152,23 +143,30 @@ def _entries(
     for k, (row, column) in enumerate(zip(row_rank[rows].tolist(), columns.tolist(), strict=True)):
         body, freedom = divmod(column, FREEDOMS)
         if body >= len(body_rank):
-            places[k] = openings + row
+            places[k] = openings + 2 * row
         else:
             places[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
     return places
 
 
-def _hessian_blocks(
-    h: ca.Sparsity, bodies: int, later: Sequence[Sequence[int]], body_rank: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return `body_starts`, `columns` and `hessian_entries` of a Layout; H is read below its diagonal."""
+def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]], entries: np.ndarray) -> Storage:
+    bodies, rank = len(order), np.argsort(order)
     columns = [[*(k for k, nodes in enumerate(later) if body in nodes), body] for body in range(bodies)]
     starts = _starts(columns)
-    places = np.full(h.nnz(), -1, dtype=np.int64)
-    for k, (row, column) in enumerate(zip(*h.get_triplet(), strict=True)):
-        if max(row, column) < bodies * FREEDOMS:
-            i, j = int(body_rank[row // FREEDOMS]), int(body_rank[column // FREEDOMS])
-            if j in columns[i]:
-                block = starts[i] + columns[i].index(j)
-                places[k] = (block * FREEDOMS + row % FREEDOMS) * FREEDOMS + column % FREEDOMS
-    return starts, np.array([k for nodes in columns for k in nodes], dtype=np.int64), places
+    block_of = np.full((bodies, bodies), -1, dtype=np.int64)
+    for body, nodes in enumerate(columns):
+        block_of[body, nodes] = starts[body] + np.arange(len(nodes))
+    rows_of_h, columns_of_h = (np.array(indices, dtype=np.int64) for indices in h.get_triplet())
+    places = np.full(len(rows_of_h), -1, dtype=np.int64)
+    of_bodies = np.flatnonzero(np.maximum(rows_of_h, columns_of_h) < bodies * FREEDOMS)
+    i, j = rows_of_h[of_bodies], columns_of_h[of_bodies]
+    blocks = block_of[rank[i // FREEDOMS], rank[j // FREEDOMS]]
+    places[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
+    return Storage(
+        bodies=np.array(order, dtype=np.int64),
+        entries=entries,
+        hessian_entries=places,
+        starts=starts,
+        columns=np.array([k for nodes in columns for k in nodes], dtype=np.int64),
+        block_of=block_of,
+    )

@@ -7,46 +7,59 @@ from tolcontact.compilation.graph.active_set_kernel import (
     search_joints,
     search_rows,
 )
-from tolcontact.compilation.graph.factor_kernel import append
+from tolcontact.compilation.graph.factor_kernel import (
+    BOUND,
+    CHANGED,
+    COUNT,
+    FRESH,
+    GRADIENT,
+    MULTIPLIER,
+    OPEN,
+    PRICE,
+    VALUE,
+    Y,
+    append,
+)
 from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
-from tolcontact.compiled import uncounted
+from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOURCE
+from tolcontact.compiled import inner, uncounted
 
 ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
 MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
 
 
-@uncounted
-def _load(layout, work, problem, k, clears):  # type: ignore[no-untyped-def]
+@inner
+def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped-def]
     """Write the rows, bounds, gradient and prices of problem k into `work`, which is cleared if rows fill more of it."""
     slopes, gradient, bounds, buffer = problem
     if clears:
         work.slopes[:] = 0.0
-    for entry in range(layout.entries.size):
-        buffer[layout.entries[entry]] = slopes[k, entry]
-    for row in range(layout.row_order.size):
-        work.bounds[row] = bounds[k, layout.row_order[row]]
+    for entry in range(storage.entries.size):
+        buffer[storage.entries[entry]] = slopes[k, entry]
+    for row in range(layout.rows.shape[0]):
+        work.rows[row, BOUND] = bounds[k, layout.rows[row, SOURCE]]
         work.place[row] = -1
-    bodies = layout.body_order.size
+    bodies = storage.bodies.size
     for body in range(bodies):
         for c in range(6):
-            work.gradient[body, c] = gradient[k, 6 * layout.body_order[body] + c]
-    for j in range(layout.slack.size):
-        work.prices[j] = gradient[k, 6 * bodies + layout.slack[j]] if layout.slack[j] >= 0 else 0.0
-        work.counts[j], work.fresh[j] = 0, 0
-        work.changed[j], work.is_open[j] = False, False
+            work.vectors[GRADIENT, body, c] = gradient[k, 6 * storage.bodies[body] + c]
+    for j in range(work.joints.shape[0]):
+        work.slacks[PRICE, j] = gradient[k, 6 * bodies + layout.joints[j, SLACK]] if layout.joints[j, SLACK] >= 0 else 0.0
+        work.joints[j, COUNT], work.joints[j, FRESH] = 0, 0
+        work.joints[j, CHANGED], work.joints[j, OPEN] = 0, 0
 
 
-@uncounted
+@inner
 def _start(layout, work, reactions, k):  # type: ignore[no-untyped-def]
     """Let equations carry, and the rows that carried before, as far as there are positions."""
-    for row in range(layout.row_order.size):
-        j, source = layout.joint[row], layout.row_order[row]
-        has_position = layout.positions[j] + work.counts[j] < layout.positions[j + 1]
-        if layout.slack[j] < 0 or (reactions[k, source] > 0 and has_position):
+    for row in range(layout.rows.shape[0]):
+        j, source = layout.rows[row, JOINT], layout.rows[row, SOURCE]
+        has_position = layout.joints[j, POSITION] + work.joints[j, COUNT] < layout.joints[j + 1, POSITION]
+        if layout.joints[j, SLACK] < 0 or (reactions[k, source] > 0 and has_position):
             append(layout, work, row)
 
 
-@uncounted
+@inner
 def _search(layout, work, rounds, steps, depths, deepest, counters, k):  # type: ignore[no-untyped-def]
     """Find the rows that carry, and return whether they were found."""
     counters[k, 0] = search_joints(layout, work, rounds, depths, deepest)
@@ -60,39 +73,39 @@ def _search(layout, work, rounds, steps, depths, deepest, counters, k):  # type:
     return False
 
 
-@uncounted
+@inner
 def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
     """Return whether equations hold that do not carry, since they depend on others."""
-    for j in range(layout.slack.size):
-        if layout.slack[j] < 0:
-            for row in range(layout.row_starts[j], layout.row_starts[j + 1]):
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] < 0:
+            for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
                 if work.place[row] < 0 and abs(excess(layout, work, row)) > MISSED:
                     return False
     return True
 
 
-@uncounted
-def _store(layout, work, k, x, lam_a, lam_x):  # type: ignore[no-untyped-def]
+@inner
+def _store(layout, storage, work, k, x, lam_a, lam_x):  # type: ignore[no-untyped-def]
     """Write the solution of problem k."""
-    bodies = layout.body_order.size
+    bodies = storage.bodies.size
     for body in range(bodies):
         for c in range(6):
-            x[k, 6 * layout.body_order[body] + c] = work.y[body, c]
-    for j in range(layout.slack.size):
-        if layout.slack[j] >= 0:
-            if work.is_open[j]:
-                x[k, 6 * bodies + layout.slack[j]] = work.slack[j]
+            x[k, 6 * storage.bodies[body] + c] = work.vectors[Y, body, c]
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] >= 0:
+            if work.joints[j, OPEN]:
+                x[k, 6 * bodies + layout.joints[j, SLACK]] = work.slacks[VALUE, j]
             else:
-                lam_x[k, 6 * bodies + layout.slack[j]] = work.slack[j]
-        for t in range(layout.positions[j], layout.positions[j] + work.counts[j]):
-            lam_a[k, layout.row_order[work.carrying[t]]] = -work.multipliers[t]
+                lam_x[k, 6 * bodies + layout.joints[j, SLACK]] = work.slacks[VALUE, j]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            lam_a[k, layout.rows[work.carrying[t], SOURCE]] = -work.positions[MULTIPLIER, t]
 
 
 @uncounted
-def solve_batch(layout, work, hessian, problem, reactions, limits, search, answer):  # type: ignore[no-untyped-def]
+def solve_batch(layout, storage, work, hessian, problem, reactions, limits, search, answer):  # type: ignore[no-untyped-def]
     """Solve min x'Hx/2 + g'x, a x >= lba; write x, lam_a, lam_x (QP, entry), all zero before, and failed (QP,).
 
-    hessian    nonzeros of h (QP, _), without columns if H is the identity, and buffers (block, 6, 6), (body, body)
+    hessian    nonzeros of h (QP, _), without columns if H is the identity, and a buffer (block, 6, 6)
     problem    nonzeros of a (QP, _), g (QP, n), lba (QP, m), the buffer of the rows
     reactions  (QP, row) of the previous problem of each realization, or zero
     limits     rounds of all joints at once, steps of single rows
@@ -100,16 +113,16 @@ def solve_batch(layout, work, hessian, problem, reactions, limits, search, answe
     """
     x, lam_a, lam_x, failed = answer
     depths, deepest, counters = search
-    nonzeros, blocks, block_of = hessian
+    nonzeros, blocks = hessian
     coupled = nonzeros.shape[1] > 0
     for k in range(x.shape[0]):
-        _load(layout, work, problem, k, coupled)
+        _load(layout, storage, work, problem, k, coupled)
         if coupled:
-            if not load_hessian(layout, nonzeros, k, blocks, block_of):
+            if not load_hessian(storage, nonzeros, k, blocks):
                 failed[k] = True
                 continue
-            vectors_to_unit(layout, blocks, work.gradient)
-            rows_to_unit(layout, blocks, block_of, work.slopes)
+            vectors_to_unit(storage, blocks, work.vectors[GRADIENT])
+            rows_to_unit(layout.blocks, storage, blocks, work.slopes)
         _start(layout, work, reactions, k)
         if not _search(layout, work, limits[0], limits[1], depths, deepest, counters, k):
             failed[k] = True
@@ -117,5 +130,5 @@ def solve_batch(layout, work, hessian, problem, reactions, limits, search, answe
         refine(layout, work)
         failed[k] = not _holds_equations(layout, work)
         if coupled:
-            from_unit(layout, blocks, work.y)
-        _store(layout, work, k, x, lam_a, lam_x)
+            from_unit(storage, blocks, work.vectors[Y])
+        _store(layout, storage, work, k, x, lam_a, lam_x)
