@@ -25,6 +25,7 @@ from tolcontact.compilation.graph.factor_kernel import (
     Y,
     add_row,
     append,
+    dependence,
     factorize,
     product,
     remove,
@@ -38,13 +39,13 @@ from tolcontact.compiled import inlined_inner, inner
 FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
 ROUNDING = 1e-15  # of the largest multiplier
 RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
-INDEPENDENT = 1e-11  # of the square of a row: what remains of it beside the rows that carry
+REFINEMENTS = 4
 EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
 
 
 @inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
-    """Compute the multipliers of the rows that carry, as equations, and the solution; return the largest multiplier."""
+    """Compute the multipliers of the rows that carry, as equations, and the solution; return how far violations are rounding."""
     multipliers = work.positions[MULTIPLIER]
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
@@ -53,7 +54,7 @@ def multiply(layout, work):  # type: ignore[no-untyped-def]
             if work.joints[j, OPEN]:
                 multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
     solve(layout, work, multipliers)
-    return _move(layout, work)
+    return _refined(layout, work, _move(layout, work))
 
 
 @inner
@@ -75,16 +76,25 @@ def _move(layout, work):  # type: ignore[no-untyped-def]
 
 
 @inner
-def refine(layout, work):  # type: ignore[no-untyped-def]
-    """Correct the multipliers by what the rows that carry miss their bounds by."""
-    for j in range(work.joints.shape[0]):
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
-    solve(layout, work, work.positions[STEP])
-    for j in range(work.joints.shape[0]):
-        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            work.positions[MULTIPLIER, t] += work.positions[STEP, t]
-    _move(layout, work)
+def _refined(layout, work, largest):  # type: ignore[no-untyped-def]
+    """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return a tolerance."""
+    missed = np.inf
+    for number in range(REFINEMENTS):
+        remainder = 0.0
+        for j in range(work.joints.shape[0]):
+            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+                work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
+                remainder = max(remainder, abs(work.positions[STEP, t]))
+        if not (remainder > FEASIBLE + ROUNDING * largest and remainder < missed / 2):
+            missed = remainder
+            break
+        missed = remainder
+        solve(layout, work, work.positions[STEP])
+        for j in range(work.joints.shape[0]):
+            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+                work.positions[MULTIPLIER, t] += work.positions[STEP, t]
+        largest = _move(layout, work)
+    return FEASIBLE + ROUNDING * largest + 2 * missed
 
 
 @inlined_inner
@@ -157,7 +167,7 @@ def search_joints(layout, work, rounds, depths, deepest):  # type: ignore[no-unt
     """Let rows enter and leave in all joints at once; return the rounds that this took, or -1 if there is no end."""
     for number in range(rounds):
         factorize(layout, work)
-        tolerance = FEASIBLE + ROUNDING * multiply(layout, work)
+        tolerance = multiply(layout, work)
         if release(layout, work, tolerance) + close_slacks(layout, work, tolerance):
             continue
         if not scan(layout, work, tolerance, depths, deepest):
@@ -184,9 +194,12 @@ def make_dual_feasible(layout, work):  # type: ignore[no-untyped-def]
 
 
 @inner
-def search_rows(layout, work, steps, depths, deepest):  # type: ignore[no-untyped-def]
-    """Let rows enter one by one, from multipliers that are not negative; return whether none is violated in the end."""
-    tolerance = FEASIBLE + ROUNDING * multiply(layout, work)
+def search_rows(layout, work, steps, factor, depths, deepest):  # type: ignore[no-untyped-def]
+    """Let rows enter one by one, from multipliers that are not negative; return whether none is violated in the end.
+
+    factor   by which rows may be violated more than by rounding
+    """
+    tolerance = factor * multiply(layout, work)
     while steps > 0:
         target = _most_violated(layout, work, tolerance, depths, deepest)
         if target < 0:
@@ -196,7 +209,7 @@ def search_rows(layout, work, steps, depths, deepest):  # type: ignore[no-untype
             return False
         steps -= used
         factorize(layout, work)
-        tolerance = FEASIBLE + ROUNDING * multiply(layout, work)
+        tolerance = factor * multiply(layout, work)
     return False
 
 
@@ -222,11 +235,11 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
     is_row = target < work.place.size
     joint = layout.rows[target, JOINT] if is_row else target - work.place.size
-    opening = work.rows[target, OPENING] if is_row else 1.0
-    square = opening * opening if work.joints[joint, OPEN] else 0.0
+    opening, square = 1.0, 0.0
     if is_row:
         set_row(layout.blocks, work.slopes, target, 1.0, scatter)
-        square += squared_length(layout.blocks, work.slopes, target)
+        opening = work.rows[target, OPENING]
+        square = squared_length(layout.blocks, work.slopes, target)
     for body in range(direction.shape[0]):
         for c in range(6):
             direction[body, c] = scatter[body, c]
@@ -245,7 +258,13 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     if is_row:
         rate += product(layout.blocks, work.slopes, target, direction)
         set_row(layout.blocks, work.slopes, target, 0.0, scatter)
-    return rate if rate > INDEPENDENT * square else 0.0
+    else:
+        # If the slack closes, as little remains of its rows as of the slack, times their openings' square.
+        largest = 0.0
+        for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
+            largest = max(largest, work.rows[work.carrying[t], OPENING] ** 2)
+        square = 1.0 / largest if largest > 0.0 else 0.0
+    return rate if rate > dependence(work) * square else 0.0
 
 
 @inner

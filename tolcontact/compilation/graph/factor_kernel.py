@@ -11,7 +11,8 @@ import numpy as np
 from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
 from tolcontact.compiled import inlined_inner, inner
 
-DEPENDENT = 1e-11  # of the square of a row: what remains of it beside the others is rounding
+# A row depends on others if they leave less of its square. Open slacks are held by the square of their openings, which is tiny.
+DEPENDENT, DEPENDENT_IF_OPEN = 1e-11, 1e-14
 
 
 OPENING, BOUND = range(2)  # columns of Work.rows
@@ -125,7 +126,7 @@ def _eliminated(layout, work, j, position, value):  # type: ignore[no-untyped-de
 
 
 @inner
-def _factor_row(layout, work, j, position):  # type: ignore[no-untyped-def]
+def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
     """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
     factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
     row, start = carrying[position], layout.joints[j, POSITION]
@@ -153,13 +154,22 @@ def _factor_row(layout, work, j, position):  # type: ignore[no-untyped-def]
         factor[position, t], column[t] = column[t], 0.0
     set_row(layout.blocks, work.slopes, row, 0.0, scatter)
     factor[position, position] = np.sqrt(max(rest, 0.0))
-    return rest > DEPENDENT * square
+    return rest > threshold * square
+
+
+@inner
+def dependence(work):  # type: ignore[no-untyped-def]
+    """Return how little of a row's square may remain beside the other rows if it is independent of them."""
+    for j in range(work.joints.shape[0]):
+        if work.joints[j, OPEN]:
+            return DEPENDENT_IF_OPEN
+    return DEPENDENT
 
 
 @inner
 def factorize(layout, work):  # type: ignore[no-untyped-def]
     """Complete the factor, and return the number of rows that carry no longer, since they depend on those before them."""
-    dropped = 0
+    dropped, threshold = 0, dependence(work)
     for j in range(work.joints.shape[0]):
         for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
             if work.joints[layout.prior[q, 0], CHANGED]:
@@ -168,7 +178,7 @@ def factorize(layout, work):  # type: ignore[no-untyped-def]
             work.joints[j, CHANGED] = 1
         while work.joints[j, FRESH] < work.joints[j, COUNT]:
             position = layout.joints[j, POSITION] + work.joints[j, FRESH]
-            if _factor_row(layout, work, j, position):
+            if _factor_row(layout, work, j, position, threshold):
                 work.joints[j, FRESH] += 1
             else:
                 remove(layout, work, position)

@@ -3,7 +3,6 @@
 from tolcontact.compilation.graph.active_set_kernel import (
     excess,
     make_dual_feasible,
-    refine,
     search_joints,
     search_rows,
 )
@@ -25,6 +24,7 @@ from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOU
 from tolcontact.compiled import inner, uncounted
 
 ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
+LOOSER = 10.0  # by which rows may be violated more in every further attempt
 MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
 
 
@@ -68,7 +68,7 @@ def _search(layout, work, rounds, steps, depths, deepest, counters, k):  # type:
     for attempt in range(ATTEMPTS):
         counters[k, 1] = attempt + 1
         make_dual_feasible(layout, work)
-        if search_rows(layout, work, steps, depths, deepest):
+        if search_rows(layout, work, steps, LOOSER**attempt, depths, deepest):
             return True
     return False
 
@@ -127,7 +127,6 @@ def solve_batch(layout, storage, work, hessian, problem, reactions, limits, sear
         if not _search(layout, work, limits[0], limits[1], depths, deepest, counters, k):
             failed[k] = True
             continue
-        refine(layout, work)
         failed[k] = not _holds_equations(layout, work)
         if coupled:
             from_unit(storage, blocks, work.vectors[Y])
