@@ -40,12 +40,14 @@ FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
 ROUNDING = 1e-15  # of the largest multiplier
 RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
 REFINEMENTS = 4
+COARSE = 1e-9  # mm: most that counts as rounding
+CLOSED = 100  # times what violates rows: slacks, which open a gap by a thousandth of them, may be more negative
 EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
 
 
 @inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
-    """Compute the multipliers of the rows that carry, as equations, and the solution; return how far violations are rounding."""
+    """Compute the multipliers of the rows that carry, as equations, and the solution; return by how much rounding violates."""
     multipliers = work.positions[MULTIPLIER]
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
@@ -79,7 +81,7 @@ def _move(layout, work):  # type: ignore[no-untyped-def]
 def _refined(layout, work, largest):  # type: ignore[no-untyped-def]
     """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return a tolerance."""
     missed = np.inf
-    for number in range(REFINEMENTS):
+    for _ in range(REFINEMENTS):
         remainder = 0.0
         for j in range(work.joints.shape[0]):
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
@@ -94,7 +96,7 @@ def _refined(layout, work, largest):  # type: ignore[no-untyped-def]
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
                 work.positions[MULTIPLIER, t] += work.positions[STEP, t]
         largest = _move(layout, work)
-    return FEASIBLE + ROUNDING * largest + 2 * missed
+    return min(FEASIBLE + ROUNDING * largest + 2 * missed, COARSE)
 
 
 @inlined_inner
@@ -140,7 +142,7 @@ def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
     """Close negative slacks, and return their number."""
     changes = 0
     for j in range(work.joints.shape[0]):
-        if work.joints[j, OPEN] and work.slacks[VALUE, j] < -tolerance:
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < -CLOSED * tolerance:
             toggle(layout, work, j)
             changes += 1
     return changes
@@ -221,7 +223,7 @@ def _most_violated(layout, work, tolerance, depths, deepest):  # type: ignore[no
     for j in range(deepest.size):
         if depths[j] < lowest:
             lowest, target = depths[j], deepest[j]
-        if work.joints[j, OPEN] and work.slacks[VALUE, j] < lowest:
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < min(lowest, -CLOSED * tolerance):
             lowest, target = work.slacks[VALUE, j], work.place.size + j
     return target
 
