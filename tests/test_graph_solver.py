@@ -1,17 +1,14 @@
 """The solver on the graph of bodies, beside optimality conditions, CasADi's plugins, and within models."""
 
-import runpy
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
-import tolcontact as tc
 from tests.helpers import nightly
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.plugins import PLUGINS, solver
-from tolcontact.simulation import simulate_blocks
 
 MODELS = Path(__file__).resolve().parents[1] / "models"
 FREEDOMS, PRICE, OPENING = 6, 50.0, 1e-3

@@ -1,9 +1,4 @@
-"""Compiled search for the rows that carry: by joints, all at once, and if that goes round, one by one.
-
-All at once: in every joint the most violated row starts to carry, a row that pulls carries no longer, and slacks open and
-close. One by one: the dual method of Goldfarb and Idnani, which raises the dual objective with every row, so that no set of
-rows comes back. Equations always carry, with multipliers of any sign.
-"""
+"""Compiled changes of the rows that carry: in all joints at once, or one by one (see search_kernel)."""
 
 import numpy as np
 
@@ -26,7 +21,6 @@ from tolcontact.compilation.graph.factor_kernel import (
     add_row,
     append,
     dependence,
-    factorize,
     product,
     remove,
     set_row,
@@ -34,20 +28,18 @@ from tolcontact.compilation.graph.factor_kernel import (
     squared_length,
 )
 from tolcontact.compilation.graph.layout import JOINT, NEAR, POSITION, ROW, SLACK
-from tolcontact.compiled import inlined_inner, inner
+from tolcontact.compiled import inlined_inner
 
 FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
-ROUNDING = 1e-15  # of the largest multiplier
 RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
 REFINEMENTS = 4
-COARSE = 1e-9  # mm: most that counts as rounding
 CLOSED = 100  # times what violates rows: slacks, which open a gap by a thousandth of them, may be more negative
-EAGER_ROUNDS = 3  # afterwards, a row only enters if no row of a neighbouring joint is violated by more
+ENTERED, PARTIAL, STUCK = range(3)  # what becomes of a row that starts to carry
 
 
-@inner
+@inlined_inner
 def multiply(layout, work):  # type: ignore[no-untyped-def]
-    """Compute the multipliers of the rows that carry, as equations, and the solution; return by how much rounding violates."""
+    """Compute the multipliers of the rows that carry, as equations, and the solution; return the largest multiplier."""
     multipliers = work.positions[MULTIPLIER]
     for j in range(work.joints.shape[0]):
         for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
@@ -56,11 +48,11 @@ def multiply(layout, work):  # type: ignore[no-untyped-def]
             if work.joints[j, OPEN]:
                 multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
     solve(layout, work, multipliers)
-    return _refined(layout, work, _move(layout, work))
+    return move(layout, work)
 
 
-@inner
-def _move(layout, work):  # type: ignore[no-untyped-def]
+@inlined_inner
+def move(layout, work):  # type: ignore[no-untyped-def]
     """Compute the solution of the multipliers, and return the largest multiplier."""
     for body in range(work.vectors[Y].shape[0]):
         for c in range(6):
@@ -77,9 +69,9 @@ def _move(layout, work):  # type: ignore[no-untyped-def]
     return largest
 
 
-@inner
-def _refined(layout, work, largest):  # type: ignore[no-untyped-def]
-    """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return a tolerance."""
+@inlined_inner
+def refine(layout, work):  # type: ignore[no-untyped-def]
+    """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return what they miss."""
     missed = np.inf
     for _ in range(REFINEMENTS):
         remainder = 0.0
@@ -87,16 +79,16 @@ def _refined(layout, work, largest):  # type: ignore[no-untyped-def]
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
                 work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
                 remainder = max(remainder, abs(work.positions[STEP, t]))
-        if not (remainder > FEASIBLE + ROUNDING * largest and remainder < missed / 2):
-            missed = remainder
-            break
+        helps = remainder > FEASIBLE and remainder < missed / 2
         missed = remainder
+        if not helps:
+            break
         solve(layout, work, work.positions[STEP])
         for j in range(work.joints.shape[0]):
             for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
                 work.positions[MULTIPLIER, t] += work.positions[STEP, t]
-        largest = _move(layout, work)
-    return min(FEASIBLE + ROUNDING * largest + 2 * missed, COARSE)
+        move(layout, work)
+    return missed
 
 
 @inlined_inner
@@ -109,7 +101,7 @@ def excess(layout, work, row):  # type: ignore[no-untyped-def]
     return value
 
 
-@inner
+@inlined_inner
 def toggle(layout, work, j):  # type: ignore[no-untyped-def]
     """Open the slack of a joint, or close it."""
     work.joints[j, OPEN] = 1 - work.joints[j, OPEN]
@@ -117,7 +109,7 @@ def toggle(layout, work, j):  # type: ignore[no-untyped-def]
     work.joints[j, CHANGED] = 1
 
 
-@inner
+@inlined_inner
 def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
     """Drop the row of each joint that pulls most, and open slacks whose price is too low; return the number of changes."""
     changes = 0
@@ -137,7 +129,7 @@ def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
     return changes
 
 
-@inner
+@inlined_inner
 def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
     """Close negative slacks, and return their number."""
     changes = 0
@@ -148,7 +140,7 @@ def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
     return changes
 
 
-@inner
+@inlined_inner
 def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Write the most violated row of each joint, or -1, and its excess; return whether there is one."""
     violated = False
@@ -164,61 +156,9 @@ def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-d
     return violated
 
 
-@inner
-def search_joints(layout, work, rounds, depths, deepest):  # type: ignore[no-untyped-def]
-    """Let rows enter and leave in all joints at once; return the rounds that this took, or -1 if there is no end."""
-    for number in range(rounds):
-        factorize(layout, work)
-        tolerance = multiply(layout, work)
-        if release(layout, work, tolerance) + close_slacks(layout, work, tolerance):
-            continue
-        if not scan(layout, work, tolerance, depths, deepest):
-            return number + 1
-        for j in range(deepest.size):
-            enters = deepest[j] >= 0
-            if number >= EAGER_ROUNDS:
-                for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
-                    k = layout.near[q]
-                    enters = enters and (depths[k] > depths[j] or (depths[k] == depths[j] and k > j))
-            if enters:
-                append(layout, work, deepest[j])
-    return -1
-
-
-@inner
-def make_dual_feasible(layout, work):  # type: ignore[no-untyped-def]
-    """Drop rows and open slacks until no multiplier is negative."""
-    while True:
-        factorize(layout, work)
-        multiply(layout, work)
-        if not release(layout, work, 0.0):
-            return
-
-
-@inner
-def search_rows(layout, work, steps, factor, depths, deepest):  # type: ignore[no-untyped-def]
-    """Let rows enter one by one, from multipliers that are not negative; return whether none is violated in the end.
-
-    factor   by which rows may be violated more than by rounding
-    """
-    tolerance = factor * multiply(layout, work)
-    while steps > 0:
-        target = _most_violated(layout, work, tolerance, depths, deepest)
-        if target < 0:
-            return True
-        used = _enter(layout, work, target, steps)
-        if used == 0:
-            return False
-        steps -= used
-        factorize(layout, work)
-        tolerance = factor * multiply(layout, work)
-    return False
-
-
-@inner
-def _most_violated(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+@inlined_inner
+def most_violated(work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
     """Return the row that is violated most, or the number of rows and of the joint whose slack is more negative, or -1."""
-    scan(layout, work, tolerance, depths, deepest)
     lowest, target = -tolerance, -1
     for j in range(deepest.size):
         if depths[j] < lowest:
@@ -228,7 +168,7 @@ def _most_violated(layout, work, tolerance, depths, deepest):  # type: ignore[no
     return target
 
 
-@inner
+@inlined_inner
 def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     """Compute the direction of y, slacks and multipliers (times -1) as that of the target grows; return the target's change.
 
@@ -269,7 +209,7 @@ def _aim(layout, work, target):  # type: ignore[no-untyped-def]
     return rate if rate > dependence(work) * square else 0.0
 
 
-@inner
+@inlined_inner
 def _block(layout, work):  # type: ignore[no-untyped-def]
     """Return the longest step that leaves multipliers not negative, and the target (see `_aim`) that stops it."""
     step, blocking = np.inf, -1
@@ -286,7 +226,7 @@ def _block(layout, work):  # type: ignore[no-untyped-def]
     return step, blocking
 
 
-@inner
+@inlined_inner
 def _advance(layout, work, length):  # type: ignore[no-untyped-def]
     """Take a step of this length in the direction of `_aim`."""
     for body in range(work.vectors[Y].shape[0]):
@@ -298,28 +238,41 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
             work.positions[MULTIPLIER, t] -= length * work.positions[STEP, t]
 
 
-@inner
-def _enter(layout, work, target, steps):  # type: ignore[no-untyped-def]
-    """Let a row carry, or close a slack, and drop what this relieves; return the number of steps, 0 without success."""
+@inlined_inner
+def enter_joints(layout, work, depths, deepest, eager):  # type: ignore[no-untyped-def]
+    """Let the most violated row of each joint carry; without `eager`, only if its neighbours are violated less."""
+    for j in range(deepest.size):
+        enters = deepest[j] >= 0
+        if not eager:
+            for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
+                k = layout.near[q]
+                enters = enters and (depths[k] > depths[j] or (depths[k] == depths[j] and k > j))
+        if enters:
+            append(layout, work, deepest[j])
+
+
+@inlined_inner
+def step_towards(layout, work, target):  # type: ignore[no-untyped-def]
+    """Take the longest step towards a row that starts to carry, or a slack that closes; drop what this relieves.
+
+    Returns ENTERED, PARTIAL if something was dropped first, or STUCK.
+    """
     rows = work.place.size
-    for number in range(steps):
-        rate = _aim(layout, work, target)
-        gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
-        step, blocking = _block(layout, work)
-        whole = -gap / rate if rate > 0.0 else np.inf
-        if min(step, whole) == np.inf:
-            return 0
-        _advance(layout, work, min(step, whole))
-        if whole <= step:
-            if target < rows:
-                append(layout, work, target)
-            else:
-                toggle(layout, work, target - rows)
-            return number + 1
-        if blocking < rows:
-            remove(layout, work, work.place[blocking])
+    rate = _aim(layout, work, target)
+    gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
+    step, blocking = _block(layout, work)
+    whole = -gap / rate if rate > 0.0 else np.inf
+    if min(step, whole) == np.inf:
+        return STUCK
+    _advance(layout, work, min(step, whole))
+    if whole <= step:
+        if target < rows:
+            append(layout, work, target)
         else:
-            toggle(layout, work, blocking - rows)
-        if factorize(layout, work):
-            return 0
-    return 0
+            toggle(layout, work, target - rows)
+        return ENTERED
+    if blocking < rows:
+        remove(layout, work, work.place[blocking])
+    else:
+        toggle(layout, work, blocking - rows)
+    return PARTIAL

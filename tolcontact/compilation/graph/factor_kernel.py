@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
-from tolcontact.compiled import inlined_inner, inner
+from tolcontact.compiled import inlined_inner
 
 # A row depends on others if they leave less of its square. Open slacks are held by the square of their openings, which is tiny.
 DEPENDENT, DEPENDENT_IF_OPEN = 1e-11, 1e-14
@@ -89,7 +89,7 @@ def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-de
             vectors[body, c] = weight * slopes[row, q, c]
 
 
-@inner
+@inlined_inner
 def append(layout, work, row):  # type: ignore[no-untyped-def]
     """Let a row carry, behind the others of its joint."""
     j = layout.rows[row, JOINT]
@@ -99,7 +99,7 @@ def append(layout, work, row):  # type: ignore[no-untyped-def]
     work.joints[j, COUNT] += 1
 
 
-@inner
+@inlined_inner
 def remove(layout, work, position):  # type: ignore[no-untyped-def]
     """Let the row at a position carry no longer."""
     j = layout.rows[work.carrying[position], JOINT]
@@ -125,7 +125,7 @@ def _eliminated(layout, work, j, position, value):  # type: ignore[no-untyped-de
     return value
 
 
-@inner
+@inlined_inner
 def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
     """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
     factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
@@ -157,16 +157,22 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
     return rest > threshold * square
 
 
-@inner
+@inlined_inner
+def any_open(work):  # type: ignore[no-untyped-def]
+    """Return whether a slack is open."""
+    is_open = False
+    for j in range(work.joints.shape[0]):
+        is_open = is_open or work.joints[j, OPEN] > 0
+    return is_open
+
+
+@inlined_inner
 def dependence(work):  # type: ignore[no-untyped-def]
     """Return how little of a row's square may remain beside the other rows if it is independent of them."""
-    for j in range(work.joints.shape[0]):
-        if work.joints[j, OPEN]:
-            return DEPENDENT_IF_OPEN
-    return DEPENDENT
+    return DEPENDENT_IF_OPEN if any_open(work) else DEPENDENT
 
 
-@inner
+@inlined_inner
 def factorize(layout, work):  # type: ignore[no-untyped-def]
     """Complete the factor, and return the number of rows that carry no longer, since they depend on those before them."""
     dropped, threshold = 0, dependence(work)
@@ -188,7 +194,7 @@ def factorize(layout, work):  # type: ignore[no-untyped-def]
     return dropped
 
 
-@inner
+@inlined_inner
 def solve(layout, work, values):  # type: ignore[no-untyped-def]
     """Solve with the Gram matrix of the rows that carry, in place; values (position,)."""
     factor = work.factor

@@ -1,11 +1,6 @@
 """Compiled solution of a batch of QPs on the graph of bodies, each from its data alone."""
 
-from tolcontact.compilation.graph.active_set_kernel import (
-    excess,
-    make_dual_feasible,
-    search_joints,
-    search_rows,
-)
+from tolcontact.compilation.graph.active_set_kernel import excess, refine
 from tolcontact.compilation.graph.factor_kernel import (
     BOUND,
     CHANGED,
@@ -21,14 +16,13 @@ from tolcontact.compilation.graph.factor_kernel import (
 )
 from tolcontact.compilation.graph.hessian_kernel import from_unit, load_hessian, rows_to_unit, vectors_to_unit
 from tolcontact.compilation.graph.layout import JOINT, POSITION, ROW, SLACK, SOURCE
-from tolcontact.compiled import inner, uncounted
+from tolcontact.compilation.graph.search_kernel import find_carrying
+from tolcontact.compiled import inlined_inner, uncounted
 
-ATTEMPTS = 3  # of the search for single rows, each from what the attempt before it ended with
-LOOSER = 10.0  # by which rows may be violated more in every further attempt
 MISSED = 1e-7  # mm: an equation that depends on others and is missed by more contradicts them
 
 
-@inner
+@inlined_inner
 def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped-def]
     """Write the rows, bounds, gradient and prices of problem k into `work`, which is cleared if rows fill more of it."""
     slopes, gradient, bounds, buffer = problem
@@ -49,7 +43,7 @@ def _load(layout, storage, work, problem, k, clears):  # type: ignore[no-untyped
         work.joints[j, CHANGED], work.joints[j, OPEN] = 0, 0
 
 
-@inner
+@inlined_inner
 def _start(layout, work, reactions, k):  # type: ignore[no-untyped-def]
     """Let equations carry, and the rows that carried before, as far as there are positions."""
     for row in range(layout.rows.shape[0]):
@@ -59,21 +53,7 @@ def _start(layout, work, reactions, k):  # type: ignore[no-untyped-def]
             append(layout, work, row)
 
 
-@inner
-def _search(layout, work, rounds, steps, depths, deepest, counters, k):  # type: ignore[no-untyped-def]
-    """Find the rows that carry, and return whether they were found."""
-    counters[k, 0] = search_joints(layout, work, rounds, depths, deepest)
-    if counters[k, 0] >= 0:
-        return True
-    for attempt in range(ATTEMPTS):
-        counters[k, 1] = attempt + 1
-        make_dual_feasible(layout, work)
-        if search_rows(layout, work, steps, LOOSER**attempt, depths, deepest):
-            return True
-    return False
-
-
-@inner
+@inlined_inner
 def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
     """Return whether equations hold that do not carry, since they depend on others."""
     for j in range(work.joints.shape[0]):
@@ -84,7 +64,7 @@ def _holds_equations(layout, work):  # type: ignore[no-untyped-def]
     return True
 
 
-@inner
+@inlined_inner
 def _store(layout, storage, work, k, x, lam_a, lam_x):  # type: ignore[no-untyped-def]
     """Write the solution of problem k."""
     bodies = storage.bodies.size
@@ -109,7 +89,7 @@ def solve_batch(layout, storage, work, hessian, problem, reactions, limits, sear
     problem    nonzeros of a (QP, _), g (QP, n), lba (QP, m), the buffer of the rows
     reactions  (QP, row) of the previous problem of each realization, or zero
     limits     rounds of all joints at once, steps of single rows
-    search     buffers depths (joint,), deepest (joint,) and counters (QP, 2): rounds of joints or -1, attempts by single rows
+    search     buffers depths (joint,), deepest (joint,) and counters (QP, 2): rounds of joints, attempts by single rows
     """
     x, lam_a, lam_x, failed = answer
     depths, deepest, counters = search
@@ -124,9 +104,10 @@ def solve_batch(layout, storage, work, hessian, problem, reactions, limits, sear
             vectors_to_unit(storage, blocks, work.vectors[GRADIENT])
             rows_to_unit(layout.blocks, storage, blocks, work.slopes)
         _start(layout, work, reactions, k)
-        if not _search(layout, work, limits[0], limits[1], depths, deepest, counters, k):
+        if not find_carrying(layout, work, limits, depths, deepest, counters[k]):
             failed[k] = True
             continue
+        refine(layout, work)
         failed[k] = not _holds_equations(layout, work)
         if coupled:
             from_unit(storage, blocks, work.vectors[Y])
