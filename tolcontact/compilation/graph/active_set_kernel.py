@@ -34,7 +34,8 @@ FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
 RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
 REFINEMENTS = 4
 CLOSED = 100  # times what violates rows: slacks, which open a gap by a thousandth of them, may be more negative
-ENTERED, PARTIAL, STUCK = range(3)  # what becomes of a row that starts to carry
+# Results of a step: solved with the rows that carry; the target entered; something else left before; nothing can be done.
+CHECKED, ENTERED, PARTIAL, STUCK = range(4)
 
 
 @inlined_inner
@@ -252,10 +253,10 @@ def enter_joints(layout, work, depths, deepest, eager):  # type: ignore[no-untyp
 
 
 @inlined_inner
-def step_towards(layout, work, target):  # type: ignore[no-untyped-def]
+def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
     """Take the longest step towards a row that starts to carry, or a slack that closes; drop what this relieves.
 
-    Returns ENTERED, PARTIAL if something was dropped first, or STUCK.
+    Returns ENTERED, PARTIAL or STUCK, and how far the multiplier of the target has grown.
     """
     rows = work.place.size
     rate = _aim(layout, work, target)
@@ -263,16 +264,18 @@ def step_towards(layout, work, target):  # type: ignore[no-untyped-def]
     step, blocking = _block(layout, work)
     whole = -gap / rate if rate > 0.0 else np.inf
     if min(step, whole) == np.inf:
-        return STUCK
+        return STUCK, growth
     _advance(layout, work, min(step, whole))
+    growth += min(step, whole)
     if whole <= step:
         if target < rows:
             append(layout, work, target)
+            work.positions[MULTIPLIER, work.place[target]] = growth
         else:
             toggle(layout, work, target - rows)
-        return ENTERED
+        return ENTERED, growth
     if blocking < rows:
         remove(layout, work, work.place[blocking])
     else:
         toggle(layout, work, blocking - rows)
-    return PARTIAL
+    return PARTIAL, growth

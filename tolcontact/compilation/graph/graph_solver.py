@@ -11,7 +11,7 @@ from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layou
 from tolcontact.compilation.graph.solve_kernel import solve_batch
 from tolcontact.mechanics.correction import FREEDOMS
 
-FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 12, 40  # rounds in which rows of all joints enter at once
+FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds in which rows of all joints enter at once
 STEPS_PER_ROW = 4  # in which single rows enter or leave
 
 Arrays = Mapping[str, Float[Array, "_ _"]]

@@ -6,6 +6,7 @@ back; it begins when no multiplier is negative. Equations always carry, with mul
 """
 
 from tolcontact.compilation.graph.active_set_kernel import (
+    CHECKED,
     ENTERED,
     FEASIBLE,
     PARTIAL,
@@ -50,6 +51,22 @@ def _hold_joints(layout, work, tolerance, depths, deepest, eager):  # type: igno
 
 
 @inlined_inner
+def _hold_row(layout, work, tolerance, depths, deepest, state):  # type: ignore[no-untyped-def]
+    """Take a step towards the most violated row; return whether none is violated. `state` is the result, target and growth."""
+    result, target, growth = state
+    if result != PARTIAL:
+        scan(layout, work, tolerance, depths, deepest)
+        target, growth = most_violated(work, tolerance, depths, deepest), 0.0
+        if target < 0:
+            return result == CHECKED, (CHECKED, target, growth)
+    result, growth = step_towards(layout, work, target, growth)
+    # What steps add up to is precise, unless open slacks hold rows weakly.
+    if result == ENTERED and any_open(work):
+        result = CHECKED
+    return False, (result, target, growth)
+
+
+@inlined_inner
 def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ignore[no-untyped-def]
     """Find the rows that carry, and return whether they were found.
 
@@ -57,14 +74,13 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
     depths, deepest   (joint,) buffers
     counters          (2,) rounds of all joints, attempts by single rows
     """
-    phase, steps, result, target, looseness = JOINTS, 0, ENTERED, deepest.size, 1.0
+    phase, steps, looseness = JOINTS if limits[0] > 0 else RELEASE, 0, 1.0
+    state = CHECKED, deepest.size, 0.0
     while counters[1] <= ATTEMPTS:
-        dropped = factorize(layout, work)
-        if result != PARTIAL:
+        if factorize(layout, work) and phase == ROWS:
+            phase = RELEASE
+        if phase != ROWS or state[0] == CHECKED:
             tolerance = _tolerance(layout, work, phase == ROWS) * looseness
-        elif dropped:
-            phase, result = RELEASE, ENTERED
-            continue
         if phase == JOINTS:
             counters[0] += 1
             if _hold_joints(layout, work, tolerance, depths, deepest, counters[0] <= EAGER_ROUNDS):
@@ -74,15 +90,13 @@ def find_carrying(layout, work, limits, depths, deepest, counters):  # type: ign
         elif phase == RELEASE:
             if not release(layout, work, 0.0):
                 phase, steps, looseness = ROWS, 0, LOOSER ** counters[1]
+                state = CHECKED, deepest.size, 0.0
                 counters[1] += 1
         else:
-            if result != PARTIAL:
-                scan(layout, work, tolerance, depths, deepest)
-                target = most_violated(work, tolerance, depths, deepest)
-                if target < 0:
-                    return True
-            result = step_towards(layout, work, target)
+            holds, state = _hold_row(layout, work, tolerance, depths, deepest, state)
+            if holds:
+                return True
             steps += 1
-            if steps == limits[1] or result == STUCK:
-                phase, result = RELEASE, ENTERED
+            if steps == limits[1] or state[0] == STUCK:
+                phase = RELEASE
     return False
