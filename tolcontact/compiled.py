@@ -25,14 +25,17 @@ from tolcontact import code_cache
 CONSTANTS = (bool, int, float, str, bytes, tuple, type(None))
 
 
-def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True) -> Any:
+def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool = True, inner: bool = False) -> Any:
     """Return the function, compiled when it is first called; `inline`, it becomes part of those that call it.
 
     counts   whether it counts references to arrays. A function that creates no array need not; if it passes on tuples of many
              arrays, counting takes longer than the arithmetic.
+    inner    whether only compiled functions call it, so that it needs no entrance from Python, which takes long to compile
     """
     # `_nrt` is Numba's own option for code without reference counts, as on graphics processors.
-    dispatcher = njit(nogil=True, error_model="numpy", forceinline=inline, _nrt=counts)(function)
+    dispatcher = njit(
+        nogil=True, error_model="numpy", forceinline=inline, _nrt=counts, no_cpython_wrapper=inner, no_cfunc_wrapper=inner
+    )(function)
     dispatcher._cache = _Cache(dispatcher)
     return dispatcher
 
@@ -40,6 +43,8 @@ def compiled(function: Callable[..., Any], *, inline: bool = False, counts: bool
 inlined = functools.partial(compiled, inline=True)
 uncounted = functools.partial(compiled, counts=False)
 inlined_uncounted = functools.partial(compiled, counts=False, inline=True)
+inner = functools.partial(compiled, counts=False, inner=True)
+inlined_inner = functools.partial(compiled, counts=False, inline=True, inner=True)
 
 
 class _Cache(NullCache):  # type: ignore[misc]

@@ -28,6 +28,7 @@ from scipy.optimize import nnls
 
 import tolcontact as tc
 from tolcontact.compilation import contact_qp, contact_solver, plugins
+from tolcontact.compilation.graph import GraphSolver
 from tolcontact.mechanics.quiet import quiet
 from tolcontact.simulation import simulate_block
 from tolcontact.variation.draws import draw
@@ -115,6 +116,21 @@ def with_casadi(name: str, one: Problem) -> Solve:
     return solve
 
 
+def on_graph(_: str, one: Problem) -> Solve:
+    sparsities = {name: ca.sparsify(ca.DM(one[matrix])).sparsity() for name, matrix in (("h", "H"), ("a", "A"))}
+    sparsities |= {name: ca.Sparsity.dense(len(one[vector]), 1) for name, vector in (("g", "g"), ("lba", "b"))}
+    rows = len(one["b"])
+    graph = GraphSolver(sparsities, slacks=int(np.isfinite(one["low"]).sum()), equations=0)
+    places = {name: tuple(map(list, sparsities[name].get_triplet())) for name in ("h", "a")}
+
+    def solve(of: Problem) -> tuple[np.ndarray, bool]:
+        stored = {"h": of["H"][places["h"]][None], "a": of["A"][places["a"]][None], "g": of["g"][None], "lba": of["b"][None]}
+        answer, failed = graph(stored, np.zeros((1, rows)))
+        return answer["x"][0], not failed[0]
+
+    return solve
+
+
 def outside(name: str, _: Problem) -> Solve:
     def solve(of: Problem) -> tuple[np.ndarray, bool]:
         problem = qpsolvers.Problem(of["H"], of["g"], -of["A"], -of["b"], lb=of["low"])
@@ -190,6 +206,7 @@ def main() -> None:
     chosen = options.parse_args()
     solvers: dict[str, tuple[Callable[[str, Problem], Solve], str]]
     solvers = {f"CasADi {name}": (with_casadi, name) for name in (*plugins.usable_plugins(), *REFUSED)}
+    solvers["graph"] = (on_graph, solvers.pop("CasADi graph")[1])
     solvers |= {f"{name} outside": (outside, name) for name in OUTSIDE}
     print("| problem | solver | ms | median error [mm] | largest | wrong, unsaid | given up | order matters [mm] |")
     print("|---|---|---:|---:|---:|---:|---:|---:|")

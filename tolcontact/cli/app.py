@@ -70,7 +70,7 @@ StepFile = Annotated[Path, typer.Argument(metavar="FILE.stp", help="STEP file.")
 Archive = Annotated[Path, typer.Argument(metavar="FILE.nc", help="Archive of a run.")]
 Samples = Annotated[int, typer.Option(help="Number of realizations.")]
 Seed = Annotated[int, typer.Option(help="Seed; the same seed gives the same realizations.")]
-Solver = Annotated[str, typer.Option(help="QP solver, a conic plugin of CasADi.")]
+Solver = Annotated[str, typer.Option(help="QP solver: a conic plugin of CasADi, or graph.")]
 Resolution = Annotated[
     str | None,
     typer.Option(help=f"One linear step, or steps until all gaps are open: {or_(RESOLUTIONS)}. Default: the model's."),

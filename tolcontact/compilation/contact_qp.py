@@ -21,7 +21,7 @@ from tolcontact.compilation.conditioning import conditioned
 from tolcontact.compilation.contact_rows import contact_rows, row_points, standing_points
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
-from tolcontact.compilation.plugins import Plugin, solver
+from tolcontact.compilation.plugins import Plugin
 from tolcontact.compilation.quadratic_terms import quadratic_terms
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
@@ -67,10 +67,6 @@ class ContactQP:
     slacks: int
     equations: int
     standing: Standing
-
-    def solver(self, plugin: Plugin) -> ca.Function:
-        """Return a new solver of a plugin, without memory of any problem."""
-        return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
 
     @property
     def max_batch(self) -> int:

@@ -9,8 +9,9 @@ from tolcontact.arrays import Array, Float
 from tolcontact.compilation.contact_qp import ContactQP
 from tolcontact.compilation.elements import ElementQP
 from tolcontact.compilation.functions import InterpretedFunction, flat
+from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.outcome import SOLUTION
-from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
+from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; refinement removes its effect
@@ -93,8 +94,8 @@ class ContactSolver:
 
     def start_over(self) -> None:
         """Forget all previous problems: some plugins start from the last one."""
-        self._solver: _PluginSolver = _PluginSolver(self._qp, self._plugin)
-        self._fallbacks: dict[str, _PluginSolver] = {}
+        self._solver = _new_solver(self._qp, self._plugin)
+        self._fallbacks: dict[str, _Solver] = {}
 
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
@@ -110,7 +111,7 @@ class ContactSolver:
             if not lost.size:
                 break
             if name not in self._fallbacks:
-                self._fallbacks[name] = _PluginSolver(self._qp, PLUGINS[name])
+                self._fallbacks[name] = _new_solver(self._qp, PLUGINS[name])
             retry = self._solved(self._fallbacks[name], _of(inputs, lost) | {"newton": np.zeros((len(lost), 1))})
             retry["second"] = np.ones((len(lost), 1))
             better = retry["residual"][:, 0] < answer["residual"][lost, 0]
@@ -127,13 +128,13 @@ class ContactSolver:
         """Return X_RM (realization, 12 * pair) of the group's pairs at poses, for deviations."""
         return self._relate(**arrays)["relative"]
 
-    def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+    def _solved(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])
         size = self._qp.max_batch
         parts = [self._solved_batch(solver, _of(inputs, slice(k, k + size))) for k in range(0, max(count, 1), size)]
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
-    def _solved_batch(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
+    def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
         solution, failed = solver(problem, inputs["reactions"])
         outputs = self._finished(inputs | problem | solution)
@@ -175,16 +176,16 @@ class _PluginSolver:
     def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
-            solver = qp.solver(plugin)
-        self._inputs = [name for name in solver.name_in() if name in QP]
-        self._results = [solver.name_out().index(name) for name in SOLUTION]
-        lower_bounds = np.zeros(solver.numel_in("g"))
+            conic = solver(plugin, qp.sparsity("h"), qp.sparsity("a"))
+        self._inputs = [name for name in conic.name_in() if name in QP]
+        self._results = [conic.name_out().index(name) for name in SOLUTION]
+        lower_bounds = np.zeros(conic.numel_in("g"))
         lower_bounds[: -qp.slacks] = -np.inf
         bounds = {"lbx": lower_bounds, "ubx": np.full(lower_bounds.shape, np.inf)}
         # The other inputs are zero: starting points that no plugin uses.
-        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(solver.name_in()) if name not in QP}
+        fixed_inputs = {i: bounds.get(name, np.zeros(1)) for i, name in enumerate(conic.name_in()) if name not in QP}
         with CONSTRUCTION_LOCK, quiet():
-            self._solve = InterpretedFunction(solver, fixed_inputs)
+            self._solve = InterpretedFunction(conic, fixed_inputs)
 
     def __call__(self, problem: Arrays, reactions: np.ndarray) -> tuple[Arrays, np.ndarray]:
         """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
@@ -202,6 +203,16 @@ class _PluginSolver:
         solved, failed = self._solve([array[order] for array in inputs])
         back = np.argsort(order)
         return {name: solved[i][back] for name, i in zip(SOLUTION, self._results, strict=True)}, failed[back]
+
+
+_Solver = _PluginSolver | GraphSolver
+
+
+def _new_solver(qp: ContactQP | ElementQP, plugin: Plugin) -> _Solver:
+    if plugin.is_conic:
+        return _PluginSolver(qp, plugin)
+    sparsities = {name: qp.sparsity(name) for name in ("h", "g", "a", "lba")}
+    return GraphSolver(sparsities, slacks=qp.slacks, equations=qp.equations)
 
 
 def _of(arrays: Arrays, rows: np.ndarray | slice) -> Arrays:

@@ -1,4 +1,4 @@
-"""The QP solvers that CasADi offers: their options, and the reasons why some are refused."""
+"""The QP solvers: those that CasADi offers, with their options, that of this package, and why some are refused."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,8 +13,9 @@ ACCURACY = 1e-8  # mm: KKT residual up to which a QP counts as solved, for every
 
 @dataclass(frozen=True)
 class Plugin:
-    """A conic plugin of CasADi.
+    """A conic plugin of CasADi, or the solver of this package.
 
+    is_conic    whether it is a plugin of CasADi; if not, it is a GraphSolver
     options     its options in CasADi
     fallbacks   names of the plugins that answer in its place, one after the other, if its answer misses ACCURACY
     remembers   whether it starts each problem from the answer to the previous one
@@ -24,6 +25,7 @@ class Plugin:
     options: dict[str, Any] = field(default_factory=dict)
     fallbacks: tuple[str, ...] = ("qpoases", "daqp")
     remembers: bool = False
+    is_conic: bool = True
 
 
 PLUGINS = {
@@ -38,6 +40,7 @@ PLUGINS = {
         ),
         # It cycles if rows contradict each other and two-sided locators are exact.
         Plugin("daqp", {"daqp": {"primal_tol": 1e-12, "dual_tol": 1e-13}}, fallbacks=("qpoases",)),
+        Plugin("graph", fallbacks=("daqp", "qpoases"), is_conic=False),
         Plugin("piqp", {"piqp": {"eps_abs": 1e-12, "eps_rel": 1e-12}}),
         Plugin("highs", {"highs": {"output_flag": False}}, remembers=True),
         Plugin("proxqp", {"proxqp": {"backend": "dense", "eps_abs": 1e-11, "eps_rel": 0.0, "max_iter": 10_000}}),
@@ -88,6 +91,8 @@ def solver(plugin: Plugin, h: ca.Sparsity, a: ca.Sparsity) -> ca.Function:
 
 def is_usable(name: str) -> bool:
     """Return whether the plugin loads and finds the solution (1, 1) of min x'x/2 subject to x1 + x2 >= 2."""
+    if not PLUGINS[name].is_conic:
+        return True
     if not ca.has_conic(name):
         return False
     try:

@@ -22,7 +22,7 @@ from tolcontact.compilation.elements.element_functions import (
 from tolcontact.compilation.elements.sparse_layout import BlockSum, SparseLayout
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import step_share
-from tolcontact.compilation.plugins import Plugin, solver
+from tolcontact.compilation.plugins import Plugin
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
@@ -89,10 +89,6 @@ class ElementQP:
         if name in ("h", "a"):
             return self._layouts[name].sparsity
         return ca.Sparsity.dense(self._size + self.slacks if name == "g" else self.spans[-1].stop, 1)
-
-    def solver(self, plugin: Plugin) -> ca.Function:
-        """Return a new solver of a plugin, without memory of any problem."""
-        return solver(plugin, self.sparsity("h"), self.sparsity("a"))
 
     def assemble(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return h, g, a, lba and uba, and what `finish` needs beside them, for the inputs of contact_qp."""

@@ -1,0 +1,281 @@
+"""Compiled changes of the rows that carry: in all joints at once, or one by one (see search_kernel)."""
+
+import numpy as np
+
+from tolcontact.compilation.graph.factor_kernel import (
+    BOUND,
+    CHANGE,
+    CHANGED,
+    COUNT,
+    DIRECTION,
+    FRESH,
+    GRADIENT,
+    MULTIPLIER,
+    OPEN,
+    OPENING,
+    PRICE,
+    SCATTER,
+    STEP,
+    VALUE,
+    Y,
+    add_row,
+    append,
+    dependence,
+    product,
+    remove,
+    set_row,
+    solve,
+    squared_length,
+)
+from tolcontact.compilation.graph.layout import JOINT, NEAR, POSITION, ROW, SLACK
+from tolcontact.compiled import inlined_inner
+
+FEASIBLE = 1e-12  # mm: rows of length 1 are violated by more
+RELIEVED = 1e-14  # times the growth of the multiplier that enters: multipliers that shrink by less stay
+REFINEMENTS = 4
+CLOSED = 100  # times what violates rows: slacks, which open a gap by a thousandth of them, may be more negative
+# Results of a step: solved with the rows that carry; the target entered; something else left before; nothing can be done.
+CHECKED, ENTERED, PARTIAL, STUCK = range(4)
+
+
+@inlined_inner
+def multiply(layout, work):  # type: ignore[no-untyped-def]
+    """Compute the multipliers of the rows that carry, as equations, and the solution; return the largest multiplier."""
+    multipliers = work.positions[MULTIPLIER]
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            row = work.carrying[t]
+            multipliers[t] = work.rows[row, BOUND] + product(layout.blocks, work.slopes, row, work.vectors[GRADIENT])
+            if work.joints[j, OPEN]:
+                multipliers[t] += work.rows[row, OPENING] * work.slacks[PRICE, j]
+    solve(layout, work, multipliers)
+    return move(layout, work)
+
+
+@inlined_inner
+def move(layout, work):  # type: ignore[no-untyped-def]
+    """Compute the solution of the multipliers, and return the largest multiplier."""
+    for body in range(work.vectors[Y].shape[0]):
+        for c in range(6):
+            work.vectors[Y, body, c] = -work.vectors[GRADIENT, body, c]
+    largest = 0.0
+    for j in range(work.joints.shape[0]):
+        pull = -work.slacks[PRICE, j]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            row, multiplier = work.carrying[t], work.positions[MULTIPLIER, t]
+            add_row(layout.blocks, work.slopes, row, multiplier, work.vectors[Y])
+            pull += work.rows[row, OPENING] * multiplier
+            largest = max(largest, abs(multiplier))
+        work.slacks[VALUE, j] = pull  # of a closed slack: its multiplier, with the other sign
+    return largest
+
+
+@inlined_inner
+def refine(layout, work):  # type: ignore[no-untyped-def]
+    """Correct the multipliers by what the rows that carry miss their bounds by, while this helps; return what they miss."""
+    missed = np.inf
+    for _ in range(REFINEMENTS):
+        remainder = 0.0
+        for j in range(work.joints.shape[0]):
+            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+                work.positions[STEP, t] = -excess(layout, work, work.carrying[t])
+                remainder = max(remainder, abs(work.positions[STEP, t]))
+        helps = remainder > FEASIBLE and remainder < missed / 2
+        missed = remainder
+        if not helps:
+            break
+        solve(layout, work, work.positions[STEP])
+        for j in range(work.joints.shape[0]):
+            for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+                work.positions[MULTIPLIER, t] += work.positions[STEP, t]
+        move(layout, work)
+    return missed
+
+
+@inlined_inner
+def excess(layout, work, row):  # type: ignore[no-untyped-def]
+    """Return by how much a row exceeds its bound."""
+    j = layout.rows[row, JOINT]
+    value = product(layout.blocks, work.slopes, row, work.vectors[Y]) - work.rows[row, BOUND]
+    if work.joints[j, OPEN]:
+        value += work.rows[row, OPENING] * work.slacks[VALUE, j]
+    return value
+
+
+@inlined_inner
+def toggle(layout, work, j):  # type: ignore[no-untyped-def]
+    """Open the slack of a joint, or close it."""
+    work.joints[j, OPEN] = 1 - work.joints[j, OPEN]
+    work.joints[j, FRESH] = 0
+    work.joints[j, CHANGED] = 1
+
+
+@inlined_inner
+def release(layout, work, tolerance):  # type: ignore[no-untyped-def]
+    """Drop the row of each joint that pulls most, and open slacks whose price is too low; return the number of changes."""
+    changes = 0
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] < 0:
+            continue
+        lowest, position = -tolerance, layout.joints[j, POSITION]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            if work.positions[MULTIPLIER, t] < lowest:
+                lowest, position = work.positions[MULTIPLIER, t], t
+        if lowest < -tolerance:
+            remove(layout, work, position)
+            changes += 1
+        if not work.joints[j, OPEN] and work.slacks[VALUE, j] > tolerance:
+            toggle(layout, work, j)
+            changes += 1
+    return changes
+
+
+@inlined_inner
+def close_slacks(layout, work, tolerance):  # type: ignore[no-untyped-def]
+    """Close negative slacks, and return their number."""
+    changes = 0
+    for j in range(work.joints.shape[0]):
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < -CLOSED * tolerance:
+            toggle(layout, work, j)
+            changes += 1
+    return changes
+
+
+@inlined_inner
+def scan(layout, work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+    """Write the most violated row of each joint, or -1, and its excess; return whether there is one."""
+    violated = False
+    for j in range(work.joints.shape[0]):
+        depths[j], deepest[j] = -tolerance, -1
+        if layout.joints[j, SLACK] < 0:
+            continue
+        for row in range(layout.joints[j, ROW], layout.joints[j + 1, ROW]):
+            if work.place[row] < 0:
+                value = excess(layout, work, row)
+                if value < depths[j]:
+                    depths[j], deepest[j], violated = value, row, True
+    return violated
+
+
+@inlined_inner
+def most_violated(work, tolerance, depths, deepest):  # type: ignore[no-untyped-def]
+    """Return the row that is violated most, or the number of rows and of the joint whose slack is more negative, or -1."""
+    lowest, target = -tolerance, -1
+    for j in range(deepest.size):
+        if depths[j] < lowest:
+            lowest, target = depths[j], deepest[j]
+        if work.joints[j, OPEN] and work.slacks[VALUE, j] < min(lowest, -CLOSED * tolerance):
+            lowest, target = work.slacks[VALUE, j], work.place.size + j
+    return target
+
+
+@inlined_inner
+def _aim(layout, work, target):  # type: ignore[no-untyped-def]
+    """Compute the direction of y, slacks and multipliers (times -1) as that of the target grows; return the target's change.
+
+    The change is zero if the target depends on the rows that carry.
+    """
+    change, scatter, direction = work.positions[STEP], work.vectors[SCATTER], work.vectors[DIRECTION]
+    is_row = target < work.place.size
+    joint = layout.rows[target, JOINT] if is_row else target - work.place.size
+    opening, square = 1.0, 0.0
+    if is_row:
+        set_row(layout.blocks, work.slopes, target, 1.0, scatter)
+        opening = work.rows[target, OPENING]
+        square = squared_length(layout.blocks, work.slopes, target)
+    for body in range(direction.shape[0]):
+        for c in range(6):
+            direction[body, c] = scatter[body, c]
+    for j in range(work.joints.shape[0]):
+        work.slacks[CHANGE, j] = opening if j == joint else 0.0
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            change[t] = product(layout.blocks, work.slopes, work.carrying[t], scatter)
+            if work.joints[j, OPEN] and j == joint:
+                change[t] += opening * work.rows[work.carrying[t], OPENING]
+    solve(layout, work, change)
+    for j in range(work.joints.shape[0]):
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            add_row(layout.blocks, work.slopes, work.carrying[t], -change[t], direction)
+            work.slacks[CHANGE, j] -= work.rows[work.carrying[t], OPENING] * change[t]
+    rate = opening * work.slacks[CHANGE, joint] if work.joints[joint, OPEN] else 0.0
+    if is_row:
+        rate += product(layout.blocks, work.slopes, target, direction)
+        set_row(layout.blocks, work.slopes, target, 0.0, scatter)
+    else:
+        # If the slack closes, as little remains of its rows as of the slack, times their openings' square.
+        largest = 0.0
+        for t in range(layout.joints[joint, POSITION], layout.joints[joint, POSITION] + work.joints[joint, COUNT]):
+            largest = max(largest, work.rows[work.carrying[t], OPENING] ** 2)
+        square = 1.0 / largest if largest > 0.0 else 0.0
+    return rate if rate > dependence(work) * square else 0.0
+
+
+@inlined_inner
+def _block(layout, work):  # type: ignore[no-untyped-def]
+    """Return the longest step that leaves multipliers not negative, and the target (see `_aim`) that stops it."""
+    step, blocking = np.inf, -1
+    for j in range(work.joints.shape[0]):
+        if layout.joints[j, SLACK] < 0:
+            continue
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            change = work.positions[STEP, t]
+            if change > RELIEVED and work.positions[MULTIPLIER, t] < step * change:
+                step, blocking = max(work.positions[MULTIPLIER, t], 0.0) / change, work.carrying[t]
+        change = work.slacks[CHANGE, j]
+        if not work.joints[j, OPEN] and change > RELIEVED and -work.slacks[VALUE, j] < step * change:
+            step, blocking = max(-work.slacks[VALUE, j], 0.0) / change, work.place.size + j
+    return step, blocking
+
+
+@inlined_inner
+def _advance(layout, work, length):  # type: ignore[no-untyped-def]
+    """Take a step of this length in the direction of `_aim`."""
+    for body in range(work.vectors[Y].shape[0]):
+        for c in range(6):
+            work.vectors[Y, body, c] += length * work.vectors[DIRECTION, body, c]
+    for j in range(work.joints.shape[0]):
+        work.slacks[VALUE, j] += length * work.slacks[CHANGE, j]
+        for t in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            work.positions[MULTIPLIER, t] -= length * work.positions[STEP, t]
+
+
+@inlined_inner
+def enter_joints(layout, work, depths, deepest, eager):  # type: ignore[no-untyped-def]
+    """Let the most violated row of each joint carry; without `eager`, only if its neighbours are violated less."""
+    for j in range(deepest.size):
+        enters = deepest[j] >= 0
+        if not eager:
+            for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
+                k = layout.near[q]
+                enters = enters and (depths[k] > depths[j] or (depths[k] == depths[j] and k > j))
+        if enters:
+            append(layout, work, deepest[j])
+
+
+@inlined_inner
+def step_towards(layout, work, target, growth):  # type: ignore[no-untyped-def]
+    """Take the longest step towards a row that starts to carry, or a slack that closes; drop what this relieves.
+
+    Returns ENTERED, PARTIAL or STUCK, and how far the multiplier of the target has grown.
+    """
+    rows = work.place.size
+    rate = _aim(layout, work, target)
+    gap = excess(layout, work, target) if target < rows else work.slacks[VALUE, target - rows]
+    step, blocking = _block(layout, work)
+    whole = -gap / rate if rate > 0.0 else np.inf
+    if min(step, whole) == np.inf:
+        return STUCK, growth
+    _advance(layout, work, min(step, whole))
+    growth += min(step, whole)
+    if whole <= step:
+        if target < rows:
+            append(layout, work, target)
+            work.positions[MULTIPLIER, work.place[target]] = growth
+        else:
+            toggle(layout, work, target - rows)
+        return ENTERED, growth
+    if blocking < rows:
+        remove(layout, work, work.place[blocking])
+    else:
+        toggle(layout, work, blocking - rows)
+    return PARTIAL, growth

@@ -1,0 +1,220 @@
+"""Compiled factorization of the Gram matrix of the rows that carry, joint by joint.
+
+Rows of length 1 have the Gram matrix N N'; the rows of a pair whose slack is open have the products of their openings, too.
+Its Cholesky factor has entries only where the elimination of joints in their order joins them (see layout).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from tolcontact.compilation.graph.layout import JOINT, POSITION, PRIOR
+from tolcontact.compiled import inlined_inner
+
+# A row depends on others if they leave less of its square. Open slacks are held by the square of their openings, which is tiny.
+DEPENDENT, DEPENDENT_IF_OPEN = 1e-11, 1e-14
+
+
+OPENING, BOUND = range(2)  # columns of Work.rows
+GRADIENT, Y, SCATTER, DIRECTION = range(4)  # of Work.vectors
+COUNT, FRESH, CHANGED, OPEN = range(4)  # columns of Work.joints
+PRICE, VALUE, CHANGE = range(3)  # of Work.slacks
+MULTIPLIER, STEP, COLUMN = range(3)  # of Work.positions
+
+
+class Work(NamedTuple):
+    """The numbers of one QP: min y'y/2 + gradient'y + sum (price s + s^2/2), slopes y + openings s >= bounds, s >= 0.
+
+    slopes      (row, block, 6)
+    rows        (row, 2) openings and bounds
+    place       (row,) positions of the rows that carry, or -1
+    vectors     (4, body, 6) the gradient, the solution y, one row among zeros, the direction of y
+    joints      (joint, 4) number of rows of the joint that carry, which have its first positions; number of those whose entries
+                of the factor are valid; whether factorization changed others; whether the slack may differ from zero
+    slacks      (3, joint) price, value and direction; the value of a closed slack is the multiplier of its bound, times -1
+    factor      (position, position) the Cholesky factor, below its diagonal
+    carrying    (position,) rows that carry
+    positions   (3, position) their multipliers, a step of these, the next row of the factor
+    """
+
+    slopes: np.ndarray
+    rows: np.ndarray
+    place: np.ndarray
+    vectors: np.ndarray
+    joints: np.ndarray
+    slacks: np.ndarray
+    factor: np.ndarray
+    carrying: np.ndarray
+    positions: np.ndarray
+
+
+@inlined_inner
+def product(blocks, slopes, row, vectors):  # type: ignore[no-untyped-def]
+    """Return the product of a row with vectors (body, 6)."""
+    total = 0.0
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
+        total += (
+            (slopes[row, q, 0] * vectors[body, 0] + slopes[row, q, 1] * vectors[body, 1])
+            + (slopes[row, q, 2] * vectors[body, 2] + slopes[row, q, 3] * vectors[body, 3])
+        ) + (slopes[row, q, 4] * vectors[body, 4] + slopes[row, q, 5] * vectors[body, 5])
+    return total
+
+
+@inlined_inner
+def squared_length(blocks, slopes, row):  # type: ignore[no-untyped-def]
+    """Return the squared length of a row."""
+    total = 0.0
+    for q in range(blocks[row, 0]):
+        for c in range(6):
+            total += slopes[row, q, c] * slopes[row, q, c]
+    return total
+
+
+@inlined_inner
+def add_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
+    """Add a multiple of a row to vectors (body, 6)."""
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
+        for c in range(6):
+            vectors[body, c] += weight * slopes[row, q, c]
+
+
+@inlined_inner
+def set_row(blocks, slopes, row, weight, vectors):  # type: ignore[no-untyped-def]
+    """Set the bodies of a row in vectors (body, 6) to a multiple of it."""
+    for q in range(blocks[row, 0]):
+        body = blocks[row, q + 1]
+        for c in range(6):
+            vectors[body, c] = weight * slopes[row, q, c]
+
+
+@inlined_inner
+def append(layout, work, row):  # type: ignore[no-untyped-def]
+    """Let a row carry, behind the others of its joint."""
+    j = layout.rows[row, JOINT]
+    position = layout.joints[j, POSITION] + work.joints[j, COUNT]
+    work.carrying[position], work.place[row] = row, position
+    work.positions[MULTIPLIER, position] = 0.0
+    work.joints[j, COUNT] += 1
+
+
+@inlined_inner
+def remove(layout, work, position):  # type: ignore[no-untyped-def]
+    """Let the row at a position carry no longer."""
+    j = layout.rows[work.carrying[position], JOINT]
+    work.place[work.carrying[position]] = -1
+    work.joints[j, COUNT] -= 1
+    for s in range(position, layout.joints[j, POSITION] + work.joints[j, COUNT]):
+        work.carrying[s], work.positions[MULTIPLIER, s] = work.carrying[s + 1], work.positions[MULTIPLIER, s + 1]
+        work.place[work.carrying[s]] = s
+    work.joints[j, FRESH] = min(work.joints[j, FRESH], position - layout.joints[j, POSITION])
+    work.joints[j, CHANGED] = 1
+
+
+@inlined_inner
+def _eliminated(layout, work, j, position, value):  # type: ignore[no-untyped-def]
+    """Return an entry of the factor's next row, in a column of joint j, for its Gram entry."""
+    factor, column = work.factor, work.positions[COLUMN]
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        start = layout.joints[layout.prior[q, 0], POSITION]
+        for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
+            value -= factor[position, t] * column[t]
+    for t in range(layout.joints[j, POSITION], position):
+        value -= factor[position, t] * column[t]
+    return value
+
+
+@inlined_inner
+def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untyped-def]
+    """Compute the factor's row at a position of joint j, and return whether the row is independent of those before it."""
+    factor, column, carrying, scatter = work.factor, work.positions[COLUMN], work.carrying, work.vectors[SCATTER]
+    row, start = carrying[position], layout.joints[j, POSITION]
+    opening = work.rows[row, OPENING] if work.joints[j, OPEN] else 0.0
+    set_row(layout.blocks, work.slopes, row, 1.0, scatter)
+    square = squared_length(layout.blocks, work.slopes, row) + opening * opening
+    rest = square
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
+        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
+            value = product(layout.blocks, work.slopes, carrying[t], scatter) if adjacent else 0.0
+            column[t] = _eliminated(layout, work, k, t, value) / factor[t, t]
+            rest -= column[t] * column[t]
+    for t in range(start, position):
+        value = product(layout.blocks, work.slopes, carrying[t], scatter)
+        if work.joints[j, OPEN]:
+            value += opening * work.rows[carrying[t], OPENING]
+        column[t] = _eliminated(layout, work, j, t, value) / factor[t, t]
+        rest -= column[t] * column[t]
+    for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+        k = layout.prior[q, 0]
+        for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
+            factor[position, t], column[t] = column[t], 0.0
+    for t in range(start, position):
+        factor[position, t], column[t] = column[t], 0.0
+    set_row(layout.blocks, work.slopes, row, 0.0, scatter)
+    factor[position, position] = np.sqrt(max(rest, 0.0))
+    return rest > threshold * square
+
+
+@inlined_inner
+def any_open(work):  # type: ignore[no-untyped-def]
+    """Return whether a slack is open."""
+    is_open = False
+    for j in range(work.joints.shape[0]):
+        is_open = is_open or work.joints[j, OPEN] > 0
+    return is_open
+
+
+@inlined_inner
+def dependence(work):  # type: ignore[no-untyped-def]
+    """Return how little of a row's square may remain beside the other rows if it is independent of them."""
+    return DEPENDENT_IF_OPEN if any_open(work) else DEPENDENT
+
+
+@inlined_inner
+def factorize(layout, work):  # type: ignore[no-untyped-def]
+    """Complete the factor, and return the number of rows that carry no longer, since they depend on those before them."""
+    dropped, threshold = 0, dependence(work)
+    for j in range(work.joints.shape[0]):
+        for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+            if work.joints[layout.prior[q, 0], CHANGED]:
+                work.joints[j, FRESH], work.joints[j, CHANGED] = 0, 1
+        if work.joints[j, FRESH] < work.joints[j, COUNT]:
+            work.joints[j, CHANGED] = 1
+        while work.joints[j, FRESH] < work.joints[j, COUNT]:
+            position = layout.joints[j, POSITION] + work.joints[j, FRESH]
+            if _factor_row(layout, work, j, position, threshold):
+                work.joints[j, FRESH] += 1
+            else:
+                remove(layout, work, position)
+                dropped += 1
+    for j in range(work.joints.shape[0]):
+        work.joints[j, CHANGED] = 0
+    return dropped
+
+
+@inlined_inner
+def solve(layout, work, values):  # type: ignore[no-untyped-def]
+    """Solve with the Gram matrix of the rows that carry, in place; values (position,)."""
+    factor = work.factor
+    for j in range(work.joints.shape[0]):
+        for position in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
+            value = values[position]
+            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+                start = layout.joints[layout.prior[q, 0], POSITION]
+                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
+                    value -= factor[position, t] * values[t]
+            for t in range(layout.joints[j, POSITION], position):
+                value -= factor[position, t] * values[t]
+            values[position] = value / factor[position, position]
+    for j in range(work.joints.shape[0] - 1, -1, -1):
+        for position in range(layout.joints[j, POSITION] + work.joints[j, COUNT] - 1, layout.joints[j, POSITION] - 1, -1):
+            value = values[position] / factor[position, position]
+            values[position] = value
+            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
+                start = layout.joints[layout.prior[q, 0], POSITION]
+                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
+                    values[t] -= factor[position, t] * value
+            for t in range(layout.joints[j, POSITION], position):
+                values[t] -= factor[position, t] * value

@@ -1,0 +1,120 @@
+"""A solver of contact QPs that follows the graph of bodies: few bodies touch each other, so most of the matrices is empty."""
+
+from collections.abc import Mapping
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.compilation.graph.factor_kernel import Work
+from tolcontact.compilation.graph.layout import POSITION, Layout, Storage, layout
+from tolcontact.compilation.graph.solve_kernel import solve_batch
+from tolcontact.mechanics.correction import FREEDOMS
+
+FEW_BODIES, ROUNDS_OF_FEW, ROUNDS = 2, 4, 40  # rounds in which rows of all joints enter at once
+STEPS_PER_ROW = 4  # in which single rows enter or leave
+
+Arrays = Mapping[str, Float[Array, "_ _"]]
+
+
+class GraphSolver:
+    """A solver of QPs with the sparsities of h, g, a and lba. Threads must not share it.
+
+    The last `equations` rows are equations, the last `slacks` variables are not negative, with unit entries in h.
+    """
+
+    def __init__(self, sparsities: Mapping[str, ca.Sparsity], *, slacks: int, equations: int) -> None:
+        self._sparsities, self._slacks, self._equations = dict(sparsities), slacks, equations
+        rows, columns = (np.array(indices) for indices in sparsities["h"].get_triplet())
+        self._identity = (rows == columns).astype(float)
+        self._is_full = {name: sparsities[name].nnz() == sparsities[name].numel() for name in ("g", "lba")}
+        self._nonzeros = {name: np.array(sparsities[name].find()) for name in ("g", "lba")}
+        self._searches: dict[bool, _Search] = {}
+
+    def __call__(
+        self, problem: Arrays, reactions: Float[Array, "realization row"]
+    ) -> tuple[dict[str, Float[Array, "realization _"]], Bool[Array, " realization"]]:
+        """Return x, lam_a and lam_x of assembled QPs, (realization, entry), and (realization,) whether the solver gave up.
+
+        Rows with `reactions` carry in the first guess.
+        """
+        count = len(reactions)
+        answer = {name: np.zeros((count, size)) for name, size in self._sizes().items()}
+        failed = np.zeros(count, dtype=np.bool_)
+        arrays = (problem["h"], problem["a"], self._full("g", problem["g"]), self._full("lba", problem["lba"]))
+        results = (*answer.values(), failed)
+        coupled = (problem["h"] != self._identity).any(axis=1)
+        for is_coupled in (False, True):
+            rows = np.flatnonzero(coupled == is_coupled)
+            if len(rows) == count:
+                self._search(is_coupled)(arrays, reactions, results)
+            elif rows.size:
+                part = tuple(array[rows] for array in results)
+                self._search(is_coupled)(tuple(array[rows] for array in arrays), reactions[rows], part)
+                for array, values in zip(results, part, strict=True):
+                    array[rows] = values
+        return answer, failed
+
+    def _sizes(self) -> dict[str, int]:
+        rows, size = self._sparsities["a"].shape
+        return {"x": size, "lam_a": rows, "lam_x": size}
+
+    def _full(self, name: str, stored: np.ndarray) -> np.ndarray:
+        """Return all entries of a vector, (realization, entry)."""
+        if self._is_full[name]:
+            return stored
+        entries = np.zeros((len(stored), self._sparsities[name].numel()))
+        entries[:, self._nonzeros[name]] = stored
+        return entries
+
+    def _search(self, coupled: bool) -> "_Search":
+        if coupled not in self._searches:
+            sparsities = self._sparsities["h"], self._sparsities["a"]
+            self._searches[coupled] = _Search(
+                *layout(*sparsities, slacks=self._slacks, equations=self._equations, coupled=coupled), coupled=coupled
+            )
+        return self._searches[coupled]
+
+
+class _Search:
+    """The layout of QPs, with buffers for their solution; `coupled` if H has blocks beside its diagonal."""
+
+    def __init__(self, layout: Layout, storage: Storage, *, coupled: bool) -> None:
+        self._layout, self._storage, self._coupled = layout, storage, coupled
+        rows, width = len(layout.blocks), layout.blocks.shape[1] - 1
+        bodies, joints, positions = len(storage.bodies), len(layout.joints) - 1, int(layout.joints[-1, POSITION])
+        cut = rows * width * FREEDOMS
+        self._buffer = np.zeros(cut + 2 * rows)
+        self._work = Work(
+            slopes=self._buffer[:cut].reshape(rows, width, FREEDOMS),
+            rows=self._buffer[cut:].reshape(rows, 2),
+            place=np.zeros(rows, dtype=np.int64),
+            vectors=np.zeros((4, bodies, FREEDOMS)),
+            joints=np.zeros((joints, 4), dtype=np.int64),
+            slacks=np.zeros((3, joints)),
+            factor=np.zeros((positions, positions)),
+            carrying=np.zeros(positions, dtype=np.int64),
+            positions=np.zeros((3, positions)),
+        )
+        self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))
+        self._guesses = np.zeros(joints), np.zeros(joints, dtype=np.int64)
+        self._limits = np.array([ROUNDS if bodies > FEW_BODIES else ROUNDS_OF_FEW, STEPS_PER_ROW * (rows + FREEDOMS)])
+
+    def __call__(
+        self, problem: tuple[np.ndarray, ...], reactions: np.ndarray, answer: tuple[np.ndarray, ...]
+    ) -> Int[Array, "realization 2"]:
+        """Solve QPs (h, a, g, lba) into `answer` (x, lam_a, lam_x, failed); return the counters of `solve_batch`."""
+        h, *vectors = (np.ascontiguousarray(array) for array in problem)
+        counters = np.zeros((len(h), 2), dtype=np.int64)
+        solve_batch(
+            self._layout,
+            self._storage,
+            self._work,
+            (h if self._coupled else h[:, :0].copy(), self._blocks),
+            (*vectors, self._buffer),
+            np.ascontiguousarray(reactions),
+            self._limits,
+            (*self._guesses, counters),
+            answer,
+        )
+        return counters

@@ -1,0 +1,172 @@
+"""The layout of a QP on the graph of bodies: which bodies a row touches, and in which order joints are eliminated.
+
+A joint is the set of rows that share a slack (those of a contact pair), or of equations that touch the same bodies.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import casadi as ca
+import numpy as np
+
+from tolcontact.compilation.graph.elimination import elimination, least_degree, least_depth
+from tolcontact.mechanics.correction import FREEDOMS
+
+JOINT, SOURCE = range(2)  # columns of Layout.rows
+ROW, POSITION, PRIOR, NEAR, SLACK = range(5)  # columns of Layout.joints
+
+
+class Layout(NamedTuple):
+    """Constant arrays for the search for the rows that carry. Bodies, joints and rows are numbered in the order of elimination.
+
+    blocks   (row, 1 + block) number of bodies that the row touches, and these bodies, in ascending order
+    rows     (row, 2) its joint, and its number in the QP; the rows of a joint come one after the other
+    joints   (joint + 1, 5) the first row of the joint, its first position in the Gram matrix of the rows that carry, its first
+             rows of `prior` and `near`, and its slack, or -1 for equations
+    prior    (_, 2) earlier joints with which the joint has entries in the factor of the Gram matrix, and whether the two share
+             a body, so that the Gram matrix has entries, too
+    near     (_,) joints that share a body with the joint
+    """
+
+    blocks: np.ndarray
+    rows: np.ndarray
+    joints: np.ndarray
+    prior: np.ndarray
+    near: np.ndarray
+
+
+class Storage(NamedTuple):
+    """Where the entries of a QP are stored.
+
+    bodies          (body,) number of each body in the QP
+    entries         (nonzero of a) place of each nonzero in a buffer: slopes (row, block, 6), then openings and bounds (row, 2)
+    hessian_entries (nonzero of h) place of each nonzero in the blocks (block, 6, 6) of H below its diagonal, or -1
+    starts          (body + 1,) first block of each body's row; its last block is on the diagonal
+    columns         (block,) body of each block's column
+    block_of        (body, body) block of a row and column, or -1
+    """
+
+    bodies: np.ndarray
+    entries: np.ndarray
+    hessian_entries: np.ndarray
+    starts: np.ndarray
+    columns: np.ndarray
+    block_of: np.ndarray
+
+
+def layout(h: ca.Sparsity, a: ca.Sparsity, *, slacks: int, equations: int, coupled: bool) -> tuple[Layout, Storage]:
+    """Return the layout and the storage of QPs with these sparsities.
+
+    If `coupled`, H = C C' has blocks beside its diagonal. Rows become C^-1 a, and touch the bodies that follow theirs as well.
+    """
+    bodies, count = (h.size1() - slacks) // FREEDOMS, a.size1()
+    rows, columns = (np.array(indices, dtype=np.int64) for indices in a.get_triplet())
+    of_body = columns < bodies * FREEDOMS
+    touched: list[set[int]] = [set() for _ in range(count)]
+    for row, column in zip(rows[of_body].tolist(), columns[of_body].tolist(), strict=True):
+        touched[row].add(column // FREEDOMS)
+    slack_of_row = np.full(count, -1)
+    slack_of_row[rows[~of_body]] = columns[~of_body] - bodies * FREEDOMS
+    graph = _body_graph(h, bodies) if coupled else [set() for _ in range(bodies)]
+    body_order, later = elimination(graph, least_depth)
+    if coupled:
+        touched = [_with_later(body_order, later, nodes) for nodes in touched]
+    joints, equation_joints = _joints(touched, slack_of_row.tolist(), count - equations)
+    joint_bodies = [set().union(*(touched[row] for row in members)) for members in joints]
+    near = [{k for k, nodes in enumerate(joint_bodies) if k != j and nodes & joint_bodies[j]} for j in range(len(joints))]
+    # Equations come first, so that no equation is dropped because it depends on rows that may leave.
+    order, joined = elimination(near, lambda j, depths, graph: (j >= equation_joints, *least_degree(j, depths, graph)))
+    rank = np.argsort(order)
+    prior = [sorted(k for k, nodes in enumerate(joined) if j in nodes) for j in range(len(order))]
+    members = [joints[j] for j in order]
+    row_order = np.array([row for rows_of_joint in members for row in rows_of_joint], dtype=np.int64)
+    body_rank = np.argsort(body_order)
+    blocks = [sorted(int(body_rank[body]) for body in touched[row]) for row in row_order]
+    width = max([1, *map(len, blocks)])
+    sizes = [len(joints[j]) if j < equation_joints else min(len(joints[j]), FREEDOMS * len(joint_bodies[j]) + 2) for j in order]
+    positions = np.cumsum([0, *sizes])
+    slack_of_joint = [*(slack_of_row[rows_of_joint[0]] for rows_of_joint in members), -1]
+    adjacent = [(k, order[k] in near[order[j]]) for j, nodes in enumerate(prior) for k in nodes]
+    return Layout(
+        blocks=np.array([[len(nodes), *nodes] + [0] * (width - len(nodes)) for nodes in blocks], dtype=np.int64),
+        rows=np.stack([np.repeat(np.arange(len(order)), list(map(len, members))), row_order], axis=1),
+        joints=np.stack(
+            [_starts(members), positions, _starts(prior), _starts([near[j] for j in order]), slack_of_joint], axis=1
+        ),
+        prior=np.array(adjacent, dtype=np.int64).reshape(-1, 2),
+        near=np.array([rank[k] for j in order for k in sorted(near[j])], dtype=np.int64),
+    ), _storage(h, body_order, later, _entries(rows, columns, np.argsort(row_order), body_rank, blocks, width))
+
+
+def _starts(lists: Sequence[Sequence[int] | set[int]]) -> np.ndarray:
+    return np.cumsum([0, *map(len, lists)])
+
+
+def _body_graph(h: ca.Sparsity, bodies: int) -> list[set[int]]:
+    """Return the bodies with which H couples each body."""
+    graph: list[set[int]] = [set() for _ in range(bodies)]
+    for row, column in zip(*h.get_triplet(), strict=True):
+        i, j = row // FREEDOMS, column // FREEDOMS
+        if i != j and max(i, j) < bodies:
+            graph[i].add(j)
+            graph[j].add(i)
+    return graph
+
+
+def _with_later(order: Sequence[int], later: Sequence[Sequence[int]], bodies: set[int]) -> set[int]:
+    """Return the bodies, and those that follow them in the factor of H."""
+    ranks = {order.index(body) for body in bodies}
+    for rank in range(len(order)):
+        if rank in ranks:
+            ranks.update(later[rank])
+    return {order[rank] for rank in ranks}
+
+
+def _joints(touched: Sequence[set[int]], slacks: Sequence[int], inequalities: int) -> tuple[list[list[int]], int]:
+    """Return the rows of each joint, those of equations in front, and their number."""
+    pairs: dict[int, list[int]] = {}
+    equations: dict[tuple[int, ...], list[int]] = {}
+    for row, (bodies, slack) in enumerate(zip(touched, slacks, strict=True)):
+        if row >= inequalities:
+            equations.setdefault(tuple(sorted(bodies)), []).append(row)
+        else:
+            pairs.setdefault(slack, []).append(row)
+    return [*equations.values(), *pairs.values()], len(equations)
+
+
+def _entries(
+    rows: np.ndarray, columns: np.ndarray, row_rank: np.ndarray, body_rank: np.ndarray, blocks: Sequence[list[int]], width: int
+) -> np.ndarray:
+    """Return the place of each nonzero of a in the buffer of the rows."""
+    openings = len(blocks) * width * FREEDOMS
+    places = np.zeros(len(rows), dtype=np.int64)
+    for k, (row, column) in enumerate(zip(row_rank[rows].tolist(), columns.tolist(), strict=True)):
+        body, freedom = divmod(column, FREEDOMS)
+        if body >= len(body_rank):
+            places[k] = openings + 2 * row
+        else:
+            places[k] = (row * width + blocks[row].index(int(body_rank[body]))) * FREEDOMS + freedom
+    return places
+
+
+def _storage(h: ca.Sparsity, order: Sequence[int], later: Sequence[Sequence[int]], entries: np.ndarray) -> Storage:
+    bodies, rank = len(order), np.argsort(order)
+    columns = [[*(k for k, nodes in enumerate(later) if body in nodes), body] for body in range(bodies)]
+    starts = _starts(columns)
+    block_of = np.full((bodies, bodies), -1, dtype=np.int64)
+    for body, nodes in enumerate(columns):
+        block_of[body, nodes] = starts[body] + np.arange(len(nodes))
+    rows_of_h, columns_of_h = (np.array(indices, dtype=np.int64) for indices in h.get_triplet())
+    places = np.full(len(rows_of_h), -1, dtype=np.int64)
+    of_bodies = np.flatnonzero(np.maximum(rows_of_h, columns_of_h) < bodies * FREEDOMS)
+    i, j = rows_of_h[of_bodies], columns_of_h[of_bodies]
+    blocks = block_of[rank[i // FREEDOMS], rank[j // FREEDOMS]]
+    places[of_bodies] = np.where(blocks < 0, -1, (blocks * FREEDOMS + i % FREEDOMS) * FREEDOMS + j % FREEDOMS)
+    return Storage(
+        bodies=np.array(order, dtype=np.int64),
+        entries=entries,
+        hessian_entries=places,
+        starts=starts,
+        columns=np.array([k for nodes in columns for k in nodes], dtype=np.int64),
+        block_of=block_of,
+    )
