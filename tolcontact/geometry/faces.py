@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
@@ -27,6 +28,8 @@ OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face 
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
+# By the meshes of a part and of its neighbour: which triangles of the part are near, for each pair of places and distance.
+_NEARNESS: WeakKeyDictionary[trimesh.Trimesh, WeakKeyDictionary[trimesh.Trimesh, dict[Any, np.ndarray]]] = WeakKeyDictionary()
 
 
 class FaceArea(NamedTuple):
@@ -208,11 +211,20 @@ def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
-    mesh, neighbour = (_in_place(part, meshes[part]) for part in (face.part, selection.part))
+    """Return the mask of a selection. A model needs it several times, so it is kept as long as both meshes are."""
+    parts = face.part, selection.part
+    masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
+    key = (*((part.at, part.rotation) for part in parts), selection.within)
+    if key not in masks:
+        masks[key] = _near_mask(*(_in_place(part, meshes[part]) for part in parts), selection.within)
+    return masks[key]
+
+
+def _near_mask(mesh: trimesh.Trimesh, neighbour: trimesh.Trimesh, within: float) -> np.ndarray:
     mask = np.zeros(len(mesh.faces), dtype=bool)
     # Both are sampled, since either part may be small beside the other.
     for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
-        origin, hit = _near_pieces(sampled, target, selection.within)
+        origin, hit = _near_pieces(sampled, target, within)
         normals, target_normals = np.asarray(sampled.face_normals)[origin], np.asarray(target.face_normals)[hit]
         is_opposing = (normals * target_normals).sum(axis=1) < OPPOSING_COSINE
         mask[(origin if sampled is mesh else hit)[is_opposing]] = True
