@@ -216,7 +216,8 @@ def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
     masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
     key = (*((part.at, part.rotation) for part in parts), selection.within)
     if key not in masks:
-        masks[key] = _near_mask(*(_in_place(part, meshes[part]) for part in parts), selection.within)
+        mesh, neighbour = (_in_place(part, meshes[part]) for part in parts)
+        masks[key] = _near_mask(mesh, neighbour, selection.within)
     return masks[key]
 
 
