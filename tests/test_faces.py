@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 import tolcontact as tc
 from tests.shapes import BLOCK, HOUSING, face_of
+from tolcontact import poses as pose
 from tolcontact.errors import GeometryFault
+from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import patch
 from tolcontact.geometry.files.reading import STEP_CHORD
 from tolcontact.geometry.shapes import shape
@@ -108,6 +111,37 @@ def test_what_is_near_on_a_large_barrel_is_not_the_whole_barrel():
     near = patch(barrel.face(tc.Near(block, 0.5)), meshes).mesh
     assert near.bounds[0, 0] > 199
     assert 100 < near.area < 400
+
+
+def test_what_is_near_on_a_ball_are_its_lowest_triangles():
+    """As near as the centres of small pieces of triangles: some triangles reach nearer than their own centres."""
+    ball = trimesh.creation.icosphere(3, 20.0)
+    a = tc.Assembly("ball")
+    table = a.part("table", tc.Box(100, 100, 10), at=(-50, -50, -30.5), fixed=True)
+    part = a.part("ball", tc.Mesh(ball))
+    meshes = {part: shape(part.geometry).mesh for part in (table, part)}
+    for within in (0.55, 1.0, 3.0):
+        near = patch(part.face(tc.Near(table, within)), meshes).mesh
+        heights = np.asarray(near.triangles)[:, :, 2] + 20.5
+        assert heights.min(axis=1).max() <= within
+        assert len(near.faces) >= (ball.triangles_center[:, 2] + 20.5 <= within).sum() and len(near.faces) > 0
+        moved = a.part(f"ball {within}", tc.Mesh(ball), at=(0, 0, 30))  # the same mesh elsewhere is not near
+        with pytest.raises(GeometryFault, match="no triangles"):
+            patch(moved.face(tc.Near(table, within)), meshes | {moved: meshes[part]})
+
+
+@pytest.mark.parametrize("turn", [0.0, 1e-3, 0.2])
+def test_faces_penetrate_each_other_where_their_depth_is_not_0(turn):
+    table, block = (trimesh.creation.box(extents) for extents in ((100, 60, 10), (40, 30, 10)))
+    faces = FacePair(*(
+        body_face(face_of(body, lambda c, n, up=up: n[:, 2] * up > 0.9), body, 4) for body, up in ((block, -1), (table, 1))
+    ))  # fmt: skip
+    rng = np.random.default_rng(2)
+    t = rng.normal([0, 0, 10], [30, 20, 0.01], (60, 3))
+    X = pose.pose(Rotation.from_rotvec(rng.normal(0, turn, (60, 3))).as_matrix(), t)
+    depths = faces.depth(X, np.zeros(60))
+    assert 0 < (depths > 0).sum() < 60
+    np.testing.assert_array_equal(faces.penetrate(X, np.zeros(60)), depths > 0)
 
 
 def test_a_mask_is_not_taken_for_indices():

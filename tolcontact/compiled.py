@@ -18,6 +18,7 @@ from numba import njit
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from tolcontact import code_cache
@@ -54,7 +55,8 @@ class _Cache(NullCache):  # type: ignore[misc]
         self._dispatcher = dispatcher
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        target_context.refresh()  # as Numba does before it uses code
+        # Code that is ready needs the runtime alone; what a compiler needs takes as long to load as all the code together.
+        rtsys.initialize(target_context)
         code = code_cache.load(self._key(sig, target_context.codegen()))
         try:
             return None if code is None else CompileResult._rebuild(target_context, *pickle.loads(code))

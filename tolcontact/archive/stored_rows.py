@@ -14,6 +14,8 @@ from tolcontact.realizations import finished
 from tolcontact.simulation import Block
 from tolcontact.vocabulary import ArchiveVariable
 
+PIECE_BYTES = 1 << 22  # of a variable that are read at once to compare them with their checksums
+
 
 class StoredBlock(NamedTuple):
     """Realizations `start` to `stop`: the values of each archived variable, by name, and their checksums."""
@@ -81,7 +83,8 @@ def _damaged(results: xr.DataTree, stored: xr.Dataset, rows: int) -> Iterator[tu
 
 def _checksums(variable: ArchiveVariable, values: xr.DataArray, rows: int) -> np.ndarray:
     """Return the checksums (block,) of the values of a variable in blocks of `rows` realizations."""
-    checksums, step = [], -(-terms.PIECE_ROWS // rows) * rows
+    row_bytes = values.dtype.itemsize * max(values.size // max(len(values), 1), 1)
+    checksums, step = [], max(min(terms.PIECE_ROWS, PIECE_BYTES // row_bytes) // rows, 1) * rows
     for start in range(0, len(values), step):
         piece = values[start : start + step].values
         checksums += [crc32(variable, piece[k : k + rows]) for k in range(0, len(piece), rows)]

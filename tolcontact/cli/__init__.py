@@ -59,7 +59,6 @@ prints JSON with `--json`, and writes netCDF with `--out`.
 (True, 0)
 """
 
-from tolcontact.cli import analyses, archives, compare, models, pmi, run, step_files
-from tolcontact.cli.app import command_line, main
+import lazy_loader
 
-__all__ = ["analyses", "archives", "command_line", "compare", "main", "models", "pmi", "run", "step_files"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

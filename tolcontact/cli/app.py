@@ -8,29 +8,19 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperGroup
 
-from tolcontact import interrupts
-from tolcontact.declaration import Assembly
+from tolcontact.cli.commands import Commands
 from tolcontact.errors import OptionError, TolcontactError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
 from tolcontact.version import __version__
 
+if TYPE_CHECKING:
+    from tolcontact.declaration import Assembly
+
 MIN_COLUMNS = 40  # of a terminal: warnings are wrapped to no fewer
-
-
-class Commands(TyperGroup):
-    """The commands. One that is stopped ends with a message."""
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            with interrupts.stoppable():
-                return super().invoke(ctx)
-        except KeyboardInterrupt:
-            interrupts.end("stopped")
 
 
 app = typer.Typer(
@@ -115,7 +105,7 @@ def chosen(**options: str | None) -> dict[str, str]:
     return {name: value for name, value in options.items() if value is not None}
 
 
-def main(assembly: Callable[[], Assembly]) -> None:
+def main(assembly: "Callable[[], Assembly]") -> None:
     """Run the script that defines `assembly`, with the options of `tolcontact run`."""
     script = inspect.getsourcefile(assembly)
     command_line([*(["run", script] if script else []), *sys.argv[1:]])

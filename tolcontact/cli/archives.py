@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tolcontact import report as reports
 from tolcontact.archive import open_archive
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
 from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
@@ -12,7 +13,7 @@ from tolcontact.cli.progress import waiting
 from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
-from tolcontact.report import capability_text, write_page, write_spreadsheet
+from tolcontact.report.text import capability_text
 from tolcontact.vocabulary import ESTIMATE, MEASURE_UNITS, STATISTIC, units_of
 from tolcontact.workflow.run import summarize
 
@@ -66,9 +67,9 @@ def report(
     with waiting(f"writing the report of {archive}"), open_archive(archive) as results:
         summary, titles = summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:
-            write_page(results, summary, page, titles)
+            reports.write_page(results, summary, page, titles)
         if xlsx is not None:
-            write_spreadsheet(results, summary, xlsx, titles)
+            reports.write_spreadsheet(results, summary, xlsx, titles)
     for kind, path in (("report", page), ("spreadsheet", xlsx)):
         if path is not None:
             typer.echo(f"{kind}: {shown(str(path))}")

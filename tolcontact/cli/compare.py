@@ -8,13 +8,14 @@ from typing import Annotated
 import typer
 import xarray as xr
 
+from tolcontact import report as reports
 from tolcontact.archive import open_archive, replacing_archive, taken
 from tolcontact.cli.app import AsJson, Overwrite, Samples, Scheduler, Seed, Workers, app, chosen, examples, or_, set_options
 from tolcontact.cli.output import check_page, console, print_data
 from tolcontact.declaration.script import load_model
 from tolcontact.errors import OptionError, shown
 from tolcontact.method import OBJECTIVES, RESOLUTIONS
-from tolcontact.report import comparison_text, runs_text, write_comparison
+from tolcontact.report.text import comparison_text, runs_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.comparison import compare as compare_solvers, compare_runs, named_archives
 from tolcontact.workflow.models import DEFAULT_SOLVER
@@ -92,7 +93,7 @@ def _compare_archives(files: Sequence[Path], report: Path | None) -> xr.Dataset:
         runs = {name: stack.enter_context(open_archive(path)) for name, path in named_archives(files).items()}
         comparison = compare_runs(runs)
         if report is not None:
-            write_comparison(runs, comparison, report)
+            reports.write_comparison(runs, comparison, report)
     return comparison
 
 

@@ -9,8 +9,9 @@ import typer
 import xarray as xr
 from rich.console import Console
 
+from tolcontact import report
 from tolcontact.errors import OptionError
-from tolcontact.report import is_page, summary_text
+from tolcontact.report.text import summary_text
 from tolcontact.vocabulary import BY_STATUS, UNRESOLVED
 
 FAILED_SHARE = 0.001
@@ -47,7 +48,7 @@ def check_page(path: Path, *, overwrite: bool = False) -> None:
         raise OptionError(f'"{path}" is not the name of a page; expected one that ends in .html')
     if not path.parent.is_dir():
         raise OptionError(f'page "{path}" cannot be written: there is no folder "{path.parent}"; make it first')
-    if not overwrite and path.exists() and not is_page(path):
+    if not overwrite and path.exists() and not report.is_page(path):
         raise OptionError(f'"{path}" exists, and is no page of tolcontact; choose another name, or replace it with --overwrite')
 
 

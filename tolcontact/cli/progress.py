@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 
 from tolcontact import interrupts
 from tolcontact.errors import shown
-from tolcontact.report import grouped
+from tolcontact.report.figures import grouped
 from tolcontact.workflow.forecast import duration
 
 LINE_INTERVAL = 10.0  # s

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 import xarray as xr
 
+from tolcontact import report as reports
 from tolcontact.cli.app import (
     Model,
     Objective,
@@ -27,7 +28,6 @@ from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
 from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title, titled_model
 from tolcontact.errors import OptionError, shown
-from tolcontact.report import write_page
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
 from tolcontact.workflow.models import DEFAULT_SOLVER
@@ -116,7 +116,7 @@ def _print_results(results: xr.DataTree, out: Path | None, report: Path | None, 
     with results:
         summary = summarize(results)
         if report is not None:
-            write_page(results, summary, report)
+            reports.write_page(results, summary, report)
         shortfall = Target.of(until).shortfall(results) if until is not None else ""
         print_summary(summary)
     if out is not None:

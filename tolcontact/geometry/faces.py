@@ -2,7 +2,8 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import trimesh
@@ -18,6 +19,7 @@ from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
 
 NEAR_STATIONS = 100
+CUT = 4  # how much finer the pieces of triangles become in one step
 BREP_REACH = 1e-3  # of the part's size: how far a point may stand off the B-rep face that it names
 FLAT_ANGLE = 2e-4  # rad: between neighbouring triangles of one flat face, after single precision
 RADIUS_TOLERANCE = 1e-6  # of a radius: radii that differ by less are equal
@@ -26,6 +28,8 @@ OPPOSING_COSINE = -0.5  # between the outward normals of two surfaces that face 
 CUT_MARGIN = 1e-9  # of the part's size: what lies in a side of a box is inside
 
 Meshes = Mapping[Part, trimesh.Trimesh]
+# By the meshes of a part and of its neighbour: which triangles of the part are near, for each pair of places and distance.
+_NEARNESS: WeakKeyDictionary[trimesh.Trimesh, WeakKeyDictionary[trimesh.Trimesh, dict[Any, np.ndarray]]] = WeakKeyDictionary()
 
 
 class FaceArea(NamedTuple):
@@ -207,30 +211,56 @@ def _by_point(face: Face, mesh: trimesh.Trimesh, place: Vector) -> np.ndarray:
 
 
 def _by_nearness(face: Face, meshes: Meshes, selection: Near) -> np.ndarray:
-    mesh, neighbour = (_in_place(part, meshes[part]) for part in (face.part, selection.part))
+    """Return the mask of a selection. A model needs it several times, so it is kept as long as both meshes are."""
+    parts = face.part, selection.part
+    masks = _NEARNESS.setdefault(meshes[face.part], WeakKeyDictionary()).setdefault(meshes[selection.part], {})
+    key = (*((part.at, part.rotation) for part in parts), selection.within)
+    if key not in masks:
+        mesh, neighbour = (_in_place(part, meshes[part]) for part in parts)
+        masks[key] = _near_mask(mesh, neighbour, selection.within)
+    return masks[key]
+
+
+def _near_mask(mesh: trimesh.Trimesh, neighbour: trimesh.Trimesh, within: float) -> np.ndarray:
     mask = np.zeros(len(mesh.faces), dtype=bool)
     # Both are sampled, since either part may be small beside the other.
     for sampled, target in ((mesh, neighbour), (neighbour, mesh)):
-        step = max(selection.within, sampled.scale / NEAR_STATIONS)
-        # What lies outside of this box is too far away.
-        low, high = np.asarray(target.bounds) + selection.within * np.array([[-1.0], [1.0]])
-        corners = np.asarray(sampled.triangles)
-        reachable = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
-        vertices, faces, piece_of = trimesh.remesh.subdivide_to_size(
-            sampled.vertices, sampled.faces[reachable], max_edge=step, max_iter=30, return_index=True
-        )
-        centres = vertices[faces].mean(axis=1)
-        within_box = np.flatnonzero(((centres >= low) & (centres <= high)).all(axis=1))
-        centres, origin = centres[within_box], reachable[piece_of[within_box]]
-        hit, nearest = Surface(target).nearest(centres)
+        origin, hit = _near_pieces(sampled, target, within)
         normals, target_normals = np.asarray(sampled.face_normals)[origin], np.asarray(target.face_normals)[hit]
         is_opposing = (normals * target_normals).sum(axis=1) < OPPOSING_COSINE
-        is_near = is_opposing & (np.linalg.norm(centres - nearest, axis=1) <= selection.within)
-        mask[(origin if sampled is mesh else hit)[is_near]] = True
+        mask[(origin if sampled is mesh else hit)[is_opposing]] = True
     # A flat face is chosen as a whole, however it is cut into triangles.
     flat = np.asarray(mesh.face_adjacency)[np.asarray(mesh.face_adjacency_angles) < FLAT_ANGLE]
     face_of = trimesh.graph.connected_component_labels(flat, node_count=len(mesh.faces))
     return np.isin(face_of, face_of[mask])
+
+
+def _near_pieces(sampled: trimesh.Trimesh, target: trimesh.Trimesh, within: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the pieces of a mesh come close to a target: their triangle, and the nearest triangle of the target.
+
+    Pieces are parts of triangles whose centres lie `within` [mm] of the target. Triangles are cut step by step, and what lies
+    too far away is left out after each step.
+    """
+    finest, surface = max(within, sampled.scale / NEAR_STATIONS), Surface(target)
+    # What lies outside of this box is too far away.
+    low, high = np.asarray(target.bounds) + within * np.array([[-1.0], [1.0]])
+    corners = np.asarray(sampled.triangles)
+    origin = np.flatnonzero(((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1))
+    step, pieces = finest * CUT ** max(math.ceil(math.log(sampled.scale / finest, CUT)), 0), corners[origin]
+    while True:
+        vertices, faces, piece_of = trimesh.remesh.subdivide_to_size(
+            pieces.reshape(-1, 3), np.arange(3 * len(pieces)).reshape(-1, 3), max_edge=step, max_iter=30, return_index=True
+        )
+        pieces, origin = vertices[faces], origin[piece_of]
+        centres = pieces.mean(axis=1)
+        hit, nearest = surface.nearest(centres)
+        distance = np.linalg.norm(centres - nearest, axis=1)
+        if step <= finest:
+            is_near = distance <= within
+            return origin[is_near], hit[is_near]
+        radius = np.linalg.norm(pieces - centres[:, None], axis=2).max(axis=1)
+        is_near = distance <= within + radius * (1 + CUT_MARGIN)
+        pieces, origin, step = pieces[is_near], origin[is_near], step / CUT
 
 
 def _in_place(part: Part, mesh: trimesh.Trimesh) -> trimesh.Trimesh:

@@ -46,12 +46,6 @@ Realizations that did not converge, cannot be assembled, or are doubtful are inc
 says so.
 """
 
-from tolcontact.report.figures import grouped
-from tolcontact.report.html import is_page, nominal_and_faults, write_comparison, write_page, write_view
-from tolcontact.report.spreadsheet import write_spreadsheet
-from tolcontact.report.text import analysis_text, capability_text, comparison_text, population_text, runs_text, summary_text
+import lazy_loader
 
-__all__ = [
-    "analysis_text", "capability_text", "comparison_text", "grouped", "is_page", "nominal_and_faults", "population_text",
-    "runs_text", "summary_text", "write_comparison", "write_page", "write_spreadsheet", "write_view",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -55,7 +55,10 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
             row, point = np.nonzero(gaps < TOUCHING_GAP + heights[:, None])
             depth = np.maximum(-pair.least_gap(raw_relative[:, k], heights), 0)
-            surfaces.false_contact[:, k] = np.where(faces.depth(raw_relative[:, k], heights) > 0, 0.0, depth)
+            inside = np.flatnonzero(depth)
+            are_apart = ~faces.penetrate(raw_relative[inside, k], heights[inside])
+            surfaces.false_contact[:, k] = 0
+            surfaces.false_contact[inside[are_apart], k] = depth[inside[are_apart]]
             touching, face = places[row, point], faces.reference.face
             surfaces.overhang[:, k] = 0
             np.maximum.at(surfaces.overhang[:, k], row, face.overhang(touching))

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
-import scipy
 from scipy import special
 
 from tolcontact.limits import Limits
@@ -29,6 +28,7 @@ from tolcontact.statistics.intervals import (
     proportion,
 )
 from tolcontact.statistics.sample import Sample
+from tolcontact.statistics.sobol_points import scrambled_points
 
 LOW, MEDIAN, HIGH = PERCENTS = 0.135, 50.0, 99.865
 TRIALS = 1 << 11  # simulated triples of percentiles, of which an interval covers 95 %
@@ -155,7 +155,7 @@ def _simulated_percentiles(x: Sample) -> tuple[np.ndarray, np.ndarray]:
 @lru_cache
 def values_below(n: int) -> np.ndarray:
     """Return simulated numbers of the values below the percentiles, among `n` values, (percentile, trial)."""
-    u = scipy.stats.qmc.Sobol(3, rng=np.random.default_rng(0)).random(TRIALS).T
+    u = scrambled_points(TRIALS, np.random.default_rng(0)).T
     p = np.array(PERCENTS) / 100
     below_low = _hits(u[0], np.full(TRIALS, n), p[0])
     below_median = below_low + _hits(u[1], n - below_low, (p[1] - p[0]) / (1 - p[0]))

@@ -14,7 +14,7 @@ MAX_SORTED_VALUES = 1 << 20  # larger samples are not sorted in memory
 MAX_KEPT_VALUES = 1 << 20  # more values are read from the file for each statistic
 DIGIT = 16  # bits
 COUNTED_DIGITS = 2
-MAX_PREFIXES = 64  # that are counted in one pass
+MAX_PREFIXES = 16  # that are counted in one pass, in 25 MB
 MIN_REPLICATES = 16
 
 

@@ -6,10 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from tolcontact import plot, vocabulary as terms
+from tolcontact import plot, report, vocabulary as terms
 from tolcontact.errors import OptionError
 from tolcontact.realizations import finished
-from tolcontact.report.notebook import results_html
 from tolcontact.statistics import Summary, touching
 from tolcontact.workflow.run import summarize
 
@@ -95,4 +94,4 @@ class Results:
         return f"{self._results.attrs.get('title', 'results')}: {verbs}"
 
     def _repr_html_(self) -> str:
-        return results_html(self._results, self.summary())
+        return report.results_html(self._results, self.summary())

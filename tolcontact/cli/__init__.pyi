@@ -1,0 +1,11 @@
+from . import (
+    analyses as analyses,
+    app as app,
+    archives as archives,
+    compare as compare,
+    models as models,
+    pmi as pmi,
+    run as run,
+    step_files as step_files,
+)
+from .app import command_line as command_line, main as main

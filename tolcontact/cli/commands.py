@@ -1,0 +1,88 @@
+"""The group of all commands. The module of a command is imported when the command is resolved: `--help` needs none of them."""
+
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from tolcontact import cli, interrupts
+
+# The module of each command in this folder, and the line that describes the command in the list of commands.
+COMMANDS = {
+    "contributions": ("analyses", "Print the contributors that cause the variance of each measure, with and without contact."),
+    "sensitivities": ("analyses", "Print how much each measure changes with each contributor, with and without contact."),
+    "tails": (
+        "analyses",
+        "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
+    ),
+    "worst": (
+        "analyses",
+        "Print the worst-case minimum and maximum of each measure, and the deviations that give them.",
+    ),
+    "allocate": (
+        "analyses",
+        "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
+    ),
+    "relocate": ("analyses", "Print the place of a locator, within a box, at which a measure varies least."),
+    "summary": ("archives", "Print the statistics of an archive."),
+    "report": (
+        "archives",
+        "Write a self-contained page for a browser from an archive, or a spreadsheet of its tables.",
+    ),
+    "compare": (
+        "compare",
+        "Compare solvers, resolutions or objectives of a model on the same draws, or archives with each other.",
+    ),
+    "new": ("models", "Write a small model with comments as a starting point."),
+    "check": ("models", "Check a model and its options without a run, and list all faults, and what is probably a mistake."),
+    "view": (
+        "models",
+        "Show an assembly before a run: faces, features with their tolerances, locators, contact points and nominal gaps.",
+    ),
+    "pmi": (
+        "pmi",
+        "List the tolerances, dimensions and datums of a STEP file of AP242, and how features declare them. In mm and rad.",
+    ),
+    "run": ("run", "Simulate a model with and without contact, and print the statistics of its measurements."),
+    "bodies": (
+        "step_files",
+        "List the bodies of a STEP file in its product tree: numbers, names, sizes in mm, faces; and its units of length.",
+    ),
+    "faces": (
+        "step_files",
+        "List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them.",
+    ),
+}
+
+
+class Commands(TyperGroup):
+    """The commands. One that is stopped ends with a message."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.commands = {name: TyperCommand(name, help=purpose) for name, (_, purpose) in COMMANDS.items()}
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        name, command, rest = super().resolve_command(ctx, args)
+        return name, command and declared_command(str(name)), rest
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            with interrupts.stoppable():
+                return super().invoke(ctx)
+        except KeyboardInterrupt:
+            interrupts.end("stopped")
+
+
+def declared_command(name: str) -> Any:
+    """Return a command with its options. The module that declares the command is imported."""
+    module, _ = COMMANDS[name]
+    getattr(cli, module)  # its import declares the command
+    app = cli.app.app
+    return next(
+        typer.main.get_command_from_info(
+            info, pretty_exceptions_short=app.pretty_exceptions_short, rich_markup_mode=app.rich_markup_mode
+        )
+        for info in app.registered_commands
+        if name == (info.name or getattr(info.callback, "__name__", ""))
+    )

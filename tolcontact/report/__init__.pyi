@@ -1,0 +1,18 @@
+from .figures import grouped as grouped
+from .html import (
+    is_page as is_page,
+    nominal_and_faults as nominal_and_faults,
+    write_comparison as write_comparison,
+    write_page as write_page,
+    write_view as write_view,
+)
+from .notebook import results_html as results_html
+from .spreadsheet import write_spreadsheet as write_spreadsheet
+from .text import (
+    analysis_text as analysis_text,
+    capability_text as capability_text,
+    comparison_text as comparison_text,
+    population_text as population_text,
+    runs_text as runs_text,
+    summary_text as summary_text,
+)
