@@ -43,6 +43,8 @@ A face consists of the triangles that meet every criterion you give; without any
 | `tc.Brep("seat")` | the faces of a STEP file that have a name, where it gives names |
 | `tc.Brep(3, 7)` | all of these faces; so are those of <code>tc.Brep(3) &#124; tc.Brep("seat")</code> |
 | `tc.Brep(3, whole=True)` | all faces of one surface: both halves of a hole that the file splits, also between keyways |
+| `tc.Brep(3, whole="slot")` | the two planes and the two round ends of a slot, by any of its faces |
+| `tc.Brep(3, whole="pattern")` | all equal holes of the body with parallel axes, by any of them |
 | `[0, 1, 2]` | triangles by their indices in the mesh |
 | a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
 

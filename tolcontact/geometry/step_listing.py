@@ -14,7 +14,8 @@ from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
-from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, plain_vector
+from tolcontact.geometry.brep_face import describe_faces, plain_vector
+from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
