@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import trimesh
 from typer.testing import CliRunner
 
 import tolcontact as tc
@@ -226,14 +225,17 @@ def test_a_slot_is_chosen_by_any_of_its_faces():
     assert "expected True, False, 'slot' or 'pattern'" in next(tc.Brep(1, whole="pocket").faults())
 
 
-def test_a_slot_comes_with_json(tmp_path):
-    model, plate, _ = plate_with(tc.Brep(6, whole=True))
-    pin = model.part("pin", tc.Mesh(trimesh.creation.cylinder(4.9, 20)), at=(25, 75, 10))
+def test_a_pattern_comes_with_json(tmp_path):
+    model = tc.Assembly("plate")
+    plate = model.part("plate", tc.Mesh(AS1, body="plate_1"), fixed=True)
+    pin = model.part("pin", tc.Pin(9.8, 20, False), at=(25, 75, 20))
     places = [((0, 0, 0), "x"), ((0, 0, 0), "y"), ((0, 0, 0), "z"), ((9, 0, 0), "y"), ((9, 0, 0), "z"), ((0, 9, 0), "z")]
     model.locate(pin, [tc.Locator(f"L{k}", *place, 0.1) for k, place in enumerate(places)])
-    model.contact("pins", moving=plate.face(tc.Brep(6, whole="pattern")), reference=pin.face())
-    written(model, tmp_path / "slot.json")
-    assert load_model(tmp_path / "slot.json").pairs[0].moving.selections == (tc.Brep(6, whole="pattern"),)
+    holes = plate.face(tc.Brep(6, (23.54, 79.78, 6.667), whole="pattern"))
+    model.contact("pin in the holes", moving=pin.face(), reference=holes)
+    model.measure("height", pin.point(0, 0, 0), along="z")
+    written(model, tmp_path / "pattern.json")
+    assert load_model(tmp_path / "pattern.json").pairs[0].reference.selections == holes.selections
 
 
 def test_the_list_states_axes_slots_and_patterns():
