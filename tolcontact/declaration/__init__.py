@@ -174,7 +174,7 @@ Measurements of faces are declared as objects. Their units follow from their kin
 |---|---|
 | `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
-| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of any faces or parts |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
 | `tc.AxisDistance(..., across="z")` | their distance in the plane across a direction, through the middle of the first axis |
 | `tc.AxisDistance(..., along="x")` | component of the perpendicular from the middle of the first axis to the second one |

@@ -13,6 +13,7 @@ from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, Fea
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.nearest_elements import NearestElements
 from tolcontact.geometry.surface import Surface
 
 
@@ -178,6 +179,16 @@ class RoundClearance(NominalMeasurement):
     first: MeasuredFace
     second: MeasuredFace
     points: RoundPoints
+
+
+@dataclass(frozen=True, eq=False)
+class MeshClearance(NominalMeasurement):
+    """The least distance of two faces by their triangles. `box` (corner, 3) [mm] is around the first one."""
+
+    first: MeasuredFace
+    second: MeasuredFace
+    elements: NearestElements
+    box: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.declaration import Angle, AxisDistance, Clearance, Combination, Face, Flush, Gap, Measurement
@@ -16,6 +17,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     Heights,
     MeasuredFace,
+    MeshClearance,
     NominalMeasurement,
     Outline,
     PlaneClearance,
@@ -31,6 +33,7 @@ from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.faces import patch
+from tolcontact.geometry.nearest_elements import nearest_elements
 from tolcontact.geometry.overlap import crossing_edges
 
 MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
@@ -127,11 +130,24 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
     if all(_is_outer_cylinder(face) for face in (first, second)):
         axes = first.axis, second.axis
         return AxisPair(_nearest_places(first.axis.ends, second.axis.ends)[None], *axes, is_between_surfaces=True)
-    kinds = " and ".join(_kind(face) for face in (first, second))
-    raise GeometryFault(
-        f"the clearance of {kinds} is not known; expected two planes, a ball or a shaft beside a wall that it may touch, or "
-        "two outer cylinders; measure the gaps of stations with tc.Gap instead"
-    )
+    return _clearance_of_meshes(first, second)
+
+
+def _clearance_of_meshes(first: MeasuredFace, second: MeasuredFace) -> MeshClearance:
+    """Return the clearance by triangles. Raises GeometryFault if too many of them are near each other."""
+    distances = [
+        np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
+        for target, corners in (
+            (second, np.asarray(first.surface.mesh.vertices)),
+            (first, np.asarray(second.surface.mesh.vertices)),
+        )
+    ]
+    try:
+        elements = nearest_elements(first.surface.mesh, second.surface.mesh, float(min(distances)))
+    except GeometryFault as fault:
+        kinds = " and ".join(_kind(face) for face in (first, second))
+        raise GeometryFault(f"the clearance of {kinds} cannot be measured: {fault}; or measure stations with tc.Gap") from fault
+    return MeshClearance(elements.line[None], first, second, elements, trimesh.bounds.corners(first.surface.mesh.bounds))
 
 
 def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights | PlaneClearance:

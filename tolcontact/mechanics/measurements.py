@@ -13,6 +13,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     Heights,
     MeasuredFace,
+    MeshClearance,
     NominalMeasurement,
     PlaneClearance,
     RoundClearance,
@@ -21,12 +22,12 @@ from tolcontact.discretization.measured_geometry import (
 )
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
+from tolcontact.mechanics.mesh_clearance import mesh_clearance
 from tolcontact.mechanics.plane_clearance import plane_clearance
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.segments import least, segment_distance
 from tolcontact.mechanics.setting import face_height, face_pose
-
-MIN_SQUARE = 1e-300  # of a length: keeps quotients finite where an axis has no length
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +79,6 @@ def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
     return ca.dot(n, first[0] - second[0]) / ca.norm_2(n)
 
 
-def least(values: Any) -> ca.SX:
-    """Return the least of several expressions."""
-    return ca.mmin(ca.vertcat(*values))
-
-
 def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
     """Return the height of a station over a wall, which may have grown [mm]."""
     X = observed.pose(wall.part, wall.deviation)
@@ -113,6 +109,12 @@ def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
     return least(ca.vertsplit(gaps))
 
 
+def _mesh_clearance(clearance: MeshClearance, observed: Observed) -> ca.SX:
+    faces = (clearance.first, clearance.second)
+    grown = sum(face_height(face.deviation, observed.deviations) for face in faces)
+    return mesh_clearance(clearance, _relative(*faces, observed)) - grown
+
+
 def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
     first, second = (
         [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends] for axis in (pair.first, pair.second)
@@ -130,34 +132,6 @@ def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
         return shortest
     grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.first, pair.second))
     return shortest - grown
-
-
-def segment_distance(first: Sequence[ca.SX], second: Sequence[ca.SX]) -> ca.SX:
-    """Return the shortest distance [mm] of two segments between ends (3, 1); parallel ones are no exception.
-
-    It is the least of five: from each end to the other segment, and between the places where the two lines are nearest if
-    both lie between the ends (Ericson, Real-Time Collision Detection, 5.1.9). All are distances of places of both segments, so
-    where lines are almost parallel, and these places uncertain, none is too short.
-    """
-    p, q, r = first[1] - first[0], second[1] - second[0], second[0] - first[0]
-    pp, qq, pq = ca.dot(p, p), ca.dot(q, q), ca.dot(p, q)
-
-    def squared(s: ca.SX | float, t: ca.SX | float) -> ca.SX:
-        return ca.sumsqr(r + t * q - s * p)
-
-    def on_first(t: ca.SX | float) -> ca.SX:
-        return _clipped(ca.dot(p, r + t * q) / ca.fmax(pp, MIN_SQUARE))
-
-    def on_second(s: ca.SX | float) -> ca.SX:
-        return _clipped(ca.dot(q, s * p - r) / ca.fmax(qq, MIN_SQUARE))
-
-    inner = _clipped((ca.dot(p, r) * qq - ca.dot(q, r) * pq) / ca.fmax(pp * qq - pq**2, MIN_SQUARE))
-    squares = [squared(s, on_second(s)) for s in (0.0, 1.0, inner)] + [squared(on_first(t), t) for t in (0.0, 1.0)]
-    return ca.sqrt(least(squares))
-
-
-def _clipped(share: ca.SX) -> ca.SX:
-    return ca.fmin(ca.fmax(share, 0), 1)
 
 
 def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
@@ -182,8 +156,8 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
 
 
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
-    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, AxisPair: _axis_distance,
-    DirectionPair: _angle, Combined: _combined,
+    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, MeshClearance: _mesh_clearance,
+    AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,
