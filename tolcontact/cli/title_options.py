@@ -29,7 +29,8 @@ def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> 
     if archive is not None and archive.exists() and any(entries.values()):
         name = shown(str(archive))
         typer.echo(
-            f"{name} keeps the title block that it was begun with; another one for its page: tolcontact report {name} --title ...",
+            f"{name} keeps the title block that it was begun with; another one for its page: "
+            f"tolcontact report {name} --title ...",
             err=True,
         )
 

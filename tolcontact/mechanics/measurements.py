@@ -60,23 +60,23 @@ def _least_height(heights: Heights, observed: Observed) -> ca.SX:
 
 
 def _plane_clearance(clearance: PlaneClearance, observed: Observed) -> ca.SX:
-    X_21 = _relative(clearance.first, clearance.second, observed)
+    X_21 = _relative(clearance.moving, clearance.reference, observed)
     return plane_clearance(clearance, X_21, _least_height(clearance.heights, observed))
 
 
-def _relative(first: MeasuredFace, second: MeasuredFace, observed: Observed) -> Pose:
-    """Return the pose of a first face in the frame of a second one."""
-    return relative(observed.pose(first.part, first.deviation), observed.pose(second.part, second.deviation))
+def _relative(moving: MeasuredFace, reference: MeasuredFace, observed: Observed) -> Pose:
+    """Return the pose of a moving face in the frame of a reference one."""
+    return relative(observed.pose(moving.part, moving.deviation), observed.pose(reference.part, reference.deviation))
 
 
 def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
     """Return the height of an edge over one that it crosses: the distance of their lines along their common normal [mm]."""
-    first, second = (
+    moving, reference = (
         [observed.pose(face.part, face.deviation).apply(ca.DM(end)) for end in edge]
-        for face, edge in zip((crossing.first, crossing.second), crossing.edges, strict=True)
+        for face, edge in zip((crossing.moving, crossing.reference), crossing.edges, strict=True)
     )
-    n = crossing.sense * ca.cross(first[1] - first[0], second[1] - second[0])
-    return ca.dot(n, first[0] - second[0]) / ca.norm_2(n)
+    n = crossing.sense * ca.cross(moving[1] - moving[0], reference[1] - reference[0])
+    return ca.dot(n, moving[0] - reference[0]) / ca.norm_2(n)
 
 
 def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
@@ -102,41 +102,42 @@ def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
 
 
 def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
-    first, second = clearance.first, clearance.second
-    X_RM = _relative(first, second, observed)
-    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (first, second)))
+    moving, reference = clearance.moving, clearance.reference
+    X_RM = _relative(moving, reference, observed)
+    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
     gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, ca.SX.zeros(len(clearance.points)))
     return least(ca.vertsplit(gaps))
 
 
 def _mesh_clearance(clearance: MeshClearance, observed: Observed) -> ca.SX:
-    faces = (clearance.first, clearance.second)
+    faces = (clearance.moving, clearance.reference)
     grown = sum(face_height(face.deviation, observed.deviations) for face in faces)
     return mesh_clearance(clearance, _relative(*faces, observed)) - grown
 
 
 def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
-    first, second = (
-        [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends] for axis in (pair.first, pair.second)
+    moving, reference = (
+        [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends]
+        for axis in (pair.moving, pair.reference)
     )
-    a, b = (first[0] + first[1]) / 2, (second[0] + second[1]) / 2
-    v = observed.pose(pair.second.part, pair.second.deviation).R @ ca.DM(pair.second.direction)
+    a, b = (moving[0] + moving[1]) / 2, (reference[0] + reference[1]) / 2
+    v = observed.pose(pair.reference.part, pair.reference.deviation).R @ ca.DM(pair.reference.direction)
     if pair.along is not None:
         return ca.dot(ca.DM(pair.along), b - a + ca.dot(a - b, v) * v)
     if pair.across is not None:
         n = ca.SX(ca.DM(pair.across))
-        v = v if pair.second.direction.any() else n
+        v = v if pair.reference.direction.any() else n
         return ca.norm_2(b - a + ca.dot(a - b, n) / ca.dot(v, n) * v)
-    shortest = segment_distance(first, second)
+    shortest = segment_distance(moving, reference)
     if not pair.is_between_surfaces:
         return shortest
-    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.first, pair.second))
+    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.moving, pair.reference))
     return shortest - grown
 
 
 def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
     """Return the angle [rad] by atan2 of sine and cosine, which keeps its digits where the cosine is 1."""
-    faces = (pair.first, pair.second)
+    faces = (pair.moving, pair.reference)
     u, v = (
         observed.pose(face.part, face.deviation).R @ ca.DM(direction)
         for face, direction in zip(faces, pair.directions, strict=True)

@@ -3,7 +3,7 @@
 A corner counts as the nearest facet over or under which it is says: as its height, negative inside the material. Edges that may
 touch first count as the distance of their lines along the common normal, negative where they have passed each other. All other
 distances are of the nearest places of both edges. Elements that are not looked at are farther apart than the horizon, less what
-the first face has moved relative to the second one; the clearance is never larger than that.
+the moving face has moved relative to the reference one; the clearance is never larger than that.
 """
 
 import casadi as ca
@@ -19,7 +19,7 @@ MARGIN = 1e-9  # of a facet: how far beside it a corner counts
 
 
 def mesh_clearance(clearance: MeshClearance, X_21: Pose) -> ca.SX:
-    """Return the clearance [mm] at the pose of the first face relative to the second one."""
+    """Return the clearance [mm] at the pose of the moving face relative to the reference one."""
     elements = clearance.elements
     X_12 = Pose(X_21.R.T, -X_21.R.T @ X_21.t)
     values = [*_heights(elements.corners[0], X_21), *_heights(elements.corners[1], X_12)]

@@ -20,7 +20,7 @@ def measured_reach(draws: TrialDraws) -> Iterator[str]:
 
 
 def _doubts(measure: Measure, clearance: MeshClearance, X: np.ndarray) -> Iterator[str]:
-    moved = [pose.apply(X[:, face.part], clearance.box) for face in (clearance.first, clearance.second)]
+    moved = [pose.apply(X[:, face.part], clearance.box) for face in (clearance.moving, clearance.reference)]
     motion = np.linalg.norm(moved[0] - moved[1], axis=2).max(axis=1)
     spare = (clearance.elements.horizon - float(np.linalg.norm(clearance.lines[0, 1] - clearance.lines[0, 0]))) / 2
     if count := int((motion > spare).sum()):
