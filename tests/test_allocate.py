@@ -142,7 +142,7 @@ def test_what_cannot_be_allocated_is_refused(options, said):
 def test_a_measure_without_limits_and_a_model_without_ranges_are_refused():
     with pytest.raises(tc.OptionError, match="which has no limits"):
         tc.allocate(pile(0.6, 0.3, tolerance=None), "top: Ppk 1")
-    with pytest.raises(tc.OptionError, match="has no range to allocate"):
+    with pytest.raises(tc.OptionError, match="has no tolerance to allocate"):
         tc.allocate(pile(0, norm(0, 0.1)), "top: Ppk 1")
 
 

@@ -10,7 +10,7 @@ from scipy.stats import binom
 
 import tolcontact as tc
 from tests.cases import STILL, Frame
-from tests.cases.fastened import THICKNESS, bolted, grown, held, hole, lying, plate, shifts
+from tests.cases.fastened import THICKNESS, bolted, grown, held, hole, lying, placed, plate, shifts
 from tests.cases.floating import SEATED
 from tests.helpers import nightly
 from tolcontact.simulation import simulate_block
@@ -278,6 +278,56 @@ def test_halves_of_holes_in_a_step_file_are_one_hole():
     assert np.abs(gaps - [0.0, 0.5]).max() < 1e-6
 
 
+def drifting(position: float = 0.0, cover_hole: float = 11.0) -> tc.Assembly:
+    """A bolt that stands anywhere in the holes of a base and of a cover, both fixed."""
+    a = tc.Assembly("drifting")
+    base = plate(a, "base", 0, {(0, 0): 11}, fixed=True)
+    cover = plate(a, "cover", 1, {(0, 0): cover_hole}, fixed=True)
+    holes = [hole(part, "H0", (0, 0), *([placed(position)] if position else [])) for part in (cover, base)]
+    bolt = a.fasten("bolt", 10, through=holes, drift=True)
+    for axis in "xy":
+        a.measure(axis, bolt.point(0, 0, -8), along=axis)
+    return a
+
+
+def places(results, state: str) -> np.ndarray:
+    """Where the bolt stands (realization, 2) [mm]."""
+    return results["measured"].sel(state=state, measure=["x", "y"]).values
+
+
+def test_a_bolt_stands_anywhere_in_its_clearance():
+    """Uniform in a disc of radius r: the variance is r2 / 4 in each direction, and a quarter lies within r / 2."""
+    results = run(drifting(), samples=4000)
+    stands = places(results, "raw")
+    radius = np.hypot(*stands.T)
+    assert radius.max() < 0.5 and np.abs(stands.mean(axis=0)).max() < 4 * 0.25 / np.sqrt(4000)
+    assert np.abs(np.cov(stands.T) / (0.5**2 / 4) - np.eye(2)).max() < 4 / np.sqrt(4000)
+    assert abs((radius < 0.25).mean() - 0.25) < 4 * np.sqrt(0.25 * 0.75 / 4000)
+    np.testing.assert_allclose(places(results, "corrected"), stands, atol=1e-6)
+
+
+def test_a_bolt_that_stands_in_the_wall_of_a_hole_moves_to_its_side():
+    """The bolt is drawn in the tightest hole, that of the base; contact moves it the shortest way into that of the cover."""
+    results = run(drifting(0.8, cover_hole=11.2), samples=400)
+    base, cover = (shifts(results, part, 1)[:, 0] for part in ("base", "cover"))
+    raw, corrected = places(results, "raw"), places(results, "corrected")
+    assert np.hypot(*(raw - base).T).max() < 0.5
+    away = raw - cover
+    distance = np.hypot(*away.T)
+    nearest = cover + away * np.minimum(1, 0.6 / distance)[:, None]
+    is_simple = np.hypot(*(nearest - base).T) < 0.499  # it does not meet the hole of the base on its way
+    assert (distance > 0.61)[is_simple].sum() > 10 and is_simple.mean() > 0.9
+    assert np.abs(corrected - nearest)[is_simple].max() < 2e-3
+    assert results.gap_min.sel(state="corrected").min() > -1e-6
+
+
+def test_a_drifting_bolt_keeps_in_archives_and_json(tmp_path):
+    results = run(drifting(), samples=20, out=tmp_path / "run.nc")
+    assert_same_run(run(tc.model_of(results), samples=20), results)
+    declared = list(results["sample"].contributor.values)
+    assert {"bolt drift x", "bolt drift y"} <= set(declared)
+
+
 FAULTS = {
     "a bolt that is too thick": ({"fastener": 12}, "through[0] has a diameter of 11 mm, and the fastener 12 mm"),
     "no diameter": ({"fastener": 0}, "its diameter is 0; expected a length in mm above 0"),
@@ -303,6 +353,15 @@ FAULTS = {
         {"into": None, "through": ["upper", "lower"], "pushed": "down"},
         "pushed is 'down'; expected a force",
     ),
+    "a drift without effect": ({"drift": True}, "drift has no effect on a fastener that the hole in into holds"),
+    "a drift without clearance": (
+        {"into": None, "through": ["upper", "lower"], "drift": True, "fastener": 8.5},
+        "drift: the tightest hole is as wide",
+    ),
+    "a drift of a part with a seat": (
+        {"into": None, "through": ["upper", "lower"], "drift": True, "fastener": "rod part", "seat": "upper seat"},
+        "seat has no effect on a part that stands in a hole",
+    ),
 }
 
 
@@ -315,15 +374,16 @@ def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
     rod = a.part("rod", tc.Pin(10, 20), at=(0, 100, 0))
     faces = {
         "lower": hole(base, "lower", (0, 0)), "far": hole(base, "far", (20, 0)), "top": base.face("+z"),
-        "upper": hole(cover, "upper", (0, 0)), "upper far": hole(cover, "upper far", (20, 0)), "side": cover.face("+y"),
+        "upper": hole(cover, "upper", (0, 0)), "upper far": hole(cover, "upper far", (20, 0)),
+        "upper seat": cover.face("+z"), "side": cover.face("+y"),
         "rod": rod.face(tc.Cylinder()), "rod part": rod, "alien": other.part("alien", tc.Pin(1, 1)).face(tc.Cylinder()),
     }  # fmt: skip
-    arguments = {"fastener": 10, "through": ["upper"], "into": "lower", "seat": None, "pushed": None} | options
+    arguments = {"fastener": 10, "through": ["upper"], "into": "lower", "seat": None, "pushed": None, "drift": False} | options
     through = [faces[name] for name in arguments.pop("through")]
     fastener, into, seat = (faces.get(arguments[key], arguments[key]) for key in ("fastener", "into", "seat"))
     before = [len(things) for things in (a.parts, a.pairs, a.locations, a.features)]
     with pytest.raises(tc.ModelError) as error:
-        a.fasten("bolt", fastener, through=through, into=into, seat=seat, pushed=arguments["pushed"])
+        a.fasten("bolt", fastener, through=through, into=into, seat=seat, pushed=arguments["pushed"], drift=arguments["drift"])
     (fault,) = error.value.faults
     assert fault.startswith('fastener "bolt" (test_fasteners.py:') and expected in fault
     assert [len(things) for things in (a.parts, a.pairs, a.locations, a.features)] == before
@@ -338,6 +398,7 @@ def test_a_fastener_that_does_not_fit_is_refused_in_one_sentence(mistake):
         ({"through": [5]}, r"through\[0\] is a int; expected the wall of a hole"),
         ({"into": "base"}, "into is a str"),
         ({"seat": 1}, "seat is a int; expected the plane under the head"),
+        ({"drift": 1}, "drift is a int; expected True or False"),
     ],
 )
 def test_arguments_of_a_wrong_type_are_refused(options, expected):

@@ -145,9 +145,6 @@ BAD = {
         lambda m, a, b: m("x", tc.Clearance(a.face("+z", tc.Inside((60, 30, 0), (100, 50, 20))), b.face("-z"))),
         "lie nowhere over each other",
     ),
-    "unknown clearance": (
-        lambda m, a, b: m("x", tc.Clearance(a.face("+z"), b.face(ROUND))), "table +z (plane) and pin cylinders (cylinder)",
-    ),
     "along": (lambda m, a, b: m("x", tc.Gap(a.point(0, 0, 0), b.face(ROUND)), along="z"), "leave out to and along"),
     "absolute": (lambda m, a, b: m("x", tc.Gap(a.point(0, 0, 0), b.face(ROUND)), absolute=True), "leave it out"),
     "two parts": (lambda m, a, b: tc.stations(a.point(0, 0, 0), b.point(0, 0, 0), 3), "not points of one part"),

@@ -301,3 +301,32 @@ def test_an_unfinished_run_is_a_page_that_says_so(tmp_path):
         tc.run(cases.stack(), samples=60_000, solver="daqp", out=tmp_path / "part.nc", progress=stop)
     page = page_of(tmp_path / "part.nc", tmp_path / "part.html")
     assert "of 60 000; the run is unfinished" in page and len(data_of(page)["scene"]["realizations"]["names"]) == 300
+
+
+@pytest.mark.slow
+@needs_browser
+def test_names_of_measurements_in_one_place_do_not_cover_each_other(tmp_path, open_page):
+    a = tc.Assembly("alone")
+    block = a.part("block", tc.Box(10, 20, 10))
+    a.locate(block, cases.translating(0.1))
+    for axis in "xyz":
+        a.measure(f"place of the corner along {axis}", block.point(5, 5, 10), along=axis)
+    tc.run(a, samples=10, out=tmp_path / "alone.nc").close()
+    page_of(tmp_path / "alone.nc", tmp_path / "alone.html")
+    opened = open_page(tmp_path / "alone.html", 390)
+    boxes = np.array(
+        opened.evaluate("""() => {
+      const names = window.viewer.marks.points.children.filter((drawn) => drawn.isSprite);
+      window.viewer.marks.points.visible = true;
+      window.viewer.draw();
+      return names.map((name) => boxOf(name, window.viewer.camera, -name.center.y - LIFT));
+    }""")
+    )
+    assert len(boxes) == 3
+    for k in range(3):
+        for j in range(k):
+            assert (boxes[k, :2] >= boxes[j, 2:] - 1e-6).any() or (boxes[j, :2] >= boxes[k, 2:] - 1e-6).any()
+    hint = "getComputedStyle(document.querySelector('.wide'), '::before').content"
+    assert "scrolls sideways" in opened.evaluate(hint)
+    opened.set_viewport_size({"width": 1280, "height": 900})
+    assert "scrolls sideways" not in opened.evaluate(hint)

@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 import xarray as xr
+from rich.console import Console
 
 import tolcontact as tc
 from tests import cases
 from tolcontact.errors import ArchiveError
+from tolcontact.report import summary_text
 
 UNTOUCHED, RESOLVED, NOT_CONVERGED, NOT_ASSEMBLABLE, DOUBTFUL = range(5)
 
@@ -150,3 +152,17 @@ def test_what_is_checked_against_surfaces_is_told(run):
     found = tc.summarize(changed)
     assert float(found["surface_penetration"]) == 0.2 and float(found["beside"]) == 3.0
     assert int(found["surfaces_checked"]) == (rows != -1).sum()
+
+
+def test_parts_that_do_not_move_have_no_row_of_fields():
+    a = tc.Assembly("stand")
+    a.part("table", tc.Box(100, 50, 10), fixed=True)
+    block = a.part("block", tc.Box(50, 25, 10), at=(20, 12.5, 10))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x")), tolerance=0.2)
+    a.measure("height", block.point(50, 0, 10), along="z")
+    console = Console(width=100)
+    with console.capture() as printed:
+        console.print(summary_text(tc.summarize(tc.run(a, samples=20, solver="daqp"))))
+    _, _, fields = printed.get().partition("6 sigma of the displacement magnitude")
+    fields, _, _ = fields.partition("\ncontact\n")
+    assert "block" in fields and "table" not in fields

@@ -45,6 +45,16 @@ def test_a_changed_block_does_not_keep_a_run_from_being_resumed(tmp_path):
         assert results.sizes["realization"] == 40
 
 
+def test_a_resumed_run_says_that_it_keeps_its_title(tmp_path):
+    model = str(cases.MODELS / "ra1.py")
+    options = ["--out", tmp_path / "a.nc", "--solver", "daqp", "--resume", "--title", "Other"]
+    begun = call(tmp_path, "run", model, "--samples", "20", *options)
+    resumed = call(tmp_path, "run", model, "--samples", "40", *options)
+    assert begun.returncode == resumed.returncode == 0, resumed.stderr
+    assert "keeps the title block" not in begun.stderr
+    assert "a.nc keeps the title block that it was begun with; another one for its page: tolcontact report" in resumed.stderr
+
+
 @pytest.mark.parametrize(
     ("block", "said"),
     [(tc.TitleBlock(title="two\nlines"), "text of one line"), (tc.TitleBlock(author=7), "author is 7"),

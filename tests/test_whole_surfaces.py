@@ -5,11 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import tolcontact as tc
+from tests.cases import MODELS
 from tests.helpers import nightly
 from tests.test_json_models import load_model, written
+from tolcontact.cli.app import app
 from tolcontact.discretization import discretize
+from tolcontact.errors import GeometryFault
+from tolcontact.geometry import preview
+from tolcontact.geometry.faces import triangles
+from tolcontact.geometry.shapes import shape
 
 AS1 = Path(__file__).resolve().parents[1] / "studies" / "cad" / "as1-oc-214.stp"
 HALVES = [(6, 7), (8, 9), (10, 11), (12, 13), (14, 15), (16, 17)]  # of the plate's six holes
@@ -98,6 +105,10 @@ def written_step(tmp_path, name):
             shape = kernel["BRepAlgoAPI"].BRepAlgoAPI_Cut(shape, tool).Shape()
         return shape
 
+    def slot_tools(start, end, y):
+        ends = [cylinder((x, y, -1), (0, 0, 1), 5, 20) for x in (end, start)]
+        return [*ends, box((start, y - 5, -1), (end, y + 5, 20))]
+
     hole = cylinder((0, 0, -1), (0, 0, 1), 8, 90)
     block, shaft = box((-20, -20, 0), (20, 20, 20)), cylinder((0, 0, 0), (0, 0, 1), 8, 40)
     ring = without(cylinder((0, 0, -1), (0, 0, 1), 12, 30), cylinder((0, 0, -2), (0, 0, 1), 8, 40))
@@ -114,9 +125,17 @@ def written_step(tmp_path, name):
         "cross hole": lambda: without(block, hole, cylinder((0, 0, 10), (1, 0, 0), 3, 40)),
         "lugs": lambda: without(box((-20, -20, 0), (20, 20, 40)), box((-10, -30, 15), (30, 30, 25)), hole),
         "curved slots": lambda: without(block, *(common(ring, sector).Shape() for sector in sectors)),
+        "drilled plate": lambda: without(
+            box((0, 0, 0), (120, 60, 10)),
+            *(cylinder((x, y, -1), (0, 0, 1), 4, 20) for x in (10, 30) for y in (10, 30)),
+            cylinder((-1, 50, 5), (1, 0, 0), 4, 20),
+            cylinder((20, 20, -1), (0, 0, 1), 6, 20),
+            *(tool for x in (50, 80) for tool in slot_tools(x, x + 15, 40)),
+            *slot_tools(50, 130, 10)[1:],
+        ),
     }
     shape = shapes[name]()
-    angle = 120 if name == "thirds" else 180
+    angle = {"thirds": 120, "drilled plate": 90}.get(name, 180)
     divided = kernel["ShapeUpgrade"].ShapeUpgrade_ShapeDivideAngle(np.radians(angle), shape)
     divided.Perform()
     shape = divided.Result()
@@ -165,3 +184,61 @@ def test_faces_of_one_cylinder_are_whole_and_others_are_not(name, tmp_path):
         texts = [str(record.message) for record in records if record.category is tc.FaceWarning]
         assert len(texts) == (len(whole) > 1)
         assert all(f"1 of the {len(whole)} faces of one cylinder" in text for text in texts)
+
+
+@pytest.mark.slow
+def test_slots_and_patterns_of_made_holes_are_listed_and_others_are_not(tmp_path):
+    path = written_step(tmp_path, "drilled plate")  # quarters of cylinders; the two slots have walls in the same planes
+    faces = tc.faces_in(path)
+    slots, patterns = ({getattr(face, word) for face in faces} - {()} for word in ("slot", "pattern"))
+    places = {tuple(sorted({round(faces[n - 1].centre[0]) for n in slot if faces[n - 1].centre})) for slot in slots}
+    assert places == {(50, 65), (80, 95)} and {len(slot) for slot in slots} == {2 + 2 * 2}
+    (pattern,) = patterns  # neither the hole across, nor the larger one, nor the end of the open slot
+    axes = {tuple(np.round(faces[n - 1].centre[:2], 6)) for n in pattern}
+    assert axes == {(x, y) for x in (10.0, 30.0) for y in (10.0, 30.0)} and len(pattern) == 16
+    assert {faces[n - 1].radius for n in pattern} == {4.0}
+
+
+def test_holes_by_hand_are_the_patterns_of_an_assembly():
+    for body, count in {"plate_1": 6, "l-bracket_1": 3, "nut_1": 0}.items():
+        faces = tc.faces_in(AS1, body)
+        patterns = {face.pattern for face in faces} - {()}
+        assert not any(face.slot for face in faces)
+        assert [len(pattern) for pattern in patterns] == [2 * count] * (count > 0)
+    assert chosen(tc.Brep(9, whole="pattern")) == chosen(tc.Brep(*range(6, 18)))
+
+
+def test_a_slot_is_chosen_by_any_of_its_faces():
+    part = tc.Assembly("cover").part("cover", tc.Mesh(MODELS / "cover.step"))
+    meshes = {part: shape(part.geometry).mesh}
+    slot = [12, 13, 14, 15]
+    selections = [tc.Brep(*slot), *(tc.Brep(number, whole="slot") for number in slot)]
+    masks = {tuple(triangles(part.face(selection), meshes)) for selection in selections}
+    assert len(masks) == 1
+    image = preview(part)
+    for number in slot:
+        (snippet,) = image.groups[number - 1]
+        assert tuple(triangles(eval(f"part.{snippet}", {"part": part, "tc": tc}), meshes)) in masks
+    assert str(part.face(tc.Brep(12, whole="slot"))) == "cover slot of B-rep face 12"
+    with pytest.raises(GeometryFault, match=r"face 1 belongs to no slot; slot, radius 4.05 mm, faces 12, 13, 14, 15: tc"):
+        triangles(part.face(tc.Brep(1, whole="slot")), meshes)
+    assert "expected True, False, 'slot' or 'pattern'" in next(tc.Brep(1, whole="pocket").faults())
+
+
+def test_a_pattern_comes_with_json(tmp_path):
+    model = tc.Assembly("plate")
+    plate = model.part("plate", tc.Mesh(AS1, body="plate_1"), fixed=True)
+    pin = model.part("pin", tc.Pin(9.8, 20, False), at=(25, 75, 20))
+    places = [((0, 0, 0), "x"), ((0, 0, 0), "y"), ((0, 0, 0), "z"), ((9, 0, 0), "y"), ((9, 0, 0), "z"), ((0, 9, 0), "z")]
+    model.locate(pin, [tc.Locator(f"L{k}", *place, 0.1) for k, place in enumerate(places)])
+    holes = plate.face(tc.Brep(6, (23.54, 79.78, 6.667), whole="pattern"))
+    model.contact("pin in the holes", moving=pin.face(), reference=holes)
+    model.measure("height", pin.point(0, 0, 0), along="z")
+    written(model, tmp_path / "pattern.json")
+    assert load_model(tmp_path / "pattern.json").pairs[0].reference.selections == holes.selections
+
+
+def test_the_list_states_axes_slots_and_patterns():
+    lines = CliRunner().invoke(app, ["faces", str(MODELS / "cover.step")]).stdout.splitlines()
+    assert lines[-1] == 'slot, radius 4.05 mm, faces 12, 13, 14, 15: tc.Brep(12, whole="slot")'
+    assert "axis through (106.7483, 65.97129, 5.333333), along (0, 0, -1)" in lines[14]

@@ -3,13 +3,16 @@
 A message states what was expected, what was got (naming the part, locator, pair, option or file) and what to do.
 """
 
+import difflib
 import re
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Protocol
 
 # Control characters but tab and line feed, separators of lines and paragraphs, overrides of the writing direction, halves of
 # surrogate pairs (bytes of a file name that are not text): they steer a terminal, or cannot be written to it.
 CONTROL_CHARACTERS = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+MIN_LIKENESS = 0.5  # of a name that another one may have been meant for
 
 
 def shown(text: str) -> str:
@@ -30,6 +33,13 @@ class Declared(Protocol):
     def name(self) -> str: ...
     @property
     def declared_at(self) -> str: ...
+
+
+def nearest_name(name: str, names: Iterable[str]) -> str:
+    """Return the end of a message about a name that does not exist: which of some names is the nearest; empty if none is."""
+    likeness = {candidate: difflib.SequenceMatcher(None, name, candidate).ratio() for candidate in names}
+    nearest = max(likeness, key=lambda candidate: likeness[candidate], default="")
+    return f'; the nearest name is "{shown(nearest)}"' if likeness.get(nearest, 0.0) >= MIN_LIKENESS else ""
 
 
 def designation(kind: str, thing: Declared) -> str:

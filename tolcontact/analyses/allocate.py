@@ -129,7 +129,7 @@ def _groups(program: Program, by: str) -> dict[str, np.ndarray]:
         if np.isfinite(contributor.range) and contributor.range > 0:
             groups.setdefault(owner, []).append(column)
     if not groups:
-        raise OptionError(f'"{program.nominal.assembly.name}" has no range to allocate; give locators or features tolerances')
+        raise OptionError(f'"{program.nominal.assembly.name}" has no tolerance to allocate; give locators or features one')
     return {owner: np.array(columns) for owner, columns in groups.items()}
 
 

@@ -10,7 +10,7 @@ from tolcontact.archive import open_archive
 from tolcontact.cli.app import Archive, AsCsv, AsJson, Overwrite, app, examples, only_one
 from tolcontact.cli.output import check_page, check_spreadsheet, console, print_data, print_summary
 from tolcontact.cli.progress import waiting
-from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title
+from tolcontact.cli.title_options import Author, Company, Date, PartNumber, Revision, Title, title_entries
 from tolcontact.declaration.title_block import title_block_of
 from tolcontact.errors import shown
 from tolcontact.report.text import capability_text
@@ -63,7 +63,7 @@ def report(
         check_page(page, overwrite=overwrite)
     if xlsx is not None:
         check_spreadsheet(xlsx, overwrite=overwrite)
-    entries = dict(zip(ENTRIES, (title, part_number, author, revision, date, company), strict=True))
+    entries = title_entries(title, part_number, author, revision, date, company)
     with waiting(f"writing the report of {archive}"), open_archive(archive) as results:
         summary, titles = summarize(results), title_block_of(results.attrs).overridden(entries)
         if page is not None:

@@ -26,7 +26,17 @@ from tolcontact.cli.app import (
 )
 from tolcontact.cli.output import check_page, print_summary
 from tolcontact.cli.progress import shown_progress, stopped
-from tolcontact.cli.title_options import ENTRIES, Author, Company, Date, PartNumber, Revision, Title, titled_model
+from tolcontact.cli.title_options import (
+    Author,
+    Company,
+    Date,
+    PartNumber,
+    Revision,
+    Title,
+    note_kept_title,
+    title_entries,
+    titled_model,
+)
 from tolcontact.errors import OptionError, shown
 from tolcontact.simulation.cluster import client_of
 from tolcontact.vocabulary import KEPT, MONTE_CARLO, PLANS
@@ -91,7 +101,8 @@ def run(
     if report is not None:
         check_page(report, overwrite=overwrite)
     method = chosen(resolution=resolution, objective=objective)
-    titles = dict(zip(ENTRIES, (title, part_number, author, revision, date, company), strict=True))
+    titles = title_entries(title, part_number, author, revision, date, company)
+    note_kept_title(out if resume else None, titles)
     # Stopping first gives the cursor back.
     with (
         stopped(out, done := [0, samples]),

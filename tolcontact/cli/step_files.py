@@ -10,7 +10,7 @@ import typer
 from tolcontact.cli.app import AsJson, StepFile, app, examples
 from tolcontact.cli.progress import waiting
 from tolcontact.errors import shown
-from tolcontact.geometry import bodies_in, faces_in
+from tolcontact.geometry import bodies_in, faces_in, group_lines
 
 Body = Annotated[str | None, typer.Option(help="Name or number of the body. Not needed for a file with a single body.")]
 
@@ -37,14 +37,14 @@ def bodies(file: StepFile, as_json: AsJson = False) -> None:
 
 @app.command(epilog=examples("faces parts.stp --body lid"))
 def faces(file: StepFile, body: Body = None, as_json: AsJson = False) -> None:
-    """List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them."""
+    """List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, axes, radii, areas; slots and hole patterns."""
     with waiting(f"reading {file}"):
         listing = faces_in(file, int(body) if body is not None and body.isdigit() else body)
     if as_json:
         _print_rows(listing)
         return
-    for face in listing:
-        typer.echo(face)
+    for line in (*listing, *group_lines(listing)):
+        typer.echo(line)
 
 
 def _print_rows(rows: Sequence[Any]) -> None:

@@ -8,6 +8,7 @@ import typer
 
 from tolcontact.declaration import Assembly, TitleBlock
 from tolcontact.declaration.script import load_model
+from tolcontact.errors import shown
 
 Title = Annotated[str | None, typer.Option(help="Title of the report. Default: the model's.", rich_help_panel="Title block")]
 PartNumber = Annotated[str | None, typer.Option(help="Part number of the assembly.", rich_help_panel="Title block")]
@@ -16,6 +17,22 @@ Revision = Annotated[str | None, typer.Option(help="Revision of the model or of 
 Date = Annotated[str | None, typer.Option(help="Date of the report, as text.", rich_help_panel="Title block")]
 Company = Annotated[str | None, typer.Option(help="Company that issues the report.", rich_help_panel="Title block")]
 ENTRIES = tuple(TitleBlock().entries)  # in the order of these options
+
+
+def title_entries(*options: str | None) -> dict[str, str | None]:
+    """Return the entries of a title block by their names, from the options above in their order."""
+    return dict(zip(ENTRIES, options, strict=True))
+
+
+def note_kept_title(archive: Path | None, entries: Mapping[str, str | None]) -> None:
+    """Say that an archive that a run resumes keeps its title block, if the options have another one."""
+    if archive is not None and archive.exists() and any(entries.values()):
+        name = shown(str(archive))
+        typer.echo(
+            f"{name} keeps the title block that it was begun with; another one for its page: "
+            f"tolcontact report {name} --title ...",
+            err=True,
+        )
 
 
 def titled_model(path: Path, entries: Mapping[str, str | None]) -> Assembly:

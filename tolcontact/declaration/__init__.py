@@ -43,6 +43,8 @@ A face consists of the triangles that meet every criterion you give; without any
 | `tc.Brep("seat")` | the faces of a STEP file that have a name, where it gives names |
 | `tc.Brep(3, 7)` | all of these faces; so are those of <code>tc.Brep(3) &#124; tc.Brep("seat")</code> |
 | `tc.Brep(3, whole=True)` | all faces of one surface: both halves of a hole that the file splits, also between keyways |
+| `tc.Brep(3, whole="slot")` | the two planes and the two round ends of a slot, by any of its faces |
+| `tc.Brep(3, whole="pattern")` | all equal holes of the body with parallel axes, by any of them |
 | `[0, 1, 2]` | triangles by their indices in the mesh |
 | a function | `function(centres, normals)` takes arrays (triangle, 3) and returns a mask (triangle,) |
 
@@ -172,7 +174,7 @@ Measurements of faces are declared as objects. Their units follow from their kin
 |---|---|
 | `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
-| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of two shafts |
+| `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of any faces or parts |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
 | `tc.AxisDistance(..., across="z")` | their distance in the plane across a direction, through the middle of the first axis |
 | `tc.AxisDistance(..., along="x")` | component of the perpendicular from the middle of the first axis to the second one |

@@ -151,6 +151,7 @@ class Assembly(Pictured):
         into: Face | Feature | None = None,
         seat: Face | Feature | None = None,
         pushed: Any = None,
+        drift: bool = False,
     ) -> Part:
         """Declare a fastener in the holes of several parts, and return its part (see `tolcontact.fasteners`).
 
@@ -159,10 +160,11 @@ class Assembly(Pictured):
         into       a threaded or press-fit hole, which holds it; without one it floats in the clearance of its holes
         seat       the plane under its head
         pushed     a force (x, y, z) [N], in the assembly frame, on a fastener that floats
+        drift      whether it stands anywhere in the clearance of its tightest hole, where contact allows, all places alike
 
         Raises ModelError if the fastener does not fit into the nominal assembly.
         """
-        part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed)
+        part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift)
         return part
 
     def force(self, name: str, *, at: Point, vector: Any) -> Force:

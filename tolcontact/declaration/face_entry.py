@@ -14,7 +14,18 @@ from tolcontact.declaration.codec import CODECS, Choice, Codec, Named, Optional,
 from tolcontact.declaration.measure import Tape
 from tolcontact.declaration.part import Face, Feature, Part
 from tolcontact.declaration.place import Place
-from tolcontact.declaration.selection import KINDS as SURFACES, Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
+from tolcontact.declaration.selection import (
+    FACE_GROUPS,
+    KINDS as SURFACES,
+    Brep,
+    Cylinder,
+    Facing,
+    Inside,
+    Largest,
+    Near,
+    Picked,
+    Triangles,
+)  # fmt: skip
 from tolcontact.declaration.values import DIRECTIONS, Vector, direction
 
 Document = dict[str, Any]
@@ -209,7 +220,7 @@ CRITERION = Choice(
         mark="brep",
         build=lambda which, whole=False: Brep(*which, whole=whole),
         brep=Plain(INDEX | str | Vector | dict[str, list[INDEX | str | Vector]], _brep_entry, _brep_faces),  # type: ignore[misc]
-        whole=Plain(bool),
+        whole=Plain(bool | text_type(FACE_GROUPS)),
     ),
     Wrapped("cylinder", Record(Cylinder, "radius? inner?", radius=Plain(POSITIVE | None))),
     Record(

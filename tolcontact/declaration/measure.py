@@ -173,7 +173,7 @@ class Measure(Readable):
             subject = "expression of the poses" if self.is_expression else f"{self.of}{along}"
         if isinstance(self.of, Point) and self.absolute is not None:
             subject = f"{self.quantity}, {subject}"
-        return f"measure {self.name}: {subject}{self._limit_text}"
+        return f"measurement {self.name}: {subject}{self._limit_text}"
 
     @property
     def _limit_text(self) -> str:

@@ -140,7 +140,10 @@ class Clearance(_OfTwoFaces):
     Of planes it is the least height, perpendicular to the second face, in the region in which they overlap at the present pose;
     in the region in which they overlap nominally if there is none, or if their rims have more than 2500 pairs of edges. Of a
     ball or a shaft beside walls it is the least gap of contact (see tolcontact.discretization), of two outer cylinders the
-    distance of their axes, each as long as its face, less both radii.
+    distance of their axes, each as long as its face, less both radii. Of all other faces, and of whole parts
+    (`part.face()`), it is the least distance of their triangles, negative by the depth of a corner or an edge inside the other
+    one. It looks at the corners and edges that are nearest nominally, and where parts move beyond these it is too small, never
+    too large, with a warning (see tolcontact.plausibility).
     """
 
     kind = "clearance"

@@ -15,6 +15,7 @@ from tolcontact.vocabulary import SURFACE_KINDS
 Picker = Callable[[np.ndarray, np.ndarray], np.ndarray]
 FACE_ANGLE = math.radians(1.0)
 KINDS = (*SURFACE_KINDS, "general")  # of surfaces
+FACE_GROUPS = ("slot", "pattern")  # that one of their faces stands for
 
 
 class Selection(Protocol):
@@ -122,14 +123,15 @@ class Brep(Readable):
     """Faces of the B-rep of a STEP file, each by number (`tolcontact faces` lists them), by name, or by a point [mm].
 
     With `whole`, each one stands for all faces that make up its surface: the two halves of a hole, or the parts of a bore that
-    keyways interrupt.
+    keyways interrupt. With `whole="slot"` it stands for the two planes and the two round ends of its slot, and with
+    `whole="pattern"` for all equal holes of the body with parallel axes.
     `Brep(3) | Brep("seat")` are the faces of both.
     """
 
     which: tuple[int | str | Vector, ...]
-    whole: bool
+    whole: bool | str
 
-    def __init__(self, *which: Any, whole: bool = False) -> None:
+    def __init__(self, *which: Any, whole: bool | str = False) -> None:
         object.__setattr__(self, "which", tuple(map(_brep_face, which)))
         object.__setattr__(self, "whole", whole)
 
@@ -138,7 +140,7 @@ class Brep(Readable):
             return NotImplemented
         if self.whole != other.whole:
             raise TypeError(
-                "a union of B-rep faces is of whole surfaces, or of single faces; state whole for both, or for none"
+                "a union of B-rep faces is of whole surfaces, or of single faces; state the same whole for both, or for none"
             )
         return Brep(*self.which, *other.which, whole=self.whole)
 
@@ -149,11 +151,12 @@ class Brep(Readable):
             yield "a B-rep face needs its number, its name, or a point on it, three finite numbers"
         if "" in self.which:
             yield "a B-rep face has an empty name; give its number, or a point on it"
-        if not isinstance(self.whole, bool):
-            yield f"whole is {self.whole!r}; expected True or False"
+        if not (isinstance(self.whole, bool) or self.whole in FACE_GROUPS):
+            yield f"whole is {self.whole!r}; expected True, False, {' or '.join(map(repr, FACE_GROUPS))}"
 
     def __str__(self) -> str:
-        return ("whole " if self.whole else "") + " and ".join(map(_brep_words, self.which))
+        prefix = f"{self.whole} of " if isinstance(self.whole, str) else "whole " if self.whole else ""
+        return prefix + " and ".join(map(_brep_words, self.which))
 
 
 def _brep_face(which: Any) -> int | str | Vector:

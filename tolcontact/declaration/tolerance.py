@@ -57,7 +57,7 @@ class Tolerance(Readable):
             if fault := text_fault(self.range):
                 yield f"tolerance is {fault}"
             elif not (is_length(self.range) and self.width >= 0):
-                yield f"tolerance range is {self.range!r}; expected the full width of the zone in mm, 0 or above"
+                yield f"tolerance is {self.range!r}; expected the full width of the zone in mm, 0 or above"
         else:
             yield from self._scipy_faults()
         if not is_length(self.shift):
@@ -80,7 +80,7 @@ class Tolerance(Readable):
         elif fault := _not_archivable(frozen):
             yield fault
         elif self.range is not None:
-            yield "a range is given with a scipy.stats distribution, which has its own width; leave the range out"
+            yield "a width is given with a scipy.stats distribution, which has its own; leave range out"
         elif not math.isfinite(median := float(frozen.ppf(0.5))):
             yield f"the median of scipy.stats.{frozen.dist.name} is {median}; expected finite parameters [mm]"
         elif (seconds := _seconds_per_draw(frozen)) > MAX_DRAW_SECONDS:

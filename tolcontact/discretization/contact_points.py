@@ -171,7 +171,7 @@ def _with_curvature(
         if error > CHORD_SHARE * finest:
             warnings.warn(
                 f"{designation('contact pair', pair)}: parts may be off by up to {error:.2g} mm {place}, "
-                f"{error / finest:.2g} of the smallest tolerance range ({finest:.4g} mm); {advice}",
+                f"{error / finest:.2g} of the smallest tolerance ({finest:.4g} mm); {advice}",
                 ContactWarning,
                 stacklevel=7,
             )

@@ -13,6 +13,7 @@ from tolcontact.features import AxisFeature, FaceDeviation, FeatureGeometry, Fea
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import rim
+from tolcontact.geometry.nearest_elements import NearestElements
 from tolcontact.geometry.surface import Surface
 
 
@@ -127,13 +128,13 @@ class NominalMeasurement:
 
 @dataclass(frozen=True, eq=False)
 class Crossing:
-    """An edge (end, 3) [mm] of a first face that crosses one of a second face, seen along its outward normal.
+    """An edge (end, 3) [mm] of a moving face that crosses one of a reference face, seen along its outward normal.
 
-    sense   1 or -1, so that sense times the cross product of the edges points outward from the second face
+    sense   1 or -1, so that sense times the cross product of the edges points outward from the reference face
     """
 
-    first: MeasuredFace
-    second: MeasuredFace
+    moving: MeasuredFace
+    reference: MeasuredFace
     edges: tuple[np.ndarray, np.ndarray]
     sense: float
 
@@ -164,8 +165,8 @@ class Outline:
 class PlaneClearance(NominalMeasurement):
     """The least height of two planes in the region in which they overlap; `heights` if they overlap nowhere at a pose."""
 
-    first: MeasuredFace
-    second: MeasuredFace
+    moving: MeasuredFace
+    reference: MeasuredFace
     planes: tuple[Plane, Plane]
     outlines: tuple[Outline, Outline]
     heights: Heights
@@ -173,19 +174,29 @@ class PlaneClearance(NominalMeasurement):
 
 @dataclass(frozen=True, eq=False)
 class RoundClearance(NominalMeasurement):
-    """The least gap of balls and shafts beside walls, of a first (moving) and a second (reference) face."""
+    """The least gap of balls and shafts beside walls, of a moving and a reference face."""
 
-    first: MeasuredFace
-    second: MeasuredFace
+    moving: MeasuredFace
+    reference: MeasuredFace
     points: RoundPoints
+
+
+@dataclass(frozen=True, eq=False)
+class MeshClearance(NominalMeasurement):
+    """The least distance of two faces by their triangles. `box` (corner, 3) [mm] is around the moving one."""
+
+    moving: MeasuredFace
+    reference: MeasuredFace
+    elements: NearestElements
+    box: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
 class AxisPair(NominalMeasurement):
     """The distance of two axes; `across` and `along` (3,) as AxisDistance has them, less `radii` [mm]."""
 
-    first: Axis
-    second: Axis
+    moving: Axis
+    reference: Axis
     across: np.ndarray | None = None
     along: np.ndarray | None = None
     is_between_surfaces: bool = False
@@ -195,8 +206,8 @@ class AxisPair(NominalMeasurement):
 class DirectionPair(NominalMeasurement):
     """The angle of two directions (3,) of faces, about a direction (3,) or in space."""
 
-    first: MeasuredFace
-    second: MeasuredFace
+    moving: MeasuredFace
+    reference: MeasuredFace
     directions: tuple[np.ndarray, np.ndarray]
     about: np.ndarray | None
 

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import scipy
+import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
 from tolcontact.declaration import Angle, AxisDistance, Clearance, Combination, Face, Flush, Gap, Measurement
@@ -16,6 +17,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     Heights,
     MeasuredFace,
+    MeshClearance,
     NominalMeasurement,
     Outline,
     PlaneClearance,
@@ -31,6 +33,7 @@ from tolcontact.geometry.analytic_surfaces import Cylinder
 from tolcontact.geometry.curvature import is_flat
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.faces import patch
+from tolcontact.geometry.nearest_elements import nearest_elements
 from tolcontact.geometry.overlap import crossing_edges
 
 MIN_SINE = 1e-3  # of the angle between directions that must not be parallel
@@ -58,9 +61,9 @@ class MeasuredFaces:
 
     def pair(self, measurement: Measurement) -> tuple[MeasuredFace, MeasuredFace]:
         """Return the two faces of a measurement."""
-        first, second = (self[face] for face in measurement.faces)
-        _check_varies([face.part for face in measurement.faces], [first.deviation, second.deviation])
-        return first, second
+        moving, reference = (self[face] for face in measurement.faces)
+        _check_varies([face.part for face in measurement.faces], [moving.deviation, reference.deviation])
+        return moving, reference
 
 
 def nominal_measurements(nominal: Nominal) -> tuple[NominalMeasurement | None, ...]:
@@ -116,56 +119,69 @@ def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
 
 
 def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
-    first, second = faces.pair(clearance)
-    if is_flat(first.surface) and is_flat(second.surface):
-        return _clearance_of_planes(first, second)
-    reach = float(np.ptp(np.vstack([first.surface.mesh.bounds, second.surface.mesh.bounds]), axis=0).sum())
-    if points := round_points(first.surface, second.surface, reach):
+    moving, reference = faces.pair(clearance)
+    if is_flat(moving.surface) and is_flat(reference.surface):
+        return _clearance_of_planes(moving, reference)
+    reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
+    if points := round_points(moving.surface, reference.surface, reach):
         rows = [point.nominal() for point in points]
         P_m, P_r, _ = min(rows, key=lambda row: float((row[0] - row[1]) @ row[2]))
-        return RoundClearance(np.array([[P_m, P_r]]), first, second, RoundPoints.of(points))
-    if all(_is_outer_cylinder(face) for face in (first, second)):
-        axes = first.axis, second.axis
-        return AxisPair(_nearest_places(first.axis.ends, second.axis.ends)[None], *axes, is_between_surfaces=True)
-    kinds = " and ".join(_kind(face) for face in (first, second))
-    raise GeometryFault(
-        f"the clearance of {kinds} is not known; expected two planes, a ball or a shaft beside a wall that it may touch, or "
-        "two outer cylinders; measure the gaps of stations with tc.Gap instead"
-    )
+        return RoundClearance(np.array([[P_m, P_r]]), moving, reference, RoundPoints.of(points))
+    if all(_is_outer_cylinder(face) for face in (moving, reference)):
+        axes = moving.axis, reference.axis
+        return AxisPair(_nearest_places(moving.axis.ends, reference.axis.ends)[None], *axes, is_between_surfaces=True)
+    return _clearance_of_meshes(moving, reference)
 
 
-def _clearance_of_planes(first: MeasuredFace, second: MeasuredFace) -> Heights | PlaneClearance:
+def _clearance_of_meshes(moving: MeasuredFace, reference: MeasuredFace) -> MeshClearance:
+    """Return the clearance by triangles. Raises GeometryFault if too many of them are near each other."""
+    distances = [
+        np.linalg.norm(target.surface.nearest(corners)[1] - corners, axis=1).min()
+        for target, corners in (
+            (reference, np.asarray(moving.surface.mesh.vertices)),
+            (moving, np.asarray(reference.surface.mesh.vertices)),
+        )
+    ]
+    try:
+        elements = nearest_elements(moving.surface.mesh, reference.surface.mesh, float(min(distances)))
+    except GeometryFault as fault:
+        kinds = " and ".join(_kind(face) for face in (moving, reference))
+        raise GeometryFault(f"the clearance of {kinds} cannot be measured: {fault}; or measure stations with tc.Gap") from fault
+    return MeshClearance(elements.line[None], moving, reference, elements, trimesh.bounds.corners(moving.surface.mesh.bounds))
+
+
+def _clearance_of_planes(moving: MeasuredFace, reference: MeasuredFace) -> Heights | PlaneClearance:
     """Return the clearance of planes that face each other, within the nominal overlap if their rims have too many edges."""
-    if not first.plane.axis @ second.plane.axis < FACING:
+    if not moving.plane.axis @ reference.plane.axis < FACING:
         raise GeometryFault(
-            f"its planes {first.face} and {second.face} do not face each other; choose planes with material behind both"
+            f"its planes {moving.face} and {reference.face} do not face each other; choose planes with material behind both"
         )
     stations: list[tuple[Station, Wall]] = []
-    for moving, reference in ((first, second), (second, first)):
-        corners = np.asarray(moving.surface.mesh.vertices)[np.unique(rim(np.asarray(moving.surface.mesh.faces)))]
-        _, _, is_over = reference.surface.project(corners)
-        outward, wall = moving.plane.axis, Wall(reference.part, reference.plane, 1.0, reference.deviation)
+    for face, target in ((moving, reference), (reference, moving)):
+        corners = np.asarray(face.surface.mesh.vertices)[np.unique(rim(np.asarray(face.surface.mesh.faces)))]
+        _, _, is_over = target.surface.project(corners)
+        outward, wall = face.plane.axis, Wall(target.part, target.plane, 1.0, target.deviation)
         corners = _outline(corners[is_over], outward)
-        stations += [(Station(moving.part, corner, moving.deviation, outward), wall) for corner in corners]
+        stations += [(Station(face.part, corner, face.deviation, outward), wall) for corner in corners]
     crossings = []
-    for edges in zip(*crossing_edges(first.surface, second.surface), strict=True):
+    for edges in zip(*crossing_edges(moving.surface, reference.surface), strict=True):
         p, q = (end - start for start, end in edges)
-        crossings.append(Crossing(first, second, edges, float(np.sign(np.cross(p, q) @ second.plane.axis))))
+        crossings.append(Crossing(moving, reference, edges, float(np.sign(np.cross(p, q) @ reference.plane.axis))))
     lines = [[station.position, wall.foot(station.position)] for station, wall in stations]
     lines += [list(_nearest_places(*crossing.edges)) for crossing in crossings]
     if not lines:
         raise GeometryFault(
-            f"its planes {first.face} and {second.face} lie nowhere over each other; choose faces that overlap, or measure the "
-            "gap of a point with tc.Gap"
+            f"its planes {moving.face} and {reference.face} lie nowhere over each other; choose faces that overlap, or measure "
+            "the gap of a point with tc.Gap"
         )
     shortest = min(lines, key=lambda line: float(np.linalg.norm(line[1] - line[0])))
     heights, outlines = (
         Heights(np.array([shortest]), stations, crossings),
-        (Outline.of(first.surface), Outline.of(second.surface)),
+        (Outline.of(moving.surface), Outline.of(reference.surface)),
     )
     if len(outlines[0].edges) * len(outlines[1].edges) > MAX_EDGE_PAIRS:
         return heights
-    return PlaneClearance(heights.lines, first, second, (first.plane, second.plane), outlines, heights)
+    return PlaneClearance(heights.lines, moving, reference, (moving.plane, reference.plane), outlines, heights)
 
 
 def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
@@ -177,21 +193,21 @@ def _outline(points: np.ndarray, n: np.ndarray) -> np.ndarray:
 
 
 def _axis_distance(distance: AxisDistance, faces: MeasuredFaces) -> AxisPair:
-    first, second = (face.axis for face in faces.pair(distance))
-    lines = np.array([first.ends, second.ends])
+    moving, reference = (face.axis for face in faces.pair(distance))
+    lines = np.array([moving.ends, reference.ends])
     if distance.across is not None:
         n = np.array(distance.across)
-        for axis, face in zip((first, second), distance.faces, strict=True):
+        for axis, face in zip((moving, reference), distance.faces, strict=True):
             if axis.direction.any() and abs(float(axis.direction @ n)) < MIN_SINE:
                 raise GeometryFault(
                     f"the axis of {face} is parallel to the plane that is to cut it; choose another direction across"
                 )
-        foot = second.middle + _slide(second, n, first.middle)
-        return AxisPair(np.concatenate([lines, [[first.middle, foot]]]), first, second, across=n)
+        foot = reference.middle + _slide(reference, n, moving.middle)
+        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, across=n)
     if distance.along is not None:
-        foot = second.middle + ((first.middle - second.middle) @ second.direction) * second.direction
-        return AxisPair(np.concatenate([lines, [[first.middle, foot]]]), first, second, along=np.array(distance.along))
-    return AxisPair(np.concatenate([lines, [_nearest_places(first.ends, second.ends)]]), first, second)
+        foot = reference.middle + ((moving.middle - reference.middle) @ reference.direction) * reference.direction
+        return AxisPair(np.concatenate([lines, [[moving.middle, foot]]]), moving, reference, along=np.array(distance.along))
+    return AxisPair(np.concatenate([lines, [_nearest_places(moving.ends, reference.ends)]]), moving, reference)
 
 
 def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
@@ -201,8 +217,8 @@ def _slide(axis: Axis, n: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
-    first, second = faces.pair(angle)
-    u, v = first.direction, second.direction
+    moving, reference = faces.pair(angle)
+    u, v = moving.direction, reference.direction
     about = None if angle.about is None else np.array(angle.about)
     across = [vector if about is None else vector - (vector @ about) * about for vector in (u, v)]
     for vector, face in zip(across, angle.faces, strict=True):
@@ -210,10 +226,10 @@ def _angle(angle: Angle, faces: MeasuredFaces) -> DirectionPair:
             raise GeometryFault(f"the direction of {face} is parallel to the direction that the angle is about; choose another")
     if across[0] @ across[1] < OBTUSE * np.linalg.norm(across[0]) * np.linalg.norm(across[1]):
         v = -v
-    length = min(float(face.surface.mesh.scale) for face in (first, second)) / 2
-    starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (first, second)]
+    length = min(float(face.surface.mesh.scale) for face in (moving, reference)) / 2
+    starts = [np.asarray(face.surface.mesh.bounds).mean(axis=0) for face in (moving, reference)]
     lines = np.array([[start, start + length * vector] for start, vector in zip(starts, (u, v), strict=True)])
-    return DirectionPair(lines, first, second, (u, v), about)
+    return DirectionPair(lines, moving, reference, (u, v), about)
 
 
 def _check_varies(parts: Iterable[Any], deviations: Iterable[Any]) -> None:
@@ -235,11 +251,11 @@ def _kind(face: MeasuredFace) -> str:
     return f"{face.face} ({' and '.join(kinds) or ('plane' if is_flat(face.surface) else 'general surface')})"
 
 
-def _nearest_places(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Return the nearest places (2, 3) of two segments, given by their ends (2, 3); of parallel ones, any that are nearest."""
-    p, q = first[1] - first[0], second[1] - second[0]
-    nearest = scipy.optimize.lsq_linear(np.column_stack([p, -q]), second[0] - first[0], bounds=(0, 1))
-    return np.array([first[0] + nearest.x[0] * p, second[0] + nearest.x[1] * q])
+    p, q = moving[1] - moving[0], reference[1] - reference[0]
+    nearest = scipy.optimize.lsq_linear(np.column_stack([p, -q]), reference[0] - moving[0], bounds=(0, 1))
+    return np.array([moving[0] + nearest.x[0] * p, reference[0] + nearest.x[1] * q])
 
 
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]

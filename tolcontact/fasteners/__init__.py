@@ -34,6 +34,7 @@ contact screw in cover: cover inner cylinders (moving) against screw outer cylin
 | fixed: a screw, a stud, a dowel | `into=` a threaded or press-fit hole | that of the hole: it shifts and leans with it |
 | floating, with a nut | `seat=` the plane under its head | its head slides on the seat, and neither lifts off nor leans |
 | floating, without a seat | neither | what contact leaves; along its axis it stays |
+| floating, at a random place | `drift=True` | drawn in its clearance, until contact moves it |
 
 In each hole of `through` there is a contact pair, which is exact for tilted axes and follows the sizes of holes and shanks that
 vary. Declare the holes and their tolerances first; a hole or a seat that belongs to no feature becomes one, without
@@ -48,6 +49,11 @@ outer cylinder in the first hole; the face of a shank may be given instead.
 In the raw state a floating fastener is in its nominal place. Contact then moves it, and the parts, as the objective of the
 model requires: "all points" no farther than needed, and "seating" to where forces press. A force of its own is
 `pushed=(0, 0, -3)`, in N.
+
+With `drift=True` it stands anywhere in the clearance of its tightest hole in the raw state, all places alike, and contact moves
+it from there only as far as holes require: bolts that choose their side. It is parallel to that hole, and follows it. The
+places are 1000 in the nominal clearance; each realization draws one of them, in the variables "screw drift x" and "screw drift
+y".
 
 Two formulas of drawings follow. Floating fasteners of diameter F pass holes of diameter H with positions T if H - F = T;
 fixed ones if H - F = T1 + T2, or T1 + T2 (1 + 2P / D) where a thread of depth D leans, and the cover has the thickness P. An

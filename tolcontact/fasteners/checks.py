@@ -8,7 +8,7 @@ from tolcontact.declaration.values import is_finite, is_length, vector
 from tolcontact.fasteners.fit import INTO, SEAT
 
 
-def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any) -> None:
+def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any, drift: Any) -> None:
     """Raise TypeError for an argument of a wrong type."""
     kinds: Any = Part | Face | Feature | Size | int | float
     face: Any = Face | Feature
@@ -23,10 +23,12 @@ def check_types(name: str, fastener: Any, through: Any, into: Any, seat: Any) ->
     for label, value, kind, expected in arguments:
         if not isinstance(value, kind) or isinstance(value, bool):
             raise TypeError(f'fasten "{name}": {label} is a {type(value).__name__}; expected {expected}')
+    if not isinstance(drift, bool):
+        raise TypeError(f'fasten "{name}": drift is a {type(drift).__name__}; expected True or False')
 
 
 def reference_faults(
-    assembly: Assembly, fastener: Part | Size | float, holes: Mapping[str, Face], seat: Face | None, pushed: Any
+    assembly: Assembly, fastener: Part | Size | float, holes: Mapping[str, Face], seat: Face | None, pushed: Any, *, drift: bool
 ) -> Iterator[str]:
     """Yield the faults that show before any shape is read."""
     passed = [label for label in holes if label != INTO]
@@ -44,10 +46,14 @@ def reference_faults(
     yield from _owner_faults(assembly, owners | ({SEAT: seat.part} if seat else {}))
     if seat is not None and not any(seat.part is owners[label] for label in passed):
         yield f'seat is on part "{seat.part.name}", which it does not pass through; choose the face under its head'
-    if seat is not None and isinstance(fastener, Part) and INTO in holes:
-        yield f"seat has no effect on a part that the hole in {INTO} holds; leave it out"
+    if seat is not None and isinstance(fastener, Part) and (drift or INTO in holes):
+        yield "seat has no effect on a part that stands in a hole, pressed or anywhere in its clearance; leave it out"
     if pushed is not None:
         yield from _push_faults(assembly, holes, pushed)
+    if drift and INTO in holes:
+        yield f"drift has no effect on a fastener that the hole in {INTO} holds; leave it out"
+    elif drift and pushed is not None:
+        yield "drift and pushed are both given; a fastener stands anywhere, or where a force presses it"
 
 
 def _owner_faults(assembly: Assembly, owners: Mapping[str, Part]) -> Iterator[str]:

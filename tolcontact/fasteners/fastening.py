@@ -1,24 +1,19 @@
 """Expansion of a fastener into a part, its location, contact pairs and a force."""
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Locator, Part, Pin, Size
+from tolcontact.declaration import Assembly, Cylinder, Face, Feature, Part, Pin, Size
 from tolcontact.declaration.part import face_of
 from tolcontact.declaration.values import script_line
 from tolcontact.errors import GeometryFault, ModelError
 from tolcontact.fasteners.checks import check_types, reference_faults
 from tolcontact.fasteners.fit import INTO, SEAT, Fit, made_fit, part_fit
-from tolcontact.fasteners.placed_faces import PlacedCylinder, PlacedPlane, meshes_of, placed_cylinder, placed_plane, placement
-from tolcontact.geometry.faces import face_area
-from tolcontact.geometry.pin_shape import HEAD_WIDTH
-
-DIGITS = 12  # of places [mm]: what is beyond is rounding
-SAME_FACE = 1 - 1e-6  # share of its area that a face has in common with that of its feature
+from tolcontact.fasteners.location import DIGITS, declare_drift, in_part, locate
+from tolcontact.fasteners.placed_faces import PlacedCylinder, placed_cylinder, placed_plane
 
 
 class Faults:
@@ -54,15 +49,16 @@ def fasten(
     into: Face | Feature | None,
     seat: Face | Feature | None,
     pushed: Any,
+    drift: bool,
 ) -> Part:
     """Declare what a fastener consists of, and return its part (see Assembly.fasten). Raises ModelError with all its faults."""
-    check_types(name, fastener, through, into, seat)
+    check_types(name, fastener, through, into, seat, drift)
     shank = face_of(fastener) if isinstance(fastener, Face | Feature) else None
     subject: Part | Size | float = fastener.part if isinstance(fastener, Face | Feature) else fastener
     faces = {f"through[{k}]": face_of(hole) for k, hole in enumerate(through)} | ({INTO: face_of(into)} if into else {})
     plane_face = face_of(seat) if seat else None
     faults = Faults(assembly, name)
-    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed))
+    faults.add(reference_faults(assembly, subject, faces, plane_face, pushed, drift=drift))
     faults.refuse()
     holes = {label: faults.attempt(label, _hole, face) for label, face in faces.items()}
     plane = faults.attempt(SEAT, placed_plane, plane_face) if plane_face else None
@@ -73,13 +69,18 @@ def fasten(
         fit = made_fit(subject.nominal if isinstance(subject, Size) else float(subject), holes, plane)
     faults.refuse()
     faults.add(fit.faults())
+    if drift and not fit.clearance > 0:
+        faults.add([f"drift: the tightest hole is as wide as the fastener, {2 * fit.radius:.6g} mm; leave drift out"])
     faults.refuse()
     part = subject if isinstance(subject, Part) else _made_part(assembly, name, subject, fit)
     _declare_contacts(assembly, name, fit.shank or _shank_face(part, fit), fit)
-    _locate(assembly, name, part, fit)
+    if drift:
+        declare_drift(assembly, name, part, fit)
+    else:
+        locate(assembly, name, part, fit)
     if pushed is not None:
         middle = fit.axis.at(sum(fit.reach) / 2)
-        assembly.force(f"{name} push", at=part.point(*_in_part(part, middle)), vector=pushed)
+        assembly.force(f"{name} push", at=part.point(*in_part(part, middle)), vector=pushed)
     return part
 
 
@@ -120,60 +121,3 @@ def _declare_contacts(assembly: Assembly, name: str, shank: Face, fit: Fit) -> N
             assembly.contact(pair, moving=shank, reference=hole.face)
         else:
             assembly.contact(pair, moving=hole.face, reference=shank)
-
-
-def _locate(assembly: Assembly, name: str, part: Part, fit: Fit) -> None:
-    """Locate a fastener in the hole that holds it, or let it float: with its head on its seat, or held at an end alone."""
-    if INTO in fit.holes:
-        ground = _feature_of(fit.holes[INTO].face, f"{name} hole")
-        assembly.locate(part, list(_press_locators(part, fit)), on=ground)
-    elif fit.seat is not None:
-        ground = _feature_of(fit.seat.face, f"{name} seat")
-        assembly.locate(part, list(_seat_locators(part, fit, fit.seat)), on=ground, floating=True)
-    else:
-        first = next(iter(fit.holes.values()))
-        end = _locator(part, "end", fit.axis.at(fit.reach[1]), fit.axis.head)
-        assembly.locate(part, [end], on=first.face.part, floating=True)
-
-
-def _press_locators(part: Part, fit: Fit) -> Iterator[Locator]:
-    """Yield locators at both ends of the axis of the hole that holds a fastener, along it, and against turning."""
-    x, y = fit.axis.across
-    low, high = fit.holes[INTO].extent(fit.axis)
-    for number, station in enumerate((low, high), start=1):
-        for letter, direction in (("x", x), ("y", y)):
-            yield _locator(part, f"{letter}{number}", fit.axis.at(station), direction)
-    yield _locator(part, "end", fit.axis.at(low), fit.axis.head)
-    yield _locator(part, "turn", fit.axis.at((low + high) / 2) + fit.radius * x, y)
-
-
-def _seat_locators(part: Part, fit: Fit, seat: PlacedPlane) -> Iterator[Locator]:
-    """Yield supports under the head of a fastener, and above it: it slides on its seat, and neither lifts off nor leans."""
-    x, y = fit.axis.across
-    middle, arm = fit.axis.at(fit.axis.station(seat.point)), HEAD_WIDTH * fit.radius
-    for number in range(3):
-        angle = 2 * math.pi * number / 3
-        foot = middle + arm * (math.cos(angle) * x + math.sin(angle) * y)
-        for name, direction in (("seat", fit.axis.head), ("clamp", -fit.axis.head)):
-            yield _locator(part, f"{name} {number + 1}", foot, direction, one_sided=True)
-
-
-def _locator(part: Part, name: str, point: np.ndarray, direction: np.ndarray, *, one_sided: bool = False) -> Locator:
-    R, _ = placement(part)
-    return Locator(name, _in_part(part, point), direction @ R, 0.0, one_sided=one_sided)
-
-
-def _in_part(part: Part, point: np.ndarray) -> np.ndarray:
-    """Return a point (3,) of the nominal assembly in the frame of a part."""
-    R, t = placement(part)
-    return np.round((point - t) @ R, DIGITS) + 0.0
-
-
-def _feature_of(face: Face, name: str) -> Feature:
-    """Return the feature of its part that a face belongs to, or declare one with this name, which has no tolerances."""
-    meshes = meshes_of(face)
-    area, mesh = face_area(face, meshes), meshes[face.part]
-    for feature in face.part.features:
-        if len(feature.faces) == 1 and area.share(face_area(feature.faces[0], meshes), mesh) > SAME_FACE:
-            return feature
-    return face.part.feature(name, face)

@@ -35,6 +35,16 @@ class Fit:
     reach: tuple[float, float]
     shank: Face | None = None
 
+    @property
+    def tightest(self) -> PlacedCylinder:
+        """The hole of the smallest diameter."""
+        return min(self.holes.values(), key=lambda hole: hole.radius)
+
+    @property
+    def clearance(self) -> float:
+        """Half the difference [mm] of the diameters of its tightest hole and the shank."""
+        return self.tightest.radius - self.radius
+
     def faults(self) -> Iterator[str]:
         """Yield why the shank does not stand in its holes, or its head on the seat."""
         if self.seat and np.linalg.norm(np.cross(self.seat.normal, self.axis.head)) > MAX_LEAN:

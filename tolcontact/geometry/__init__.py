@@ -52,6 +52,9 @@ NAME` and `tc.faces_in` list the faces of a body with their numbers, kinds, dire
 if the file has any; `tc.Brep("...")` chooses a face by its name. Faces of one surface that touch, such as the halves of a
 hole, are listed with each other's numbers; `tc.Brep(6, whole=True)` chooses all of them by any of their numbers. A face that
 the file states several times in one place has one number, and is listed as such.
+Lines at the end of the list name slots (two parallel planes and two round ends) and patterns (holes of one radius with parallel
+axes), which `tc.Brep(6, whole="slot")` and `tc.Brep(6, whole="pattern")` choose by any of their faces. The holes of a pattern
+with tolerances are chosen one by one, as in `part.pattern("H", *(part.face(tc.Brep(n, whole=True)) for n in (6, 8, 10)), ...)`.
 Areas and boxes are those of the true faces, not of triangles. A B-spline surface within 0.1 um of a plane, cylinder, cone or
 sphere is taken for it. Where a file states no simple surface, one is fitted to the vertices to within 1 um, and its residual is
 listed. STEP files that refer to other files are rejected.
@@ -63,7 +66,8 @@ therefore leads to a single message, which names the file and says what to do.
 """
 
 from tolcontact.geometry.analytic_surfaces import surface_arrays, surfaces_of
-from tolcontact.geometry.brep_face import FaceInFile
+from tolcontact.geometry.face_groups import group_lines
+from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.part_preview import PartPreview, preview
 from tolcontact.geometry.step_listing import BodyInFile, bodies_in, faces_in, parts_from
 from tolcontact.geometry.surface_recognition import known_surfaces, with_known_surfaces
@@ -74,6 +78,7 @@ __all__ = [
     "PartPreview",
     "bodies_in",
     "faces_in",
+    "group_lines",
     "known_surfaces",
     "parts_from",
     "preview",

@@ -13,6 +13,7 @@ import trimesh
 
 from tolcontact.arrays import Array, Float
 from tolcontact.geometry.edges import edges
+from tolcontact.geometry.triangle_tree import triangle_tree
 
 STARTING_CELLS = 6  # along the longest side of the box
 MAX_LEVELS = 6
@@ -39,9 +40,7 @@ class SolidBody:
 
     @cached_property
     def _tree(self) -> igl.AABB:
-        tree = igl.AABB()
-        tree.init(self._vertices, self._faces)
-        return tree
+        return triangle_tree(self._vertices, self._faces)
 
     @cached_property
     def is_closed(self) -> bool:

@@ -1,75 +1,28 @@
 """Descriptions of the faces of a part: B-rep faces of a STEP file, or smooth pieces of a mesh. Lengths in mm."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 import trimesh
 
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import shown
-from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere
+from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
 from tolcontact.geometry.edges import smooth_pieces
+from tolcontact.geometry.face_groups import FaceGroups
+from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import BREP, FACE_NAMES, STATED_FACES, SURFACES
 from tolcontact.geometry.files.stated_face import FaceMeasure, StatedFace
 from tolcontact.geometry.fitting import fit_surface
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface, interruptions
-from tolcontact.readable import Readable
 
 FIT_TOLERANCE = 1e-3  # [mm] largest distance of the vertices of a face from the surface on which it is
 RESIDUAL_FACTOR = 10  # times the residuals of two faces: distance at which they still are parts of one surface
 POSITION_TOLERANCE = 1e-9  # of a part's size: distance between faces of one surface
 DESCRIPTIONS = "descriptions"
 ON_SURFACES = "on_surfaces"
-GENERAL = "general"  # kind of a face without an analytic surface
 UNKNOWN = StatedFace(0, "", (), 0, None)  # a face of a mesh, or from an archive, which keeps no measures
-
-
-@dataclass(frozen=True, repr=False)
-class FaceInFile(Readable):
-    """A face of a body, in the body's own frame.
-
-    number      from 1 in the file's order, for `tc.Brep`
-    kind        plane, cylinder, cone, sphere, torus, or "general"
-    point       a point on the face [mm]
-    direction   outward normal of a plane; axis of a cylinder, cone or torus; otherwise None
-    radius      [mm] of a cylinder or sphere, or of the circle inside a torus; otherwise None
-    is_inner    whether a round face is hollow: its outside is towards its axis or centre
-    area        [mm2]; of its triangles, if the file states it by triangles
-    residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
-    name        its name in the file, which other faces may have too; empty if it has none
-    whole       numbers of the faces that make up its surface, and it; empty if it has the surface for itself
-    copies      number of other faces in the same place, which have no numbers of their own
-    """
-
-    number: int
-    kind: str
-    point: Vector
-    direction: Vector | None
-    radius: float | None
-    is_inner: bool
-    area: float
-    residual: float = 0.0
-    name: str = ""
-    whole: tuple[int, ...] = ()
-    copies: int = 0
-
-    def __str__(self) -> str:
-        name = f'"{shown(self.name)}", ' if self.name else ""
-        entries = [f"{self.number}. {name}{'inner ' if self.is_inner else ''}{self.kind}"]
-        if self.radius is not None:
-            entries.append(f"radius {self.radius:.6g} mm")
-        if self.direction is not None:
-            entries.append("along ({:g}, {:g}, {:g})".format(*(round(c, 6) + 0.0 for c in self.direction)))
-        if self.residual:
-            entries.append(f"fitted within {self.residual:.1g} mm")
-        if self.whole:
-            neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
-            entries.append(f"one surface with {neighbours}")
-        if self.copies:
-            entries.append(f"stands {self.copies + 1} times in the file")
-        return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
 
 
 def number_faces(mesh: trimesh.Trimesh) -> tuple[np.ndarray, Sequence[AnalyticSurface | None]]:
@@ -98,8 +51,7 @@ def describe_faces(mesh: trimesh.Trimesh) -> tuple[FaceInFile, ...]:
                 replace(face, name=name, copies=stated.copies)
                 for face, name, stated in zip(faces, names, stated_faces, strict=True)
             ]
-            wholes = _wholes(mesh, number_faces(mesh)[0], on_surfaces)
-            faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
+            faces = _grouped(mesh, faces, on_surfaces)
         mesh.metadata[DESCRIPTIONS] = tuple(faces)
     return mesh.metadata[DESCRIPTIONS]  # type: ignore[no-any-return]
 
@@ -128,19 +80,25 @@ def faces_at(mesh: trimesh.Trimesh, point: Vector) -> tuple[list[int], float]:
     return [int(number) + 1 for number in nearest], float(distances.min())
 
 
-def whole_surfaces(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return the number of the whole surface of each B-rep face (face,): faces of one surface have the same one."""
-    return np.array([face.whole[0] if face.whole else face.number for face in describe_faces(mesh)], dtype=np.int64)
+def _grouped(mesh: trimesh.Trimesh, faces: Sequence[FaceInFile], surfaces: Sequence[FaceOnSurface]) -> list[FaceInFile]:
+    """Return the descriptions of B-rep faces with their whole surfaces, slots and patterns."""
+    number_of, _ = number_faces(mesh)
+    neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
+    touching = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
+    wholes = _wholes(mesh, touching, surfaces)
+    faces = [replace(face, whole=whole) for face, whole in zip(faces, wholes, strict=True)]
+    groups = FaceGroups(mesh, faces, surfaces, touching)
+    slot_of = {number: slot for slot in groups.slots() for number in slot}
+    pattern_of = {number: pattern for pattern in groups.patterns() for number in pattern}
+    return [replace(face, slot=slot_of.get(face.number, ()), pattern=pattern_of.get(face.number, ())) for face in faces]
 
 
-def _wholes(mesh: trimesh.Trimesh, number_of: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
+def _wholes(mesh: trimesh.Trimesh, touching: np.ndarray, faces: Sequence[FaceOnSurface]) -> Iterator[tuple[int, ...]]:
     """Yield for each B-rep face the numbers of the faces that make up its surface with it; none if it is alone.
 
-    They touch, or a cylinder or cone is interrupted between them.
+    They are among the pairs of `touching` (pair, 2) faces, or a cylinder or cone is interrupted between them.
     """
-    neighbours = number_of[np.asarray(mesh.face_adjacency).reshape(-1, 2)]
-    pairs = np.unique(np.sort(neighbours[neighbours[:, 0] != neighbours[:, 1]], axis=1), axis=0)
-    links = [pair for pair in pairs if are_one_surface(mesh, *(faces[number] for number in pair))]
+    links = [pair for pair in touching if are_one_surface(mesh, *(faces[number] for number in pair))]
     label = _components(links, len(faces))
     links += interruptions(mesh, faces, label, partial(are_one_surface, mesh))
     label = _components(links, len(faces))
@@ -199,7 +157,16 @@ def _description(number: int, surface: AnalyticSurface | None, measure: FaceMeas
     is_plane = isinstance(surface, Plane)
     direction = None if isinstance(surface, Sphere) else plain_vector(-surface.axis if is_plane and is_inward else surface.axis)
     radius = surface.radius if "radius" in surface.sizes else None
-    return FaceInFile(number, surface.kind, point, direction, radius, is_inward and not is_plane, area, surface.residual)
+    is_inner, residual = is_inward and not is_plane, surface.residual
+    centre = None if is_plane else plain_vector(_centre(surface, measure.point))
+    return FaceInFile(number, surface.kind, point, direction, radius, is_inner, area, centre, residual)
+
+
+def _centre(surface: AnalyticSurface, point: np.ndarray) -> np.ndarray:
+    """Return the centre (3,) of a sphere or torus, or the point of the axis of a cylinder or cone beside a point (3,)."""
+    if isinstance(surface, Sphere | Torus):
+        return surface.origin
+    return surface.origin + float((point - surface.origin) @ surface.axis) * surface.axis  # type: ignore[no-any-return]
 
 
 def plain_vector(numbers: np.ndarray) -> Vector:

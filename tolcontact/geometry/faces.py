@@ -13,7 +13,9 @@ from tolcontact.declaration import Brep, Cylinder, Face, Facing, Inside, Largest
 from tolcontact.declaration.selection import FACE_ANGLE
 from tolcontact.declaration.values import Vector
 from tolcontact.errors import GeometryFault, shown
-from tolcontact.geometry.brep_face import FaceInFile, describe_faces, faces_at, number_faces, whole_surfaces
+from tolcontact.geometry.brep_face import describe_faces, faces_at, number_faces
+from tolcontact.geometry.face_groups import group_lines
+from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP, FACE_NAMES, SURFACES
 from tolcontact.geometry.surface import Surface
 from tolcontact.geometry.surface_recognition import analytic_surfaces
@@ -172,9 +174,19 @@ def _by_brep(face: Face, mesh: trimesh.Trimesh, selection: Brep) -> np.ndarray:
     brep = np.asarray(mesh.face_attributes[BREP]).ravel()
     numbers = [number for which in selection.which for number in _brep_numbers(face, mesh, which)]
     if selection.whole:
-        group = whole_surfaces(mesh)
-        return np.isin(group[brep], group[numbers])
+        faces = describe_faces(mesh)
+        numbers = [member - 1 for number in numbers for member in _group(face, faces, faces[number], selection.whole)]
     return np.isin(brep, numbers)
+
+
+def _group(face: Face, faces: Sequence[FaceInFile], description: FaceInFile, whole: bool | str) -> tuple[int, ...]:
+    """Return the numbers of the faces of a B-rep face's surface, slot or pattern of holes. Raises GeometryFault without one."""
+    if whole is True:
+        return description.whole or (description.number,)
+    if group := getattr(description, str(whole)):
+        return group  # type: ignore[no-any-return]
+    listed = "; ".join(line for line in group_lines(faces) if line.startswith(str(whole))) or "the part has none"
+    raise GeometryFault(f"face {face}: B-rep face {description.number} belongs to no {whole}; {listed}")
 
 
 def _brep_numbers(face: Face, mesh: trimesh.Trimesh, which: int | str | Vector) -> np.ndarray:

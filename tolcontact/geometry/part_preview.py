@@ -1,5 +1,6 @@
 """Previews of parts before anything is computed: shapes in their places, and code that chooses each face."""
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -7,9 +8,10 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from tolcontact.declaration import Part
-from tolcontact.declaration.selection import FACE_ANGLE
+from tolcontact.declaration.selection import FACE_ANGLE, FACE_GROUPS
 from tolcontact.errors import GeometryFault
-from tolcontact.geometry.brep_face import FaceInFile, describe_faces, number_faces
+from tolcontact.geometry.brep_face import describe_faces, number_faces
+from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import BREP
 from tolcontact.geometry.shapes import shape
 
@@ -24,6 +26,7 @@ class PartPreview(NamedTuple):
     face_of       (triangle,) numbers of faces from 0: of the B-rep faces of a STEP file, or of smooth pieces
     descriptions  of the faces
     snippets      Python code that chooses each face
+    groups        Python code that chooses the slot and the pattern of holes to which each face belongs
     """
 
     mesh: trimesh.Trimesh
@@ -33,6 +36,7 @@ class PartPreview(NamedTuple):
     face_of: np.ndarray
     descriptions: tuple[FaceInFile, ...]
     snippets: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...]
 
 
 def preview(part: Part) -> PartPreview | None:
@@ -48,12 +52,13 @@ def preview(part: Part) -> PartPreview | None:
     face_of, _ = number_faces(mesh)
     faces = describe_faces(mesh)
     snippets = tuple(_snippet(mesh, face_of, face) for face in faces)
-    return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets)
+    groups = tuple(tuple(_group_snippets(face)) for face in faces)
+    return PartPreview(mesh, R, vertices, np.asarray(mesh.faces), face_of, faces, snippets, groups)
 
 
 def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> str:
     if BREP in mesh.face_attributes:
-        return f"face(tc.Brep({_vector(np.array(face.point))}{', whole=True' if face.whole else ''}))"
+        return _brep_snippet(face, "whole=True" if face.whole else "")
     if face.kind == "cylinder" and face.radius is not None:
         return f"face(tc.Cylinder(radius={face.radius:.6g}, inner={face.is_inner}))"
     mask = face_of == face.number - 1
@@ -65,6 +70,16 @@ def _snippet(mesh: trimesh.Trimesh, face_of: np.ndarray, face: FaceInFile) -> st
         is_facing = np.asarray(mesh.face_normals) @ normal >= np.cos(FACE_ANGLE)
         return f"face({direction})" if (is_facing == mask).all() else f"face({direction}, {_box(mesh, mask)})"
     return f"face({_box(mesh, mask)})"
+
+
+def _brep_snippet(face: FaceInFile, option: str) -> str:
+    return f"face(tc.Brep({', '.join(filter(None, [_vector(np.array(face.point)), option]))}))"
+
+
+def _group_snippets(face: FaceInFile) -> Iterator[str]:
+    for word in FACE_GROUPS:
+        if getattr(face, word):
+            yield _brep_snippet(face, f'whole="{word}"')
 
 
 def _box(mesh: trimesh.Trimesh, mask: np.ndarray) -> str:

@@ -13,8 +13,9 @@ from scipy.spatial.transform import Rotation
 from tolcontact.declaration import Assembly, Mesh, Part
 from tolcontact.declaration.geometry import STEP
 from tolcontact.declaration.values import Vector
-from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, shown
-from tolcontact.geometry.brep_face import GENERAL, FaceInFile, describe_faces, plain_vector
+from tolcontact.errors import CONTROL_CHARACTERS, GeometryFault, ModelError, OptionError, nearest_name, shown
+from tolcontact.geometry.brep_face import describe_faces, plain_vector
+from tolcontact.geometry.face_in_file import GENERAL, FaceInFile
 from tolcontact.geometry.files import SURFACES, key_of, read_files
 from tolcontact.geometry.files.bodies import MAX_LISTED
 from tolcontact.geometry.files.product import Product
@@ -116,7 +117,8 @@ class PartsOfFile(dict[str, Part]):
     """The parts of a STEP file by their names."""
 
     def __missing__(self, name: str) -> Part:
-        raise OptionError(f'no part "{shown(str(name))}" is declared of the file; its parts are: {_first(list(self))}')
+        listed, nearest = _first(list(self)), nearest_name(str(name), self)
+        raise OptionError(f'no part "{shown(str(name))}" is declared of the file; its parts are: {listed}{nearest}')
 
 
 def parts_from(
@@ -146,7 +148,8 @@ def parts_from(
     by_name = {body.name: body for body in bodies}
     if missing := [name for name in (*(wanted or ()), *fixed_names) if name not in by_name]:
         listed = _first([body.name for body in bodies])
-        raise ModelError(model.name, [f'"{path}" holds no body "{name}"; it holds {listed}' for name in missing])
+        faults = [f'"{path}" holds no body "{name}"; it holds {listed}{nearest_name(name, by_name)}' for name in missing]
+        raise ModelError(model.name, faults)
     declared = bodies if wanted is None else [by_name[name] for name in wanted]
     if undeclared := [name for name in fixed_names if by_name[name] not in declared]:
         raise ModelError(model.name, [f'fixed has the body "{name}", which names has not; add it there' for name in undeclared])

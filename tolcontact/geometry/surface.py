@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import CREASE, on_rim, rim
+from tolcontact.geometry.triangle_tree import triangle_tree
 
 RIM_TOLERANCE = 1e-6  # of a face's size: a point over a face stands no farther beside its rim
 MAX_TURN = 0.3  # rad: between the normals of a triangle and of the analytic surface for which it stands
@@ -113,9 +114,7 @@ class Surface:
 
     @cached_property
     def _tree(self) -> igl.AABB:
-        tree = igl.AABB()
-        tree.init(self._vertices, self._faces)
-        return tree
+        return triangle_tree(self._vertices, self._faces)
 
     @cached_property
     def _rim_edges(self) -> np.ndarray:

@@ -13,6 +13,7 @@ from tolcontact.discretization.measured_geometry import (
     DirectionPair,
     Heights,
     MeasuredFace,
+    MeshClearance,
     NominalMeasurement,
     PlaneClearance,
     RoundClearance,
@@ -21,12 +22,12 @@ from tolcontact.discretization.measured_geometry import (
 )
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface, Plane, Sphere, Torus
+from tolcontact.mechanics.mesh_clearance import mesh_clearance
 from tolcontact.mechanics.plane_clearance import plane_clearance
 from tolcontact.mechanics.pose import Pose, relative
 from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.segments import least, segment_distance
 from tolcontact.mechanics.setting import face_height, face_pose
-
-MIN_SQUARE = 1e-300  # of a length: keeps quotients finite where an axis has no length
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,28 +60,23 @@ def _least_height(heights: Heights, observed: Observed) -> ca.SX:
 
 
 def _plane_clearance(clearance: PlaneClearance, observed: Observed) -> ca.SX:
-    X_21 = _relative(clearance.first, clearance.second, observed)
+    X_21 = _relative(clearance.moving, clearance.reference, observed)
     return plane_clearance(clearance, X_21, _least_height(clearance.heights, observed))
 
 
-def _relative(first: MeasuredFace, second: MeasuredFace, observed: Observed) -> Pose:
-    """Return the pose of a first face in the frame of a second one."""
-    return relative(observed.pose(first.part, first.deviation), observed.pose(second.part, second.deviation))
+def _relative(moving: MeasuredFace, reference: MeasuredFace, observed: Observed) -> Pose:
+    """Return the pose of a moving face in the frame of a reference one."""
+    return relative(observed.pose(moving.part, moving.deviation), observed.pose(reference.part, reference.deviation))
 
 
 def _edge_height(crossing: Crossing, observed: Observed) -> ca.SX:
     """Return the height of an edge over one that it crosses: the distance of their lines along their common normal [mm]."""
-    first, second = (
+    moving, reference = (
         [observed.pose(face.part, face.deviation).apply(ca.DM(end)) for end in edge]
-        for face, edge in zip((crossing.first, crossing.second), crossing.edges, strict=True)
+        for face, edge in zip((crossing.moving, crossing.reference), crossing.edges, strict=True)
     )
-    n = crossing.sense * ca.cross(first[1] - first[0], second[1] - second[0])
-    return ca.dot(n, first[0] - second[0]) / ca.norm_2(n)
-
-
-def least(values: Any) -> ca.SX:
-    """Return the least of several expressions."""
-    return ca.mmin(ca.vertcat(*values))
+    n = crossing.sense * ca.cross(moving[1] - moving[0], reference[1] - reference[0])
+    return ca.dot(n, moving[0] - reference[0]) / ca.norm_2(n)
 
 
 def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
@@ -106,63 +102,42 @@ def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:
 
 
 def _round_clearance(clearance: RoundClearance, observed: Observed) -> ca.SX:
-    first, second = clearance.first, clearance.second
-    X_RM = _relative(first, second, observed)
-    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (first, second)))
+    moving, reference = clearance.moving, clearance.reference
+    X_RM = _relative(moving, reference, observed)
+    grown = ca.vertcat(*(face_height(face.deviation, observed.deviations) for face in (moving, reference)))
     gaps, *_ = round_gaps(clearance.points)(X_RM.vector(), grown, ca.SX.zeros(len(clearance.points)))
     return least(ca.vertsplit(gaps))
 
 
+def _mesh_clearance(clearance: MeshClearance, observed: Observed) -> ca.SX:
+    faces = (clearance.moving, clearance.reference)
+    grown = sum(face_height(face.deviation, observed.deviations) for face in faces)
+    return mesh_clearance(clearance, _relative(*faces, observed)) - grown
+
+
 def _axis_distance(pair: AxisPair, observed: Observed) -> ca.SX:
-    first, second = (
-        [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends] for axis in (pair.first, pair.second)
+    moving, reference = (
+        [observed.pose(axis.part, axis.deviation).apply(ca.DM(end)) for end in axis.ends]
+        for axis in (pair.moving, pair.reference)
     )
-    a, b = (first[0] + first[1]) / 2, (second[0] + second[1]) / 2
-    v = observed.pose(pair.second.part, pair.second.deviation).R @ ca.DM(pair.second.direction)
+    a, b = (moving[0] + moving[1]) / 2, (reference[0] + reference[1]) / 2
+    v = observed.pose(pair.reference.part, pair.reference.deviation).R @ ca.DM(pair.reference.direction)
     if pair.along is not None:
         return ca.dot(ca.DM(pair.along), b - a + ca.dot(a - b, v) * v)
     if pair.across is not None:
         n = ca.SX(ca.DM(pair.across))
-        v = v if pair.second.direction.any() else n
+        v = v if pair.reference.direction.any() else n
         return ca.norm_2(b - a + ca.dot(a - b, n) / ca.dot(v, n) * v)
-    shortest = segment_distance(first, second)
+    shortest = segment_distance(moving, reference)
     if not pair.is_between_surfaces:
         return shortest
-    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.first, pair.second))
+    grown = sum(axis.radius + face_height(axis.deviation, observed.deviations) for axis in (pair.moving, pair.reference))
     return shortest - grown
-
-
-def segment_distance(first: Sequence[ca.SX], second: Sequence[ca.SX]) -> ca.SX:
-    """Return the shortest distance [mm] of two segments between ends (3, 1); parallel ones are no exception.
-
-    It is the least of five: from each end to the other segment, and between the places where the two lines are nearest if
-    both lie between the ends (Ericson, Real-Time Collision Detection, 5.1.9). All are distances of places of both segments, so
-    where lines are almost parallel, and these places uncertain, none is too short.
-    """
-    p, q, r = first[1] - first[0], second[1] - second[0], second[0] - first[0]
-    pp, qq, pq = ca.dot(p, p), ca.dot(q, q), ca.dot(p, q)
-
-    def squared(s: ca.SX | float, t: ca.SX | float) -> ca.SX:
-        return ca.sumsqr(r + t * q - s * p)
-
-    def on_first(t: ca.SX | float) -> ca.SX:
-        return _clipped(ca.dot(p, r + t * q) / ca.fmax(pp, MIN_SQUARE))
-
-    def on_second(s: ca.SX | float) -> ca.SX:
-        return _clipped(ca.dot(q, s * p - r) / ca.fmax(qq, MIN_SQUARE))
-
-    inner = _clipped((ca.dot(p, r) * qq - ca.dot(q, r) * pq) / ca.fmax(pp * qq - pq**2, MIN_SQUARE))
-    squares = [squared(s, on_second(s)) for s in (0.0, 1.0, inner)] + [squared(on_first(t), t) for t in (0.0, 1.0)]
-    return ca.sqrt(least(squares))
-
-
-def _clipped(share: ca.SX) -> ca.SX:
-    return ca.fmin(ca.fmax(share, 0), 1)
 
 
 def _angle(pair: DirectionPair, observed: Observed) -> ca.SX:
     """Return the angle [rad] by atan2 of sine and cosine, which keeps its digits where the cosine is 1."""
-    faces = (pair.first, pair.second)
+    faces = (pair.moving, pair.reference)
     u, v = (
         observed.pose(face.part, face.deviation).R @ ca.DM(direction)
         for face, direction in zip(faces, pair.directions, strict=True)
@@ -182,8 +157,8 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
 
 
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
-    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, AxisPair: _axis_distance,
-    DirectionPair: _angle, Combined: _combined,
+    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, MeshClearance: _mesh_clearance,
+    AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,

@@ -1,7 +1,7 @@
 """The clearance of two plane faces at any pose: the least height within the region in which they overlap there.
 
-Heights are linear over this region, so that the least is at one of its corners: a corner of the first outline inside the
-second, a corner of the second inside the first, or a place where edges of both cross, as seen along the second face's normal.
+Heights are linear over this region, so that the least is at one of its corners: a corner of either outline inside the other
+one, or a place where edges of both cross, as seen along the normal of the reference face.
 """
 
 from collections.abc import Sequence
@@ -18,21 +18,21 @@ MIN_CROSS = 1e-12  # of the product of the lengths of two edges: nearly parallel
 
 
 def plane_clearance(clearance: PlaneClearance, X_21: Pose, otherwise: ca.SX) -> ca.SX:
-    """Return the clearance [mm] at the pose of the first face relative to the second; `otherwise` if they do not overlap."""
-    first, second = clearance.outlines
+    """Return the clearance [mm] at the pose of the moving face relative to the reference; `otherwise` without overlap."""
+    moving, reference = clearance.outlines
     o, n = clearance.planes[1].origin, clearance.planes[1].axis
     across = np.linalg.svd(n[None])[2][1:]
-    moved = [X_21.apply(ca.DM(vertex)) - ca.DM(o) for vertex in first.vertices]
+    moved = [X_21.apply(ca.DM(vertex)) - ca.DM(o) for vertex in moving.vertices]
     p, heights = [ca.DM(across) @ place for place in moved], [ca.dot(ca.DM(n), place) for place in moved]
-    q = [ca.SX(ca.DM(place)) for place in (second.vertices - o) @ across.T]
-    edges_p, edges_q = ([(ends[a], ends[b]) for a, b in outline.edges] for ends, outline in ((p, first), (q, second)))
+    q = [ca.SX(ca.DM(place)) for place in (reference.vertices - o) @ across.T]
+    edges_p, edges_q = ([(ends[a], ends[b]) for a, b in outline.edges] for ends, outline in ((p, moving), (q, reference)))
     plane, normal = X_21.apply(ca.DM(clearance.planes[0].origin)), X_21.R @ ca.DM(clearance.planes[0].axis)
     candidates = [ca.if_else(_is_inside(place, edges_q), height, NONE) for place, height in zip(p, heights, strict=True)]
     candidates += [
         ca.if_else(_is_inside(place, edges_p), ca.dot(normal, ca.DM(vertex) - plane), NONE)
-        for place, vertex in zip(q, second.vertices, strict=True)
+        for place, vertex in zip(q, reference.vertices, strict=True)
     ]
-    ends = [(heights[a], heights[b]) for a, b in first.edges]
+    ends = [(heights[a], heights[b]) for a, b in moving.edges]
     candidates += [
         _crossing(edge, other, *edge_heights) for edge, edge_heights in zip(edges_p, ends, strict=True) for other in edges_q
     ]

@@ -9,6 +9,7 @@ from tolcontact.plausibility.body_overlaps import body_overlaps
 from tolcontact.plausibility.declared_points import far_points, unfit_directions
 from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
 from tolcontact.plausibility.measure_limits import measure_limits
+from tolcontact.plausibility.measured_reach import measured_reach
 from tolcontact.plausibility.pair_gaps import pair_clearances, pair_overlaps
 from tolcontact.plausibility.trial_draws import TrialDraws
 
@@ -20,6 +21,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "overlap": (pair_overlaps, body_overlaps),
     "gap": (pair_clearances,),
     "limits": (measure_limits,),
+    "reach": (measured_reach,),
 }
 
 

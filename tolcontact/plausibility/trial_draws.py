@@ -22,21 +22,25 @@ class TrialDraws:
     deviations   (draw, contributor)
     relative     (draw, pair, 12): X_RM of every pair
     measured     (draw, measure); a function of poses may return what is no number
+    poses        (draw, part, 12)
     """
 
     program: Program
     deviations: Float[Array, "n contributor"]
     relative: Float[Array, "n pair 12"]
     measured: Float[Array, "n measure"]
+    poses: Float[Array, "n part 12"]
 
     @classmethod
     def of(cls, program: Program) -> "TrialDraws":
         """Return the draws of a program, without those that have no finite pose."""
         deviations = program.draws(seed=TRIAL_SEED, start=0, stop=DRAWS)
-        observed = program.observe(poses=program.place(deviations=deviations)["poses"], deviations=deviations)
+        placed = program.place(deviations=deviations)["poses"]
+        observed = program.observe(poses=placed, deviations=deviations)
         relative = observed["relative"].reshape(len(deviations), len(program.nominal.pairs), pose.ENTRIES)
         finite = np.isfinite(relative).all(axis=(1, 2))
-        return cls(program, deviations[finite], relative[finite], observed["measured"][finite])
+        poses = placed.reshape(len(deviations), len(program.nominal.parts), pose.ENTRIES)
+        return cls(program, deviations[finite], relative[finite], observed["measured"][finite], poses[finite])
 
     def nominal_gaps(self, k: int) -> Float[Array, " point"]:
         """Return the gaps (point,) [mm] of pair k in the nominal assembly."""

@@ -6,12 +6,12 @@ import numpy as np
 
 from tolcontact.declaration.values import Vector
 from tolcontact.geometry.brep_face import (
-    FaceInFile,
     are_one_surface,
     describe_faces,
     faces_at,
     faces_on_surfaces,
 )
+from tolcontact.geometry.face_in_file import FaceInFile
 from tolcontact.geometry.files import STATED_FACES, Shape
 from tolcontact.geometry.interrupted_surfaces import FaceOnSurface
 

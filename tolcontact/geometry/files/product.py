@@ -13,7 +13,7 @@ import numpy as np
 import scipy.spatial
 import trimesh
 
-from tolcontact.errors import GeometryFault
+from tolcontact.errors import GeometryFault, nearest_name
 from tolcontact.geometry.analytic_surfaces import AnalyticSurface
 from tolcontact.geometry.edges import rim
 from tolcontact.geometry.files.bodies import Body, ShapePlace, StepShape, bodies, listed
@@ -71,7 +71,9 @@ class Product:
             else next((k for k, b in enumerate(self.bodies) if b.name == selector), -1)
         )
         if not 0 <= number < len(self.bodies):
-            raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {len(self.bodies)}: {listed(self.bodies)}')
+            nearest = nearest_name(selector, [body.name for body in self.bodies]) if isinstance(selector, str) else ""
+            bodies = f"{len(self.bodies)}: {listed(self.bodies)}{nearest}"
+            raise GeometryFault(f'"{self.path}" holds no body {selector!r}; it holds {bodies}')
         return self.bodies[number]
 
     @property

@@ -36,7 +36,7 @@ class Highlights {
       const depth = plane.distanceToPoint(middle);
       if (depth < 0) middle.addScaledVector(plane.normal, -depth);
     }
-    this.keep(part, this.viewer.label(text, middle.toArray()));
+    this.keep(part, labelOf(text, middle.toArray()));
   }
 
   add(part, runs, boundary, colour, level) {

@@ -38,8 +38,16 @@ from tolcontact.vocabulary import (
 HERE = Path(__file__).parent
 GENERATOR = '<meta name="generator" content="tolcontact">'
 SCRIPTS = {
-    "report": ("vendor/three.min.js", "vendor/plotly-basic.min.js", "data.js", "viewer.js", "charts.js", "report.js"),
-    "view": ("vendor/three.min.js", "data.js", "viewer.js", "features.js", "view.js"),
+    "report": (
+        "vendor/three.min.js",
+        "vendor/plotly-basic.min.js",
+        "data.js",
+        "labels.js",
+        "viewer.js",
+        "charts.js",
+        "report.js",
+    ),
+    "view": ("vendor/three.min.js", "data.js", "labels.js", "viewer.js", "features.js", "view.js"),
     "compare": ("vendor/plotly-basic.min.js", "data.js", "charts.js", "compare.js"),
 }
 RUN = ("solver", "resolution", "objective", "regularization", "eta", "active_set", "search", "method_from", "sampler", "seed",

@@ -29,11 +29,11 @@ function choose(viewer, features, part, hit) {
     return;
   }
   const known = data.scene.parts[viewer.parts.indexOf(part)], faces = unpacked(known.faceOfTriangle).values;
-  const number = faces[hit.faceIndex], face = known.described[number];
-  features.highlights.add(part, runsOf(faces, number), [], OF_FACE, 2);
+  const face = known.described[faces[hit.faceIndex]];
+  for (const number of face.whole) features.highlights.add(part, runsOf(faces, number - 1), [], OF_FACE, 2);
   viewer.draw();
   const ofFeatures = owners.flatMap(({ entry, member }) => ["", ...linesOf(entry.feature, member)]);
-  say([`part ${part.name}`, face.said, face.words, pointAt(known, part, hit), ...ofFeatures]);
+  say([`part ${part.name}`, face.said, face.words, ...face.groups, pointAt(known, part, hit), ...ofFeatures]);
 }
 
 /** Return the selector of the nearest corner of the triangle, or of the hit if no corner is near, in the frame of the part. */

@@ -116,7 +116,7 @@ class Viewer {
       end.setComponent(k, end.getComponent(k) + length);
       const line = new THREE.BufferGeometry().setFromPoints([start, end]);
       this.scene.add(new THREE.LineSegments(line, new THREE.LineBasicMaterial({ color: "#5b6470" })));
-      const label = this.label(name, end.toArray());
+      const label = labelOf(name, end.toArray());
       label.center.set(0.5, 0.5);
       this.scene.add(label);
     });
@@ -135,7 +135,7 @@ class Viewer {
       }
       const ends = measure.lines.flat().map((at) => new THREE.Vector3(...at));
       group.add(new THREE.LineSegments(new THREE.BufferGeometry().setFromPoints(ends), stroke));
-      group.add(this.label(measure.name, measure.at));
+      group.add(labelOf(measure.name, measure.at));
     }
     this.scene.add(group);
     return group;
@@ -182,28 +182,10 @@ class Viewer {
   /** The names of features, where they are; not shown at first: there may be many. */
   features() {
     const group = new THREE.Group();
-    for (const feature of this.data.features) group.add(this.label(feature.name, feature.at));
+    for (const feature of this.data.features) group.add(labelOf(feature.name, feature.at));
     group.visible = false;
     this.scene.add(group);
     return group;
-  }
-
-  label(text, at) {
-    const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
-    context.font = "28px sans-serif";
-    canvas.width = Math.ceil(context.measureText(text).width) + 16;
-    canvas.height = 40;
-    context.font = "28px sans-serif";
-    context.fillStyle = "rgba(255,255,255,0.85)";
-    context.fillRect(0, 0, canvas.width, canvas.height);
-    context.fillStyle = "#7c2d12";
-    context.fillText(text, 8, 29);
-    const material = new THREE.SpriteMaterial({ map: new THREE.CanvasTexture(canvas), depthTest: false, sizeAttenuation: false });
-    const sprite = new THREE.Sprite(material);
-    sprite.scale.set((0.032 * canvas.width) / canvas.height, 0.032, 1);
-    sprite.center.set(0, -0.4);
-    sprite.position.set(...at);
-    return sprite;
   }
 
   look() {
@@ -229,6 +211,7 @@ class Viewer {
   }
 
   draw() {
+    stackLabels(this.scene, this.camera);
     this.renderer.render(this.scene, this.camera);
   }
 

@@ -139,13 +139,19 @@ def _are_disjoint(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def _field_table(summary: xr.Dataset) -> FigureTable:
+    """Return the table of the displacement fields of the parts that move."""
     rows = []
-    for part in summary["part"].values:
+    for part in summary["part"].values[_is_moving(summary)]:
         for state in (RAW, CORRECTED):
             field = summary["field_extreme"].sel(part=part, state=state)
             extremes = [number(field.sel(extreme=extreme).values) for extreme in ("least", "largest")]
             rows.append([str(part), WORD_OF_STATE[state], *extremes])
     return FigureTable(["part", "", "smallest", "largest"], rows)
+
+
+def _is_moving(summary: xr.Dataset) -> np.ndarray:
+    """Return a mask (part,) of the parts with a displacement other than 0 in any state."""
+    return (summary["field_extreme"] != 0).any(("state", "extreme", "interval")).values  # type: ignore[no-any-return]
 
 
 def pair_columns(summary: xr.Dataset) -> list[str]:

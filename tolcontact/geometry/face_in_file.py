@@ -1,0 +1,67 @@
+"""The description of a face of a body. Lengths in mm."""
+
+from dataclasses import dataclass
+
+from tolcontact.declaration.values import Vector
+from tolcontact.errors import shown
+from tolcontact.readable import Readable
+
+GENERAL = "general"  # kind of a face without an analytic surface
+
+
+@dataclass(frozen=True, repr=False)
+class FaceInFile(Readable):
+    """A face of a body, in the body's own frame.
+
+    number      from 1 in the file's order, for `tc.Brep`
+    kind        plane, cylinder, cone, sphere, torus, or "general"
+    point       a point on the face [mm]
+    direction   outward normal of a plane; axis of a cylinder, cone or torus; otherwise None
+    radius      [mm] of a cylinder or sphere, or of the circle inside a torus; otherwise None
+    is_inner    whether a round face is hollow: its outside is towards its axis or centre
+    centre      the point of its axis beside `point`, or the centre of a sphere or torus [mm]; otherwise None
+    area        [mm2]; of its triangles, if the file states it by triangles
+    residual    [mm] largest distance of its vertices from a fitted surface; 0 if the file states the surface
+    name        its name in the file, which other faces may have too; empty if it has none
+    whole       numbers of the faces that make up its surface, and it; empty if it has the surface for itself
+    slot        numbers of the faces of the slot of which it is a wall; empty if there is none
+    pattern     numbers of the faces of the equal holes of which it is one, or a part of one; empty if there are none
+    copies      number of other faces in the same place, which have no numbers of their own
+    """
+
+    number: int
+    kind: str
+    point: Vector
+    direction: Vector | None
+    radius: float | None
+    is_inner: bool
+    area: float
+    centre: Vector | None = None
+    residual: float = 0.0
+    name: str = ""
+    whole: tuple[int, ...] = ()
+    slot: tuple[int, ...] = ()
+    pattern: tuple[int, ...] = ()
+    copies: int = 0
+
+    def __str__(self) -> str:
+        name = f'"{shown(self.name)}", ' if self.name else ""
+        entries = [f"{self.number}. {name}{'inner ' if self.is_inner else ''}{self.kind}"]
+        if self.radius is not None:
+            entries.append(f"radius {self.radius:.6g} mm")
+        if self.centre is not None:
+            entries.append(f"{'centre' if self.kind == 'sphere' else 'axis through'} {_numbers(self.centre)}")
+        if self.direction is not None:
+            entries.append(f"along {_numbers(self.direction)}")
+        if self.residual:
+            entries.append(f"fitted within {self.residual:.1g} mm")
+        if self.whole:
+            neighbours = ", ".join(str(number) for number in self.whole if number != self.number)
+            entries.append(f"one surface with {neighbours}")
+        if self.copies:
+            entries.append(f"stands {self.copies + 1} times in the file")
+        return ", ".join([*entries, f"{self.area:.4g} mm2", "at ({:.4g}, {:.4g}, {:.4g})".format(*self.point)])
+
+
+def _numbers(vector: Vector) -> str:
+    return "({:.7g}, {:.7g}, {:.7g})".format(*(round(c, 6) + 0.0 for c in vector))
