@@ -15,11 +15,11 @@ from tests import cases
 from tests.helpers import nightly, recompiled
 from tolcontact.code_cache import cache_folder
 from tolcontact.compilation import contact_qp
-from tolcontact.compilation.contact_qp import is_convex
 from tolcontact.compilation.functions import InterpretedFunction
 from tolcontact.compilation.functions.named import MIN_COMPILED_CALLS
 from tolcontact.compilation.functions.native import OPERATIONS, NativeFunction, UnknownInstructionError
 from tolcontact.compilation.plugins import plugin
+from tolcontact.compilation.quadratic_terms import is_convex
 from tolcontact.contact import kernel
 from tolcontact.contact.scan import PairScan, cluster_labels, pair_scan
 from tolcontact.discretization import Offsets, discretize

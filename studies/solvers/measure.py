@@ -92,7 +92,7 @@ def problems(assembly: tc.Assembly, realizations: int) -> list[Problem]:
         contact_qp.standing_points = kept  # type: ignore[attr-defined, method-assign]
         contact_solver.InterpretedFunction.__call__ = solve  # type: ignore[attr-defined, method-assign]
     functions = program.groups[0].qp
-    h, a = functions.assemble.sparsity_out("h"), functions.assemble.sparsity_out("a")
+    h, a = functions.sparsity("h"), functions.sparsity("a")
     for one in found:
         one["H"], one["A"] = ca.DM(h, one["h"]).full(), ca.DM(a, one["a"]).full()
         one["low"] = np.r_[np.full(h.size1() - functions.slacks, -np.inf), np.zeros(functions.slacks)]

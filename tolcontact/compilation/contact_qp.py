@@ -10,59 +10,42 @@ objective at the present poses, is zero in the raw state but for forces; h are t
 objective holds them."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from tolcontact.compilation.conditioning import conditioned
-from tolcontact.compilation.contact_rows import Rows, contact_rows, standing_points
+from tolcontact.compilation.contact_rows import contact_rows, row_points, standing_points
+from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import outcome
 from tolcontact.compilation.plugins import Plugin, solver
+from tolcontact.compilation.quadratic_terms import quadratic_terms
 from tolcontact.discretization import Nominal
-from tolcontact.mechanics.correction import FREEDOMS, Motion, increments, linear, published, quadratic, rigid
+from tolcontact.mechanics.correction import FREEDOMS, linear, published, rigid
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.gap import GapMap
 from tolcontact.mechanics.groups import Group, curved_pairs
-from tolcontact.mechanics.objective import Energy, energy, proximity
+from tolcontact.mechanics.objective import energy
 from tolcontact.mechanics.placement import misfit
-from tolcontact.mechanics.pose import ENTRIES, Pose, poses_of
-from tolcontact.mechanics.setting import Setting
+from tolcontact.mechanics.pose import ENTRIES, poses_of
+from tolcontact.mechanics.setting import Setting, face_heights, face_poses
 from tolcontact.method import Method
-
-
-def with_curvature(
-    setting: Setting, goal: Energy, rows: Rows, poses: Sequence[Pose], Q: ca.SX, pull: ca.SX, inputs: Mapping[str, ca.SX]
-) -> tuple[ca.SX, ca.SX]:
-    """Return Q and its linear term, if `newton` is 1 with the curvature of objective and gaps at `poses`, to second order in z.
-
-    Curvature counts only while Q stays convex. A penalty holds the rows that carry. It does not change the answer, and restores
-    convexity in most cases. The check covers the freedoms of each mover, not those of several movers together.
-    """
-    reactions = inputs["reactions"]
-    curvature = _lagrangian_hessian(setting, poses, rows.bends / goal.scale) + (rows.wrap - rows.bow) / goal.scale - Q
-    hold = (1 + 2 * ca.sum1(reactions) / goal.scale / setting.group.length) * ca.if_else(reactions > 0, rows.filled, 0)
-    curvature += rows.slopes.T @ ca.diag(hold) @ rows.slopes
-    counts = ca.logic_and(inputs["newton"], is_convex(Q + curvature))
-    return Q + ca.if_else(counts, curvature, 0), pull + ca.if_else(counts, rows.slopes.T @ (hold * rows.gaps), 0)
-
-
-def _lagrangian_hessian(setting: Setting, poses: Sequence[Pose], bends: ca.SX) -> ca.SX:
-    """Return the Hessian, at z = 0, of the Lagrangian: the objective less the reactions' work on the gaps (linear in X_RM)."""
-    work = ca.dot(bends, ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))))
-    return setting.curvature(energy(setting, poses).value - work)
-
-
-def is_convex(Q: ca.SX) -> ca.SX:
-    """Return 1 if the diagonal blocks of Q are positive definite, else 0, also for a NaN among the pivots."""
-    blocks = (ca.densify(Q[k : k + FREEDOMS, k : k + FREEDOMS]) for k in range(0, Q.size1(), FREEDOMS))
-    pivots = ca.vertcat(*(ca.diag(ca.chol(block)) for block in blocks))
-    return ca.mmin(ca.if_else(pivots > 0, 1, 0))
-
 
 Standing = Sequence[np.ndarray | int]  # see ContactQP
 ENERGY_INPUTS = ("poses", "raw", "moments", "deviations")
+MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
+
+
+class Evaluators(NamedTuple):
+    """The functions of a QP for many realizations: of arrays by name, (realization, entry), to such arrays."""
+
+    assemble: Callable[..., dict[str, np.ndarray]]
+    finish: Callable[..., dict[str, np.ndarray]]
+    energy: Callable[..., dict[str, np.ndarray]]
+    relate: Callable[..., dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,10 +73,30 @@ class ContactQP:
         return solver(plugin, self.assemble.sparsity_out("h"), self.assemble.sparsity_out("a"))
 
     @property
+    def max_batch(self) -> int:
+        """The number of realizations that are solved together."""
+        return MAX_BATCH
+
+    @property
+    def evaluators(self) -> Evaluators:
+        """The functions for many realizations, which threads may share."""
+        dense = (NamedFunction.dense(function) for function in (self.energy, self.relate))
+        return Evaluators(NamedFunction(self.assemble), NamedFunction(self.finish), *dense)
+
+    def sparsity(self, name: str) -> ca.Sparsity:
+        """Return the sparsity of an output of `assemble`."""
+        return self.assemble.sparsity_out(name)
+
+    @property
     def spans(self) -> list[slice]:
         """The rows of each pair among those of the group."""
-        ends = np.cumsum([0, *(_row_count(points) for points in self.standing)])
-        return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
+        return row_spans(self.standing)
+
+
+def row_spans(standing: Standing) -> list[slice]:
+    """Return the rows of each pair among those of a group."""
+    ends = np.cumsum([0, *(_row_count(points) for points in standing)])
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(ends)]
 
 
 def _row_count(points: np.ndarray | int) -> int:
@@ -121,27 +124,23 @@ def contact_qp(
     """
     standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
     inputs = _inputs(nominal, group, standing)
+    pairs = [nominal.pairs[index] for index in group.pairs]
     setting = Setting(
         nominal, group, method, raw=poses_of(inputs["raw"]), z=ca.SX.sym("z", FREEDOMS * len(group.free)),
         **{name: inputs[name] for name in ("moments", "deviations", "firmness")},
+        faces=[face_poses(pair, inputs["deviations"]) for pair in pairs],
+        heights=[face_heights(pair, inputs["deviations"]) for pair in pairs],
     )  # fmt: skip
-    current = poses_of(inputs["poses"])
-    centres = [current[k].apply(ca.DM(group.mobilities[k].centre)) for k in map(group.position, group.free)]
-    motion = Motion(group.mobilities, current, increments(setting.z, group.length, centres))
-    moved = motion.by(linear)
-    rows = contact_rows(setting, standing, current, moved, inputs)
-    goal = energy(setting, moved)
-    Q, pull = (setting.at_rest(expression) for expression in ca.hessian(goal.value, setting.z))
-    if method.is_exact:
-        Q += rows.wrap / goal.scale
-        Q, pull = with_curvature(setting, goal, rows, motion.by(quadratic), Q, pull, inputs)
-        if method.is_iterated or curved_pairs(nominal, group):
-            Q += inputs["caution"] * setting.curvature(proximity(setting, current, moved)) / group.length
+    motion = setting.motion(poses_of(inputs["poses"]))
+    current, moved, reactions = motion.poses, motion.by(linear), inputs["reactions"]
+    rows = contact_rows(setting, row_points(setting, standing, inputs), current, moved, reactions)
+    projects = method.is_iterated or bool(curved_pairs(nominal, group))
+    terms = quadratic_terms(setting, rows, motion, reactions, ca.sum1(reactions), projects=projects)
     exact = misfit(setting, moved, linear=True) if method.minimizes.presses else ca.SX(0, 1)
-    problem = conditioned(setting, Q, pull, rows, exact)
+    problem = conditioned(setting, *terms.summed(inputs["newton"], inputs["caution"]), rows, exact)
     poses = motion.by(rigid if method.is_exact else published)
-    solution_symbols, results = outcome(setting, goal, rows, poses, problem, inputs["stride"])
-    pure_energy = ca.substitute(setting.at_rest(goal.value), setting.firmness, 1)
+    solution_symbols, results = outcome(setting, terms.scale, rows, poses, problem, inputs["stride"])
+    pure_energy = ca.substitute(energy(setting, current).value, setting.firmness, 1)
     return ContactQP(
         assemble=_function("assemble", inputs, problem),
         plugin=plugin,

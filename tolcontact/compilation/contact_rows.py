@@ -3,6 +3,7 @@
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -10,13 +11,24 @@ import numpy as np
 from tolcontact.discretization import ContactPoints
 from tolcontact.mechanics.gap import GapMap, gap
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
-from tolcontact.mechanics.round_gap import heights, round_gaps
+from tolcontact.mechanics.round_gap import round_gaps
 from tolcontact.mechanics.setting import Setting
 from tolcontact.method import Method
 
 SLOTS, LEAST_SLOTS = 12, 8  # of a pair: at most, and at least; six rows can carry
 
 Point = tuple[ca.SX, ca.SX, ca.SX, ca.SX]  # P^m, P^r, n^r, and 1 if it has a row
+
+
+class RowPoints(NamedTuple):
+    """The points of a pair that have rows, unless it is round.
+
+    `bend` (12, 1) is that of the points in the slots of the previous step; None for points that always have a row, whose
+    previous reactions are known.
+    """
+
+    points: Sequence[Point]
+    bend: ca.SX | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +70,15 @@ def standing_points(pair: ContactPoints, gaps: GapMap | None, method: Method) ->
 
 def contact_rows(
     setting: Setting,
-    standing: Sequence[np.ndarray | int],
+    points_of_pairs: Sequence[RowPoints],
     start_poses: Sequence[Pose],
     end_poses: Sequence[Pose],
-    inputs: Mapping[str, ca.SX],
+    reactions: ca.SX,
 ) -> Rows:
-    """Return the rows about `start_poses`, which the increments change to `end_poses`; see contact_qp for `inputs`."""
-    slots, slot_bends = _slots(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
+    """Return the rows about `start_poses`, which the increments change to `end_poses`.
+
+    `reactions` (row, 1) are those of the points in the previous step, see contact_qp.
+    """
     slopes: list[ca.SX] = []
     pairs: list[int] = []
     gaps, filled, relative, bends = ([] for _ in range(4))
@@ -72,35 +86,32 @@ def contact_rows(
     for k, (start, end) in enumerate(zip(setting.relative(start_poses), setting.relative(end_poses), strict=True)):
         by_z = setting.slope(end.vector())
         relative.append(start.vector() + by_z @ setting.z)
-        points, pair = standing[k], setting.nominal.pairs[setting.group.pairs[k]]
+        (points, bend), pair = points_of_pairs[k], setting.nominal.pairs[setting.group.pairs[k]]
         if pair.round is not None:
-            reactions = inputs["reactions"][len(pairs) : len(pairs) + len(pair.round)]
+            of_pair = reactions[len(pairs) : len(pairs) + len(pair.round)]
             point_gaps, by_entries, second_derivative, closing, _ = round_gaps(pair.round)(
-                start.vector(), heights(pair, setting.deviations), reactions
+                start.vector(), setting.heights[k], of_pair
             )
             slopes.append(by_entries @ by_z)
             gaps.append(point_gaps)
             filled.append(ca.SX.ones(len(pair.round)))
             pairs += [k] * len(pair.round)
-            bends.append(by_entries.T @ reactions)
+            bends.append(by_entries.T @ of_pair)
             bow += by_z.T @ second_derivative @ by_z
             wrap += by_z.T @ closing @ by_z
             continue
-        if isinstance(points, int):
-            row_points, bend = list(itertools.islice(slots, points)), next(slot_bends)
-        else:
-            row_points, bend = _standing_rows(pair, points, setting.deviations), ca.SX.zeros(ENTRIES)
-        for P_m, P_r, n_r, is_filled in row_points:
+        total = ca.SX.zeros(ENTRIES) if bend is None else bend
+        for P_m, P_r, n_r, is_filled in points:
             X = ca.SX.sym("X_RM", ENTRIES)
             g = gap(pose_of(X), P_m, P_r, n_r)
             gradient = ca.substitute(ca.jacobian(g, X), X, start.vector())
-            if not isinstance(points, int):
-                bend += gradient.T * inputs["reactions"][len(pairs)]
+            if bend is None:
+                total += gradient.T * reactions[len(pairs)]
             slopes.append(gradient @ by_z)
             gaps.append(ca.substitute(g, X, start.vector()))
             filled.append(is_filled)
             pairs.append(k)
-        bends.append(bend)
+        bends.append(total)
     return Rows(
         slopes=ca.vertcat(*slopes),
         gaps=ca.vertcat(*gaps),
@@ -113,7 +124,21 @@ def contact_rows(
     )
 
 
-def _slots(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
+def row_points(setting: Setting, standing: Sequence[np.ndarray | int], inputs: Mapping[str, ca.SX]) -> list[RowPoints]:
+    """Return the points of the group's pairs that have rows, see contact_qp for `standing` and `inputs`."""
+    slots, bends = slot_points(inputs), iter(ca.vertsplit(inputs["bend"], ENTRIES) if inputs["bend"].numel() else [])
+    points_of_pairs = []
+    for index, points in zip(setting.group.pairs, standing, strict=True):
+        pair = setting.nominal.pairs[index]
+        if isinstance(points, int):
+            points_of_pairs.append(RowPoints(list(itertools.islice(slots, points)), next(bends)))
+        else:
+            rows = [] if pair.round is not None else _standing_rows(pair, points, setting.deviations)
+            points_of_pairs.append(RowPoints(rows))
+    return points_of_pairs
+
+
+def slot_points(inputs: Mapping[str, ca.SX]) -> Iterator[Point]:
     """Return the points in the slots."""
     columns = (ca.horzsplit(values) for values in (inputs["P_m"], inputs["P_r"], inputs["n_r"], inputs["filled"].T))
     return iter(zip(*columns, strict=True))

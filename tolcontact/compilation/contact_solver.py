@@ -7,7 +7,8 @@ import numpy as np
 
 from tolcontact.arrays import Array, Float
 from tolcontact.compilation.contact_qp import ContactQP
-from tolcontact.compilation.functions import InterpretedFunction, NamedFunction, flat
+from tolcontact.compilation.elements import ElementQP
+from tolcontact.compilation.functions import InterpretedFunction, flat
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
@@ -69,7 +70,6 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
 
 
 QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
-MAX_BATCH = 1024  # realizations whose QPs fit into a processor's cache
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
 
@@ -79,10 +79,9 @@ Arrays = dict[str, Float[Array, "_ _"]]  # by name, (realization, entry)
 class ContactSolver:
     """A solver of the QPs of a ContactQP. Threads must not share it."""
 
-    def __init__(self, qp: ContactQP) -> None:
+    def __init__(self, qp: ContactQP | ElementQP) -> None:
         self._qp = qp
-        self._assemble, self._finish = NamedFunction(qp.assemble), NamedFunction(qp.finish)
-        self._energy, self._relate = (NamedFunction.dense(function) for function in (qp.energy, qp.relate))
+        self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
         self.start_over()
 
@@ -130,7 +129,8 @@ class ContactSolver:
 
     def _solved(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
         count = len(inputs["poses"])
-        parts = [self._solved_batch(solver, _of(inputs, slice(k, k + MAX_BATCH))) for k in range(0, max(count, 1), MAX_BATCH)]
+        size = self._qp.max_batch
+        parts = [self._solved_batch(solver, _of(inputs, slice(k, k + size))) for k in range(0, max(count, 1), size)]
         return parts[0] if len(parts) == 1 else {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
     def _solved_batch(self, solver: "_PluginSolver", inputs: Arrays) -> Arrays:
@@ -161,7 +161,7 @@ class ContactSolver:
 
     def _dense(self, name: str, stored: np.ndarray) -> np.ndarray:
         """Return all entries of an output of `assemble`: (realization, row, column), or (realization, row) of a vector."""
-        sparsity = self._qp.assemble.sparsity_out(name)
+        sparsity = self._qp.sparsity(name)
         columns = np.zeros((len(stored), sparsity.numel()))
         columns[:, sparsity.find()] = stored
         if sparsity.size2() == 1:
@@ -172,7 +172,7 @@ class ContactSolver:
 class _PluginSolver:
     """A plugin's solver with its own memory."""
 
-    def __init__(self, qp: ContactQP, plugin: Plugin) -> None:
+    def __init__(self, qp: ContactQP | ElementQP, plugin: Plugin) -> None:
         self._remembers = plugin.remembers
         with CONSTRUCTION_LOCK, quiet():
             solver = qp.solver(plugin)

@@ -4,21 +4,20 @@ from collections.abc import Mapping, Sequence
 
 import casadi as ca
 
-from tolcontact.compilation.conditioning import SLACK, whitening
+from tolcontact.compilation.conditioning import SLACK
 from tolcontact.compilation.contact_rows import Rows
 from tolcontact.mechanics.correction import FREEDOMS
-from tolcontact.mechanics.objective import Energy
 from tolcontact.mechanics.placement import misfit
-from tolcontact.mechanics.pose import Pose
+from tolcontact.mechanics.pose import Number, Pose
 from tolcontact.mechanics.setting import Setting
 
-QP_ENTRIES = ("h", "g", "a", "lba", "u", "length")  # the QP as it was solved, whose residuals are computed
+QP_ENTRIES = ("h", "g", "a", "lba", "to_z", "length")  # the QP as it was solved, whose residuals are computed
 SOLUTION = ("x", "lam_a", "lam_x")
 
 
 def outcome(
     setting: Setting,
-    goal: Energy,
+    scale: ca.SX,
     rows: Rows,
     poses: Sequence[Pose],
     problem: Mapping[str, ca.SX],
@@ -36,14 +35,13 @@ def outcome(
     x, lam_a, lam_x, length = symbols["x"], symbols["lam_a"], symbols["lam_x"], symbols["length"]
     y, s, lam_s = x[: z.numel()], x[z.numel() :], lam_x[z.numel() :]
     excess = symbols["a"] @ x - symbols["lba"]
-    natural = ca.vertcat(ca.fmin(excess[:count], -lam_a[:count]), ca.fmin(s, -lam_s), ca.fmin(excess[:count] * length, 0))
+    natural = ca.vertcat(row_residuals(excess[:count], lam_a[:count], length), ca.fmin(s, -lam_s))
     stationarity = ca.norm_inf(symbols["h"] @ x + symbols["g"] + symbols["a"].T @ lam_a + lam_x)
     residuals = [stationarity, ca.norm_inf(natural), *([ca.norm_inf(excess[count:])] if equations else [])]
-    step = whitening(symbols["u"]) @ y
+    step = symbols["to_z"] @ y
     taken_step = step
     if setting.method.is_exact:
-        turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
-        taken_step = step * ca.fmin(1, stride * group.length / ca.norm_inf(turns))
+        taken_step = step * step_share(step, stride, group.length)
     end_values = {
         "corrected": ca.vertcat(*(pose.vector() for pose in poses)),
         "relative": ca.vertcat(*(X_RM.vector() for X_RM in setting.relative(poses))),
@@ -51,10 +49,26 @@ def outcome(
     }
     results = {
         "linearized": ca.substitute(rows.relative, z, step),
-        "multipliers": -lam_a[:count] / length * rows.filled * goal.scale,
+        "multipliers": reactions(lam_a[:count], length, rows.filled, scale),
         "residual": ca.mmax(ca.vertcat(*residuals)),
         "slack": SLACK * s,
         "step": ca.vertcat(ca.norm_inf(step), ca.norm_inf(y)),
         **{name: ca.substitute(value, z, taken_step) for name, value in end_values.items()},
     }
     return symbols, {name: ca.densify(value) for name, value in results.items()}
+
+
+def row_residuals(excess: ca.SX, lam: ca.SX, length: ca.SX) -> ca.SX:
+    """Return what is left of min(row, multiplier) = 0, and the depth of gaps that remain negative, of rows (row, 1)."""
+    return ca.vertcat(ca.fmin(excess, -lam), ca.fmin(excess * length, 0))
+
+
+def reactions(lam: ca.SX, length: ca.SX, filled: ca.SX, scale: ca.SX) -> ca.SX:
+    """Return the reactions of rows (row, 1) in the units of the objective."""
+    return -lam / length * filled * scale
+
+
+def step_share(step: ca.SX, stride: ca.SX, length: Number) -> ca.SX:
+    """Return the share of a step (z, 1) [mm] in which no mover turns by more than `stride` [rad]."""
+    turns = ca.vertcat(*(step[k + 3 : k + FREEDOMS] for k in range(0, step.numel(), FREEDOMS)))
+    return ca.fmin(1, stride * length / ca.norm_inf(turns))

@@ -12,6 +12,7 @@ from tolcontact.compilation.bounded_pairs import TRIAL_SEED, TRIALS, Trial, boun
 from tolcontact.compilation.contact_qp import ContactQP, contact_qp
 from tolcontact.compilation.contact_rows import LEAST_SLOTS, SLOTS, standing_points
 from tolcontact.compilation.contact_solver import ContactSolver
+from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
@@ -26,8 +27,8 @@ from tolcontact.mechanics.measures import measured, record
 from tolcontact.mechanics.placement import raw_poses
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
-from tolcontact.mechanics.round_gap import heights, round_gaps
-from tolcontact.mechanics.setting import face_poses, facing_pose
+from tolcontact.mechanics.round_gap import round_gaps
+from tolcontact.mechanics.setting import face_heights, face_poses, facing_pose
 from tolcontact.method import Method
 from tolcontact.poses import AT_REST
 from tolcontact.readable import Pictured
@@ -41,7 +42,7 @@ class ContactGroup:
     """A group of coupled parts and its QP (see contact_qp)."""
 
     group: Group
-    qp: ContactQP
+    qp: ContactQP | ElementQP
     solve: ContactSolver
 
 
@@ -164,7 +165,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
 
 def _round_gap_function(pair: ContactPoints, points: RoundPoints, deviations: ca.SX) -> ca.Function:
     X_RM = ca.SX.sym("X_RM", ENTRIES)
-    gaps, *_, distances = round_gaps(points)(X_RM, heights(pair, deviations), ca.SX.zeros(len(points)))
+    gaps, *_, distances = round_gaps(points)(X_RM, face_heights(pair, deviations), ca.SX.zeros(len(points)))
     return ca.Function("round_gaps", [X_RM, deviations], [gaps, distances], ["X_RM", "deviations"], ["gaps", "distances"])
 
 
@@ -204,7 +205,8 @@ def _contact_group(
         min(max(trials[k].places, LEAST_SLOTS), SLOTS) if k in meetings else standing_points(nominal.pairs[k], gaps[k], method)
         for k in group.pairs
     ]
-    qp = contact_qp(nominal, group, gaps, method, plugin, standing if meetings else ())
+    build = ElementQP if has_elements(group, method) else contact_qp
+    qp = build(nominal, group, gaps, method, plugin, standing)
     return ContactGroup(group, qp, ContactSolver(qp))
 
 

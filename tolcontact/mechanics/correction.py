@@ -4,9 +4,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
-import numpy as np
 
-from tolcontact.mechanics.pose import Pose, rotation
+from tolcontact.mechanics.pose import Number, Pose, Vector, constant, rotation
 
 FREEDOMS = 6
 
@@ -21,7 +20,7 @@ class Mobility:
     """
 
     movers: tuple[int, ...]
-    centre: np.ndarray
+    centre: Vector
     is_reference: bool
 
 
@@ -55,7 +54,7 @@ class Motion:
         return [update(part, X, self.movers) for part, X in zip(self.mobilities, self.poses, strict=True)]
 
 
-def increments(scaled: ca.SX, length: float, centres: Sequence[ca.SX]) -> list[Twist]:
+def increments(scaled: ca.SX, length: Number, centres: Sequence[ca.SX]) -> list[Twist]:
     """Return the increments of the movers from the QP's variables, all of them in mm: (dt, length * w) for each mover."""
     return [Twist(c, z[:3], z[3:] / length) for c, z in zip(centres, ca.vertsplit(scaled, FREEDOMS), strict=True)]
 
@@ -95,7 +94,7 @@ def published(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Pose:
 
 def _total(part: Mobility, X: Pose, movers: Sequence[Twist]) -> Twist:
     """Return the sum of the twists of all movers of a part, about the part's own centre."""
-    c = X.apply(ca.DM(part.centre))
+    c = X.apply(constant(part.centre))
     d, W = ca.SX.zeros(3), ca.SX.zeros(3)
     for mover in part.movers:
         d, W = d + movers[mover].at(c), W + movers[mover].W

@@ -7,7 +7,7 @@ sum (P - c)(P - c)'. They suffice for every weighting and any number of points.
 import casadi as ca
 import numpy as np
 
-from tolcontact.mechanics.pose import Pose
+from tolcontact.mechanics.pose import Pose, Vector, constant
 
 MOMENTS = 10
 _UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
@@ -19,7 +19,7 @@ def moment_table(P: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return np.vstack([np.ones(len(P)), p, *(p[i] * p[j] for i, j in _UPPER)])
 
 
-def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Pose) -> ca.SX:
+def displacement_energy(moments: ca.SX, centre: Vector, start: Pose, end: Pose) -> ca.SX:
     """Return 1/2 sum |x_end - x_start|^2 [mm^2] over the points with the given `moments` (10, 1); it is quadratic in `end`.
 
     It is x_end - x_start = a + D (P - c), where a is the displacement of the centre and D the difference of the rotations.
@@ -28,6 +28,6 @@ def displacement_energy(moments: ca.SX, centre: np.ndarray, start: Pose, end: Po
     second_moment = ca.SX.zeros(3, 3)
     for k, (i, j) in enumerate(_UPPER):
         second_moment[i, j] = second_moment[j, i] = moments[4 + k]
-    a = end.apply(ca.DM(centre)) - start.apply(ca.DM(centre))
+    a = end.apply(constant(centre)) - start.apply(constant(centre))
     D = end.R - start.R
     return count * ca.dot(a, a) / 2 + ca.dot(a, D @ first_moment) + ca.trace(D @ second_moment @ D.T) / 2

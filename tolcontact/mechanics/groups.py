@@ -9,30 +9,30 @@ from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
+from tolcontact.mechanics.pose import Number, Vector
 
 BALL_SHARE = 0.01  # of the group's length: radius of the ball that a point represents
 
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One side of a pair whose points can be displaced: its points, and the position of their part in the group."""
+    """One side of a pair whose points can be displaced: its points, and the position of their part in the group.
+
+    centre        (3,) [mm]: nominal point about which moments are taken
+    all_moments   (10,): the moments of all points as small balls, so that points on a line hold all rotations, too
+    """
 
     pair: int
     part: int
     points: np.ndarray
     weights: np.ndarray
-    centre: np.ndarray
+    centre: Vector
+    all_moments: Vector
 
     @property
     def table(self) -> np.ndarray:
         """The moments of each point, shape (moment, point), times its weight."""
-        return moment_table(self.points, self.centre) * self.weights
-
-    def ball_moments(self, radius: float) -> np.ndarray:
-        """Return the moments of all points as small balls, so that points on a line hold all rotations, too."""
-        moments = self.table.sum(axis=1)
-        moments[[4, 7, 9]] += self.weights.sum() * radius**2
-        return np.asarray(moments)
+        return moment_table(self.points, np.asarray(self.centre)) * self.weights
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,7 @@ class Group:
     mobilities       one per part of `parts`
     sides            sides of pairs that enter the objective, in the order of the Function's moments
     length           root mean square distance of the contact points from their centroid [mm]
+    count            number of points on all sides
     """
 
     parts: tuple[int, ...]
@@ -51,16 +52,12 @@ class Group:
     free: tuple[int, ...]
     mobilities: tuple[Mobility, ...]
     sides: tuple[Side, ...]
-    length: float
+    length: Number
+    count: Number
 
     def position(self, part: int) -> int:
         """Return the position of a part in `parts`."""
         return self.parts.index(part)
-
-    @property
-    def ball(self) -> float:
-        """Radius of the ball [mm] that a contact point represents in the regularization."""
-        return BALL_SHARE * self.length
 
 
 def curved_pairs(nominal: Nominal, group: Group) -> list[int]:
@@ -113,13 +110,15 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
     moving_points = np.vstack([pair.P_m for _, pair in members])
     centre = {part: np.vstack(points[part] or points[(chains[part] or free)[-1]]).mean(axis=0) for part in parts}
     references = {pair.reference for _, pair in members}
+    spread = float(np.sqrt(((moving_points - moving_points.mean(axis=0)) ** 2).sum(axis=1).mean()))
+    length = spread or float(nominal.parts[members[0][1].moving].mesh.scale)
+    ball = BALL_SHARE * length
     sides = [
-        Side(position, parts.index(part), P, pair.weights if weighs_areas else np.ones(len(P)), centre[part])
+        _side(position, parts.index(part), P, pair.weights if weighs_areas else np.ones(len(P)), centre[part], ball)
         for position, (_, pair) in enumerate(members)
         for part, P in ((pair.moving, pair.P_m), (pair.reference, pair.P_r))
         if part is not None and chains[part]
     ]
-    spread = float(np.sqrt(((moving_points - moving_points.mean(axis=0)) ** 2).sum(axis=1).mean()))
     return Group(
         parts=parts,
         pairs=tuple(index for index, _ in members),
@@ -128,5 +127,13 @@ def _group(nominal: Nominal, chains: Sequence[tuple[int, ...]], free: tuple[int,
             Mobility(tuple(free.index(mover) for mover in chains[part]), centre[part], part in references) for part in parts
         ),
         sides=tuple(sides),
-        length=spread or float(nominal.parts[members[0][1].moving].mesh.scale),
+        length=length,
+        count=sum(len(side.points) for side in sides),
     )
+
+
+def _side(pair: int, part: int, points: np.ndarray, weights: np.ndarray, centre: np.ndarray, radius: float) -> Side:
+    """Return a side whose points are balls of a radius [mm] in the regularization."""
+    all_moments = (moment_table(points, centre) * weights).sum(axis=1)
+    all_moments[[4, 7, 9]] += weights.sum() * radius**2
+    return Side(pair, part, points, weights, centre, all_moments)

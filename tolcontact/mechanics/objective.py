@@ -40,7 +40,12 @@ def energy(setting: Setting, poses: Sequence[Pose]) -> Energy:
 def proximity(setting: Setting, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
     """Return half the mean squared displacement of all contact points [mm^2] between two poses."""
     sides = setting.group.sides
-    return sum((_side_energy(setting, side, start, end) for side in sides), ca.SX(0)) / _count(setting)
+    return sum((_side_energy(setting, side, start, end) for side in sides), ca.SX(0)) / setting.group.count
+
+
+def points_scale(moments: ca.SX) -> ca.SX:
+    """Return the number of the points that count, of their moments (10, side): at least 1."""
+    return ca.fmax(ca.sum2(moments[0, :]), 1)
 
 
 def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
@@ -48,8 +53,8 @@ def _points(setting: Setting, poses: Sequence[Pose]) -> Energy:
     value = setting.firmness * _regularization(setting, poses)
     for k, side in enumerate(setting.group.sides):
         value += displacement_energy(setting.moments[:, k], side.centre, setting.raw[side.part], poses[side.part])
-    weight = ca.fmax(ca.sum2(setting.moments[0, :]), 1)
-    return Energy(value / weight, weight)
+    scale = points_scale(setting.moments) if setting.scale is None else setting.scale
+    return Energy(value / scale, scale)
 
 
 def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
@@ -63,7 +68,7 @@ def _springs(setting: Setting, poses: Sequence[Pose]) -> Energy:
             value += float(k) * e**2 / 2
             total += float(k)
     total = total or 1.0
-    return Energy(value / total + regularization / _count(setting), ca.SX(total))
+    return Energy(value / total + regularization / setting.group.count, ca.SX(total))
 
 
 def _forces(setting: Setting, poses: Sequence[Pose]) -> Energy:
@@ -115,14 +120,10 @@ _REGULARIZATIONS = {"points": _point_energies, "identity": _identity_energies}
 def _side_energy(setting: Setting, side: Side, start: Sequence[Pose], end: Sequence[Pose]) -> ca.SX:
     """Return the displacement energy of all points of a side, relative to the free part that it is located on, if any."""
     group, part = setting.group, side.part
-    moments = ca.SX(side.ball_moments(group.ball))
+    moments = ca.SX(side.all_moments)
     supporting = group.mobilities[part].movers[:-1]
     if not supporting:
         return displacement_energy(moments, side.centre, start[part], end[part])
     support = group.position(group.free[supporting[-1]])
     end_relative = setting.linear(relative(end[part], end[support]))
     return displacement_energy(moments, side.centre, relative(start[part], start[support]), end_relative)
-
-
-def _count(setting: Setting) -> int:
-    return sum(len(side.points) for side in setting.group.sides)

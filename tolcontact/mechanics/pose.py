@@ -6,10 +6,14 @@ As a vector a pose has 12 entries: R row by row, then t [mm].
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from tolcontact import poses
 
 ENTRIES = poses.ENTRIES
+
+Number = float | ca.SX  # a number of the model, or its symbol in a function that serves many pairs
+Vector = np.ndarray | ca.SX
 
 # Keeps sqrt differentiable at rest; its square root is far below any angle, and the series below stay exact with it.
 _TINY = 1e-300
@@ -32,6 +36,11 @@ class Pose(NamedTuple):
     def vector(self) -> ca.SX:
         """Return the 12 entries."""
         return ca.vertcat(ca.vec(self.R.T), self.t)
+
+
+def constant(values: Vector) -> ca.SX | ca.DM:
+    """Return numbers (n,) as a CasADi matrix (n, 1); symbols stay as they are."""
+    return values if isinstance(values, ca.SX) else ca.DM(values)
 
 
 def pose_of(vector: ca.SX) -> Pose:

@@ -10,10 +10,9 @@ hollow cylinder the nearest one counts.
 import casadi as ca
 import numpy as np
 
-from tolcontact.discretization import ContactPoints, RoundPoint, RoundPoints
+from tolcontact.discretization import RoundPoint, RoundPoints
 from tolcontact.geometry.analytic_surfaces import Cone, Sphere, Torus
 from tolcontact.mechanics.pose import ENTRIES, Pose, pose_of
-from tolcontact.mechanics.setting import face_height
 
 NEWTON_STEPS = 6  # from the tangent that is nearest to an upright shaft
 MAX_TURN = 0.5  # rad: largest Newton step
@@ -80,11 +79,6 @@ def _tangent_or_nearest(fixed: Terms, nearest: Terms) -> Terms:
     is_alike = ca.sumsqr(fixed[1] - nearest[1]) < TANGENT_TOLERANCE**2 * ca.sumsqr(fixed[1])
     gap, slope, bend, closing = (ca.if_else(is_alike, b, a) for a, b in zip(fixed, nearest, strict=True))
     return gap, slope, bend, closing
-
-
-def heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
-    """Return the growth (2) [mm] of the moving and the reference face of a pair."""
-    return ca.vertcat(*(face_height(face, deviations) for face in pair.deviating))
 
 
 def _has_tangents(point: RoundPoint) -> bool:

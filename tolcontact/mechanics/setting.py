@@ -5,14 +5,14 @@ A small rigid deviation enters as the pose of the face. It adds no rows: contact
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import casadi as ca
 
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.features import FaceDeviation
+from tolcontact.mechanics.correction import Motion, increments
 from tolcontact.mechanics.groups import Group
-from tolcontact.mechanics.pose import Pose, pose_of, relative, rotation
+from tolcontact.mechanics.pose import Pose, constant, pose_of, relative, rotation
 from tolcontact.method import Method
 
 
@@ -38,6 +38,11 @@ def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pos
     return face_pose(moving, deviations), face_pose(reference, deviations)
 
 
+def face_heights(pair: ContactPoints, deviations: ca.SX) -> ca.SX:
+    """Return the growth (2, 1) [mm] of the moving and the reference face of a pair."""
+    return ca.vertcat(*(face_height(face, deviations) for face in pair.deviating))
+
+
 def facing_pose(faces: tuple[Pose | None, Pose | None], X_WM: Pose, X_WR: Pose | None) -> Pose:
     """Return X_RM of a pair: the pose of its moving face in the frame of its reference face.
 
@@ -59,6 +64,9 @@ class Setting:
     deviations   (contributor, 1) of the model
     firmness     factor of the regularization: 1 in the last step
     z            (6 * mover, 1) [mm]: the increments, about which everything is linearized
+    faces        poses of the moving and the reference face of each pair of the group in their parts
+    heights      (2, 1) [mm] by which the moving and the reference face of each pair of the group have grown
+    scale        of the objective, if the group is a part of the one whose objective it is; see tolcontact.mechanics.objective
     """
 
     nominal: Nominal
@@ -69,6 +77,9 @@ class Setting:
     deviations: ca.SX
     firmness: ca.SX
     z: ca.SX
+    faces: Sequence[tuple[Pose | None, Pose | None]]
+    heights: Sequence[ca.SX]
+    scale: ca.SX | None = None
 
     def at_rest(self, expression: ca.SX) -> ca.SX:
         """Return the expression at z = 0."""
@@ -87,16 +98,17 @@ class Setting:
         entries = X.vector()
         return pose_of(self.at_rest(entries) + self.slope(entries) @ self.z)
 
+    def motion(self, poses: Sequence[Pose]) -> Motion:
+        """Return the motion of the group about poses of its parts, by the increments z."""
+        mobilities = self.group.mobilities
+        centres = [poses[k].apply(constant(mobilities[k].centre)) for k in map(self.group.position, self.group.free)]
+        return Motion(mobilities, poses, increments(self.z, self.group.length, centres))
+
     def relative(self, poses: Sequence[Pose]) -> list[Pose]:
         """Return X_RM of the faces of each pair of the group."""
         relative_poses = []
-        for index, faces in zip(self.group.pairs, self._faces, strict=True):
+        for index, faces in zip(self.group.pairs, self.faces, strict=True):
             pair = self.nominal.pairs[index]
             reference = None if pair.reference is None else poses[self.group.position(pair.reference)]
             relative_poses.append(facing_pose(faces, poses[self.group.position(pair.moving)], reference))
         return relative_poses
-
-    @cached_property
-    def _faces(self) -> list[tuple[Pose | None, Pose | None]]:
-        """Poses of the faces of the group's pairs in their parts, as shared expressions."""
-        return [face_poses(self.nominal.pairs[index], self.deviations) for index in self.group.pairs]

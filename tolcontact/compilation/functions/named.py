@@ -168,6 +168,11 @@ class NamedFunction:
         self._names, self._results = function.name_in(), function.name_out()
         self._evaluate = AdaptiveFunction(function)
 
+    @property
+    def names(self) -> list[str]:
+        """The names of its inputs."""
+        return self._names
+
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
         """Return a function with all entries of inputs and outputs, including those that are always zero."""

@@ -3,6 +3,9 @@
 A Function of scalar expressions is a straight line of some thousand additions and multiplications. CasADi interprets it at
 5 ns an instruction; compiled it takes a tenth of that (and 30 us of compiling), with the same operations in the same order, so
 that the results are the same to the last bit.
+
+LLVM's time for a straight line grows faster than its length. So it is cut into segments, functions of their own, which pass
+numbers on in memory.
 """
 
 import ctypes
@@ -11,6 +14,7 @@ import hashlib
 from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -19,9 +23,11 @@ from llvmlite import binding, ir
 from tolcontact import code_cache
 
 LANES = 4
+SEGMENT = 1000  # instructions
 _INDEX = ir.IntType(64)
 _DOUBLE = ir.DoubleType()
 _LANES = ir.VectorType(_DOUBLE, LANES)
+VECTOR_ALIGNMENT = 8  # bytes: what is sure of memory on the stack
 
 
 class UnknownInstructionError(Exception):
@@ -74,10 +80,7 @@ def _module(function: ca.Function) -> ir.Module:
     count, inputs, results = evaluate.args
     entry, body, done = (evaluate.append_basic_block(name) for name in ("entry", "body", "done"))
     builder = ir.IRBuilder(entry)
-    places = [
-        [builder.load(builder.gep(array, [_INDEX(i)])) for i in range(number)]
-        for array, number in ((inputs, function.n_in()), (results, function.n_out()))
-    ]
+    memory = builder.alloca(_LANES, _INDEX(max(function.sz_w(), 1)))
     last = builder.sub(count, _INDEX(1))
     builder.cbranch(builder.icmp_signed(">", count, _INDEX(0)), body, done)
     builder.position_at_end(body)
@@ -85,15 +88,8 @@ def _module(function: ca.Function) -> ir.Module:
     k.add_incoming(_INDEX(0), entry)
     lanes = [builder.add(k, _INDEX(lane)) for lane in range(LANES)]
     lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
-    sizes = ([function.nnz_in(i) for i in range(function.n_in())], [function.nnz_out(i) for i in range(function.n_out())])
-    registers_here = [
-        [
-            [builder.gep(place, [builder.mul(lane, _INDEX(size))]) for lane in lanes]
-            for place, size in zip(*operands, strict=True)
-        ]
-        for operands in zip(places, sizes, strict=True)
-    ]
-    _translate(function, builder, *registers_here)
+    for segment in _segments(function, module):
+        builder.call(segment, [inputs, results, memory, *lanes])
     following = builder.add(k, _INDEX(LANES))
     k.add_incoming(following, builder.block)
     builder.cbranch(builder.icmp_signed("<", following, count), body, done)
@@ -101,12 +97,108 @@ def _module(function: ca.Function) -> ir.Module:
     return module
 
 
-def _translate(function: ca.Function, builder: ir.IRBuilder, inputs: list, results: list) -> None:
-    """Emit the instructions of a Function; `inputs` and `results` hold the address of each argument and lane."""
-    work: dict[int, ir.Value] = {}
-    for number in range(function.n_instructions()):
-        operation = function.instruction_id(number)
-        to, names = function.instruction_output(number), function.instruction_input(number)
+class Instruction(NamedTuple):
+    """An instruction of a Function: work entries that it writes and reads; of inputs and outputs the argument and its entry."""
+
+    operation: int
+    to: list[int]
+    operands: list[int]
+
+
+def _segments(function: ca.Function, module: ir.Module) -> list[ir.Function]:
+    """Return functions `void (inputs, results, memory, lanes...)` that together are all instructions of a Function.
+
+    A segment stores in `memory` the work entries that later segments read.
+    """
+    instructions = [
+        Instruction(function.instruction_id(k), function.instruction_output(k), function.instruction_input(k))
+        for k in range(function.n_instructions())
+    ]
+    parts = [instructions[k : k + SEGMENT] for k in range(0, len(instructions), SEGMENT)]
+    read_later: set[int] = set()
+    stored: list[set[int]] = []
+    for part in reversed(parts):
+        reads, writes = _accesses(part)
+        stored.insert(0, writes & read_later)
+        read_later = read_later - writes | reads
+    segments, start = [], 0
+    for number, (part, kept) in enumerate(zip(parts, stored, strict=True)):
+        segments.append(_segment(function, module, f"segment{number}", (start, part), kept))
+        start += len(part)
+    return segments
+
+
+def _accesses(part: Sequence[Instruction]) -> tuple[set[int], set[int]]:
+    """Return the work entries that instructions read before they write them, and those that they write."""
+    reads, writes = set[int](), set[int]()
+    for operation, to, operands in part:
+        if operation not in (ca.OP_INPUT, ca.OP_CONST):
+            reads.update(index for index in operands if index not in writes)
+        if operation != ca.OP_OUTPUT:
+            writes.update(to)
+    return reads, writes
+
+
+def _segment(
+    function: ca.Function, module: ir.Module, name: str, part: tuple[int, Sequence[Instruction]], kept: set[int]
+) -> ir.Function:
+    """Return the function of the instructions from a number on, which stores the work entries that are `kept`."""
+    pointers = _DOUBLE.as_pointer().as_pointer()
+    arguments = [pointers, pointers, _LANES.as_pointer(), *[_INDEX] * LANES]
+    segment = ir.Function(module, ir.FunctionType(ir.VoidType(), arguments), name)
+    segment.linkage = "internal"
+    segment.attributes.add("noinline")
+    inputs, results, memory, *lanes = segment.args
+    builder = ir.IRBuilder(segment.append_basic_block("entry"))
+    sizes = ([function.nnz_in(i) for i in range(function.n_in())], [function.nnz_out(i) for i in range(function.n_out())])
+    places = [_Places(builder, array, of_array, lanes) for array, of_array in zip((inputs, results), sizes, strict=True)]
+    work = _Work(builder, memory)
+    _translate(function, builder, part, work, *places)
+    for index in sorted(kept):
+        builder.store(work[index], builder.gep(memory, [_INDEX(index)]), align=VECTOR_ALIGNMENT)
+    builder.ret_void()
+    return segment
+
+
+class _Work(dict[int, ir.Value]):
+    """The work entries of a segment; those of earlier segments are loaded from memory when they are first read."""
+
+    def __init__(self, builder: ir.IRBuilder, memory: ir.Value) -> None:
+        super().__init__()
+        self._builder, self._memory = builder, memory
+
+    def __missing__(self, index: int) -> ir.Value:
+        self[index] = self._builder.load(self._builder.gep(self._memory, [_INDEX(index)]), align=VECTOR_ALIGNMENT)
+        return self[index]
+
+
+class _Places:
+    """The addresses of arguments for each lane, computed when a segment first needs them."""
+
+    def __init__(self, builder: ir.IRBuilder, arrays: ir.Value, sizes: Sequence[int], lanes: Sequence[ir.Value]) -> None:
+        self._builder, self._arrays, self._sizes, self._lanes = builder, arrays, sizes, lanes
+        self._known: dict[int, list[ir.Value]] = {}
+
+    def __getitem__(self, argument: int) -> list[ir.Value]:
+        if argument not in self._known:
+            builder = self._builder
+            start = builder.load(builder.gep(self._arrays, [_INDEX(argument)]))
+            size = _INDEX(self._sizes[argument])
+            self._known[argument] = [builder.gep(start, [builder.mul(lane, size)]) for lane in self._lanes]
+        return self._known[argument]
+
+
+def _translate(
+    function: ca.Function,
+    builder: ir.IRBuilder,
+    part: tuple[int, Sequence[Instruction]],
+    work: _Work,
+    inputs: _Places,
+    results: _Places,
+) -> None:
+    """Emit instructions of a Function from a number on; `inputs` and `results` hold the address of each argument and lane."""
+    start, instructions = part
+    for number, (operation, to, names) in enumerate(instructions, start):
         if operation == ca.OP_OUTPUT:
             for lane, place in enumerate(results[to[0]]):
                 value = builder.extract_element(work[names[0]], ir.IntType(32)(lane))
