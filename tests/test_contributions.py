@@ -11,7 +11,7 @@ from scipy import stats
 
 import tolcontact as tc
 from tests import cases
-from tests.helpers import PAPER, call
+from tests.helpers import PAPER, call, nightly
 from tests.test_ra1 import MEASURED, TOP, plane_weights
 from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.grouping import independent_groups
@@ -34,9 +34,10 @@ def clipped(x):
     return np.maximum(0, x[:, 0] + 0.5 * x[:, 1])
 
 
-def of_clipped():
-    """First-order and total indices of `clipped` by quadrature: of max(0, z) with z normal, mean and variance are known."""
-    whole = 1.25 * (0.5 - 1 / (2 * np.pi))
+def of_clipped(variances=(1.0, 0.25)):
+    """First-order and total indices of max(0, z), z a sum of normal numbers, by quadrature: mean and variance are known."""
+    whole_variance = sum(variances)
+    whole = whole_variance * (0.5 - 1 / (2 * np.pi))
     phi, Phi = stats.norm.pdf, stats.norm.cdf
 
     def moments(m, s):
@@ -46,7 +47,7 @@ def of_clipped():
     found = []
     z, weights = np.polynomial.hermite_e.hermegauss(150)
     weights = weights / weights.sum()
-    for own, other in ((1.0, 0.5), (0.5, 1.0)):
+    for own, other in ((np.sqrt(v), np.sqrt(whole_variance - v)) for v in variances):
         given, left = moments(own * z, other)[0], moments(other * z, own)[1]
         found.append(((weights @ given**2 - (weights @ given) ** 2) / whole, weights @ left / whole))
     return np.array(found).T
@@ -314,6 +315,39 @@ def test_independent_causes_of_the_same_locators_have_shares_of_their_own():
             _, lower, upper = found[name].sel(state="raw", group=group).values
             assert lower - 0.02 < share < upper + 0.02
     assert found.missed.sel(state="raw", interval="estimate") < 1e-6
+
+
+WEIGHTS = np.r_[2.0, -1.5, np.full(10, 0.7), np.full(56, 0.02)]  # of 68 causes
+
+
+@pytest.mark.parametrize("seeds", [range(2), *nightly(range(2, 22))])
+def test_minor_contributors_are_bounded_together_and_major_ones_keep_their_intervals(seeds):
+    """A stack of 68 causes, and with contact max(0, sum): shares by closed form and by quadrature."""
+    program = tc.build(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
+    shares = WEIGHTS**2 / (WEIGHTS**2).sum()
+    truth = {"raw": (shares, shares), "corrected": of_clipped(tuple(WEIGHTS**2))}
+    misses, minor_shares = np.zeros(4), shares[12:].sum()
+    for seed in seeds:
+        found = tc.contributions(program, samples=512, seed=seed).isel(measure=0)
+        assert found.minor.values.tolist() == [0] * 12 + [1] * 56
+        assert found.attrs["realizations"] == 128 * 70 + 512 * 15
+        assert abs(float(found.minor_total.sel(state="raw", interval="estimate")) / minor_shares - 1) < 0.5
+        for state, orders in truth.items():
+            for word, expected in zip(("first", "total"), orders, strict=True):
+                estimate, lower, upper = found[word].sel(state=state).values.T
+                covered = (lower <= expected) & (expected <= upper)
+                misses += [*(~covered[:2]), 0.1 * (~covered[2:12]).sum(), 0.02 * (~covered[12:]).sum()]
+                assert (estimate >= lower).all() and (estimate <= upper).all() and (upper[12:] < 0.01).all()
+    assert (misses <= 0.15 * 4 * len(seeds)).all(), misses
+
+
+def test_by_default_realizations_are_those_of_what_matters():
+    program = tc.build(shelf({f"v{k}": w for k, w in enumerate(WEIGHTS)}), solver="daqp", method=PAPER)
+    found = tc.contributions(program)
+    assert 58_000 < found.attrs["realizations"] <= 60_000 and found.attrs["base_realizations"] == (60_000 - 8960) // 15
+    half_widths = np.ptp(found["total"].sel(interval=["lower", "upper"]).values, axis=-1) / 2
+    assert half_widths.max() < 0.04
+    assert tc.contributions(program, samples=64).minor.sum() == 0  # too few to be screened
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.extreme_search import Effort, Evaluation
+from tolcontact.analyses.influences import Influences
 from tolcontact.analyses.worst_case import search_worst_case
 from tolcontact.simulation import map_blocks
 
@@ -102,6 +103,49 @@ def test_what_is_found_is_what_the_engine_says_of_the_combination():
         own = found.deviations.isel(measure=0, state=state).values
         measured = Evaluation(Engine(program, map_blocks), Region(program.draws, seed=1)).corrected(own)
         assert measured[:, state, 0] == pytest.approx(found.worst.isel(measure=0, state=state).values, abs=1e-12)
+
+
+def with_idle_parts(a, count):
+    """The model with parts aside that touch nothing and are not measured."""
+    for k in range(count):
+        part = a.part(f"aside {k}", tc.Box(10, 10, 10), at=(200 + 20 * k, 0, 0))
+        a.locate(part, tc.three_two_one(part.face("-z"), part.face("-y"), part.face("-x")), tolerance=0.1)
+    return a
+
+
+def influences_of(a, count=16):
+    program, rng = tc.build(a, solver="daqp"), np.random.default_rng(1)
+    area = Region(program.draws, seed=1)
+    points = area.scattered(rng, count)
+    evaluation = Evaluation(Engine(program, map_blocks), area)
+    influences = Influences(area, evaluation, np.ones(len(program.nominal.measures)))
+    influences.explore(points, area.scattered(rng, count))
+    return {label for label, is_active in zip(program.nominal.contributors, influences.is_active[0], strict=True) if is_active}
+
+
+def test_contributors_without_influence_are_left_out_and_change_no_answer():
+    plain, crowded = (few_searches(with_idle_parts(small_ra1(), count), 16) for count in (0, 4))
+    assert crowded.sizes["contributor"] == plain.sizes["contributor"] + 24
+    spread = np.ptp(values(plain))
+    assert values(crowded) == pytest.approx(values(plain), abs=0.02 * spread)
+    assert int(crowded.by_status.sum()) < 1.5 * int(plain.by_status.sum())
+
+
+def test_influences_are_those_of_contact_too():
+    active = influences_of(with_idle_parts(small_ra1(), 2))
+    assert {"base.A1", "base.A2", "base.A3", "top.A1", "top.A2", "top.A3"} <= active
+    assert not any(label.startswith("aside") for label in active)
+
+
+def test_an_influence_that_shows_only_at_some_points_is_found_there():
+    """CASES C1: the height max(0, z) does not change between two points below, and does between one below and one above."""
+    program = tc.build(cases.one_dimensional(0), solver="daqp", method=PAPER)
+    area = Region(program.draws, seed=1)
+    influences = Influences(area, Evaluation(Engine(program, map_blocks), area), np.ones(1))
+    is_height = np.array([label == "block.Z" for label in program.nominal.contributors])
+    low, lower, above = (np.where(is_height, z, area.middle)[None] for z in (-1.5, -2.5, 2.5))
+    assert not influences.explore(low, lower).any() and not influences.is_active.any()
+    assert influences.explore(low, above).all() and np.array_equal(influences.is_active[0], is_height)
 
 
 def varied():

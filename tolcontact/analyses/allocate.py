@@ -27,7 +27,7 @@ BATCHES = 32  # of realizations, for intervals of effects
 MAX_STEPS, USUAL_STEPS = 24, 8  # of one search: at most, and for the forecast
 FIRST_RADIUS, LAST_RADIUS = 0.5, 0.004  # of the region that a step stays in, in logarithms of the factors
 IDLE = 1e-6  # of a measure's spread: a group that changes no decisive realization by more has no influence
-MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many
+MIN_EFFECT_SAMPLES, EFFECT_SHARE = 512, 4  # realizations for effects: at least, and one in so many; of all groups so many times
 COMMON_FACTORS = np.geomspace(0.1, 3.0, 13)  # of all ranges, where requirements cannot be met
 PENALTY = 10.0  # for missed margins, in the costs that the same margins save to first order
 MIN_GAIN = 1e-4  # of the cost
@@ -60,11 +60,12 @@ def allocate(
     "feature" or "part".
 
     Ranges stay between a tenth and three times the present ones. Groups without influence on any requirement keep theirs. Each
-    step replaces the margins of the requirements by functions of squared ranges with the same values and slopes, on the same
-    draws; for the slopes only realizations near the limits are simulated again. scipy's SLSQP minimizes the cost under them
-    within a region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run
-    misses a requirement, the search continues with a margin larger by as much. `progress` is called with the number of
-    realizations simulated, and with the approximate number of all.
+    step replaces the margins of the requirements by functions of squared ranges, on the same draws. The slopes are those to
+    wider ranges, and only realizations near the limits are simulated again for them. scipy's SLSQP minimizes the cost within a
+    region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
+    requirement, the search continues with a margin larger by as much. Effects follow from a quarter of the realizations, with
+    more than 16 groups from 4 samples / groups, but at least 512. `progress` is called with the number of realizations
+    simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """
@@ -77,7 +78,8 @@ def allocate(
     requirements = _requirements(require, program, samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
-    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
+    total = VERIFICATION_FACTOR * samples + _expected(samples, len(groups))
+    trials = ScaledTrials(analysis.engine(total), list(groups.values()), seed, samples)
     prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
     search = Search(trials, requirements, prices)
     logs, estimates, is_met = _allocated(search, _expected(samples, 0))
@@ -161,8 +163,15 @@ def _cost(curve: Cost, factor: float) -> float:
 
 def _expected(samples: int, groups: int) -> int:
     """Return the approximate number of realizations of a search and its verification, with slopes and effects of groups."""
-    effects = max(samples // EFFECT_SHARE, MIN_EFFECT_SAMPLES)
-    return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * (USUAL_STEPS * MIN_DECISIVE + effects)
+    return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * (
+        USUAL_STEPS * MIN_DECISIVE + _effect_samples(samples, groups)
+    )
+
+
+def _effect_samples(samples: int, groups: int) -> int:
+    """Return how many of `samples` realizations the effect of each group is estimated from."""
+    count = min(samples // EFFECT_SHARE, EFFECT_SHARE * samples // max(groups, 1))
+    return min(max(count, MIN_EFFECT_SAMPLES), samples)
 
 
 def _allocated(search: "Search", expected: int) -> tuple[np.ndarray, list[list[Estimate]], np.ndarray]:
@@ -251,25 +260,24 @@ class Search:
         return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
 
     def _slopes(self, logs: np.ndarray, corrected: np.ndarray) -> np.ndarray:
-        """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
+        """Return derivatives (requirement, group) of the margins, linear in squared ranges; 0 for groups that do not change.
 
         A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
         measures of the others (n, measure) stay. Groups that change none of them are idle from then on.
         """
-        slopes = np.zeros((len(self.requirements), len(logs)))
+        slopes, margins = np.zeros((len(self.requirements), len(logs))), _margins(self.requirements, corrected)
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
         measures = sorted({requirement.measure for requirement in self.requirements})
         spreads = corrected.std(axis=0)[measures]
         for group in np.flatnonzero(self.is_free):
             step = STEP * np.eye(len(logs))[group]
-            wide, narrow = corrected.copy(), corrected.copy()
+            wide = corrected.copy()
             wide[rows] = self.trials.corrected_rows(np.exp(logs + step), rows)
             changes = np.abs(wide - corrected)[:, measures]
             if (changes.max(axis=0) <= IDLE * spreads).all():
                 self.idle[group] = True
                 continue
-            narrow[rows] = self.trials.corrected_rows(np.exp(logs - step), rows)
-            slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
+            slopes[:, group] = (_margins(self.requirements, wide) - margins) / (math.expm1(2 * STEP) / 2)
         return slopes
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:
@@ -303,7 +311,7 @@ def _effects(trials: ScaledTrials, program: Program) -> np.ndarray:
     """
     limits = [program.limits(number) for number in range(len(program.nominal.measures))]
     ones = np.ones(len(trials))
-    rows = np.arange(min(max(trials.samples // EFFECT_SHARE, MIN_EFFECT_SAMPLES), trials.samples))
+    rows = np.arange(_effect_samples(trials.samples, len(trials)))
     present = trials.corrected_rows(ones, rows)
     effects = np.zeros((len(limits), len(terms.EFFECTS), len(trials), len(terms.ESTIMATE)))
     for group in range(len(trials)):

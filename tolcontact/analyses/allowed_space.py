@@ -68,6 +68,13 @@ class Region:
             middle[columns] = values[0]
         return np.asarray(middle)
 
+    @property
+    def independent_columns(self) -> list[np.ndarray]:
+        """Sets of columns that vary independently of each other: of common zones, of measured parts, or single ones."""
+        joined = [columns for columns, _ in self._joined]
+        single = np.setdiff1d(self.varies, np.concatenate([np.zeros(0, dtype=int), *joined]))
+        return [*joined, *single[:, None]]
+
     def farthest(self, direction: np.ndarray) -> np.ndarray:
         """Return the farthest points (n, contributor) in directions (n, contributor); in zones, among some extreme points."""
         ends: np.ndarray = np.where(direction > 0, self.upper, np.where(direction < 0, self.lower, self.middle))
@@ -102,6 +109,18 @@ class Region:
             half, half_after = self._half(zone, points), self._half(zone, points + step)
             shares = np.minimum(shares, _first_crossing(start, along, half, half_after))
         return np.asarray(np.maximum(shares, 0.0))
+
+    def enclosed(self, points: np.ndarray) -> np.ndarray:
+        """Return points (n, contributor) drawn into the region, each zone by itself, towards the middle of the zone."""
+        points = np.clip(points, self.lower, self.upper)
+        middle = self.middle
+        for columns in self._joint_columns():
+            offsets = np.zeros_like(points)
+            offsets[:, columns] = points[:, columns] - middle[columns]
+            shares = self.reach(np.broadcast_to(middle, points.shape), offsets)
+            is_outside = shares < 1
+            points[np.ix_(is_outside, columns)] = (middle + shares[:, None] * offsets)[np.ix_(is_outside, columns)]
+        return points
 
     def is_inside(self, points: np.ndarray) -> np.ndarray:
         """Return whether points (n, contributor) lie in the region."""

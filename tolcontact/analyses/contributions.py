@@ -13,20 +13,27 @@ from tolcontact.analyses.designs import MixedDraws, ReleasedDraws
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.grouping import check_grouping, independent_groups, owners
 from tolcontact.analyses.linear_model import total_derivatives
+from tolcontact.analyses.screening import SCREENING_SAMPLES, Screening, screened
 from tolcontact.compilation import Program
 from tolcontact.simulation import Block
 from tolcontact.statistics.sobol_indices import missed, shapley_effects, sobol_indices
 from tolcontact.workflow.models import Choice, Model
 
+BUDGET = 60_000  # realizations that base realizations are chosen for by default
+MIN_SAMPLES, MAX_SAMPLES = 512, 4096  # base realizations by default
+
 
 def contributions(
-    model: Model | Program, *, samples: int = 4096, seed: int = 1, solver: str | None = None, method: Choice | None = None,
-    by: str = "contributor", into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: str | None = None,
+    method: Choice | None = None, by: str = "contributor", into: str | Path | None = None, client: Any = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return Sobol' indices of each measure (see tolcontact.statistics.sobol_indices), and the classical linear percentages.
 
         first   (measure, state, group, interval)   share of variance by a group alone, with its 95 % interval
         total   (measure, state, group, interval)   share of variance by a group and its interactions with others
+        minor   (group)                             1: its interval is from 0 to the upper bound of all minor groups together
+        minor_total (measure, state, interval)      share of variance by all minor groups together; 0 if there are none
         shapley (measure, state, unit, interval)    Shapley effects, if contributors are correlated; units are the groups
                                                     that there would be without the correlations
         linear  (measure, group)                    by sensitivities of the raw measure at the nominal assembly: (s sigma)^2,
@@ -38,35 +45,35 @@ def contributions(
     or one following from another) always form one group. A shared cause is a contributor like others, together with what it
     adds to those that it drives; these have groups of their own if they also vary by themselves. Contributors that do not vary
     are left out.
+    With more than 16 groups and 256 samples, a screening of 128 base realizations selects minor groups, which have 1 % of the
+    variance of any measure together, or less; they are estimated as one group (see tolcontact.analyses.screening).
     `samples` is the number of base realizations: samples (2 + groups) are simulated, and samples (1 + units) more for Shapley
-    effects. `progress` is called with the number of finished realizations, and of all.
+    effects, beside the screening. By default it is what 60 000 realizations allow, but at least 512 and at most 4096.
+    `progress` is called with the number of finished realizations, and of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
     """
     check_grouping(by)
     analysis = Analysis(
-        terms.CONTRIBUTIONS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        terms.CONTRIBUTIONS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver,
+        method=method, into=into, client=client, progress=progress,
     )  # fmt: skip
     program = analysis.program
     deviations = program.draws.own(analysis.sampled_deviations())
     groups, units = (_varying_groups(program, by, deviations, correlated=correlated) for correlated in (True, False))
     analysis.check_varies(groups)
-    mixed, released = MixedDraws(program.draws, list(groups.values())), ReleasedDraws(program.draws, units)
-    has_units = len(units) > len(groups)
-    engine = analysis.engine(samples * (mixed.size + has_units * released.size))
+    released = ReleasedDraws(program.draws, units) if len(units) > len(groups) else None
+    engine = analysis.engine(analysis.samples * _realizations_each(len(groups), released))
+    screening = screened(engine, groups, seed) if analysis.samples > 2 * SCREENING_SAMPLES else Screening.none(groups)
+    mixed = MixedDraws(program.draws, screening.estimated)
+    realizations_each = _realizations_each(len(screening.estimated), released)
+    if samples is None:
+        samples = int(np.clip((BUDGET - engine.simulated) // realizations_each, MIN_SAMPLES, MAX_SAMPLES))
+    engine.total = engine.simulated + samples * realizations_each
     measured, A, _ = engine.simulate_design(mixed, samples, seed=seed, observe=_FirstDeviations(mixed.size))
-    shapley = np.empty((measured.shape[3], measured.shape[2], 0, len(terms.ESTIMATE)))
-    if has_units:
-        shapley = _shapley_effects(engine, released, samples, seed)
     slopes, A = total_derivatives(program), program.draws.own(A[:, 0])
-    indices = [
-        [sobol_indices(f, accuracy) for f in states]
-        for states, accuracy in zip(measured.transpose(3, 2, 0, 1), program.accuracies, strict=True)
-    ]
     values = {
-        "first": [[first for first, _ in states] for states in indices],
-        "total": [[total for _, total in states] for states in indices],
-        "shapley": shapley,
+        **_indices(screening, measured, program.accuracies),
+        "shapley": _shapley_effects(engine, released, samples, seed),
         "linear": [_linear_shares(program, deviations, row, groups.values()) for row in slopes],
         "missed": [
             [missed(f, A @ row, accuracy) for f in states]
@@ -74,9 +81,13 @@ def contributions(
         ],
         "by_status": engine.statuses,
     }
-    labels = {terms.GROUP: list(groups), terms.UNIT: list(units) if has_units else []}
-    realizations = int(engine.statuses.sum())
-    return analysis.dataset(values, labels, base_realizations=samples, realizations=realizations, by=by)
+    labels = {terms.GROUP: list(groups), terms.UNIT: [] if released is None else list(units)}
+    return analysis.dataset(values, labels, base_realizations=samples, realizations=engine.simulated, by=by)
+
+
+def _realizations_each(groups: int, released: ReleasedDraws | None) -> int:
+    """Return how many realizations a base realization has for Sobol' indices of groups, and for Shapley effects if any."""
+    return 2 + groups + (0 if released is None else released.size)
 
 
 def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correlated: bool) -> dict[str, np.ndarray]:
@@ -85,8 +96,21 @@ def _varying_groups(program: Program, by: str, deviations: np.ndarray, *, correl
     return independent_groups(program.draws, owners(program, by), varies, correlated=correlated)
 
 
-def _shapley_effects(engine: Engine, released: ReleasedDraws, samples: int, seed: int) -> np.ndarray:
-    """Return Shapley effects (measure, state, unit, interval)."""
+def _indices(screening: Screening, measured: np.ndarray, accuracies: np.ndarray) -> dict[str, Any]:
+    """Return the variables of Sobol' indices, from measures (base, realization, state, measure) of a design."""
+    indices = [
+        [screening.of_all_groups(sobol_indices(f, accuracy), measure, state) for state, f in enumerate(states)]
+        for measure, (states, accuracy) in enumerate(zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True))
+    ]
+    names = "first", "total", "minor_total"
+    columns = {name: [[row[k] for row in states] for states in indices] for k, name in enumerate(names)}
+    return {**columns, "minor": screening.is_minor.astype(np.int8)}
+
+
+def _shapley_effects(engine: Engine, released: ReleasedDraws | None, samples: int, seed: int) -> np.ndarray:
+    """Return Shapley effects (measure, state, unit, interval); no unit if nothing is correlated."""
+    if released is None:
+        return np.empty((len(engine.program.nominal.measures), len(terms.STATES), 0, len(terms.ESTIMATE)))
     measured, _ = engine.simulate_design(released, samples, seed=seed)
     places = released.places(seed, 0, samples)
     return np.array([

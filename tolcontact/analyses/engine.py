@@ -68,8 +68,11 @@ class Engine:
         return measured, status
 
     def simulate_design(
-        self, design: Design, samples: int, *, seed: int, observe: Observer = outcomes
+        self, design: Design, samples: int, *, seed: int, start: int = 0, observe: Observer = outcomes
     ) -> tuple[np.ndarray, ...]:
-        """Return what `observe` gives of `samples` base realizations of a design, as arrays (base, realization, ...)."""
-        arrays = self.simulate(samples * design.size, seed=seed, draws=design, observe=observe)
+        """Return what `observe` gives of `samples` base realizations of a design, as arrays (base, realization, ...).
+
+        The first base realization has the number `start`.
+        """
+        arrays = self.simulate(samples * design.size, seed=seed, start=start * design.size, draws=design, observe=observe)
         return tuple(array.reshape(samples, len(array) // samples, *array.shape[1:]) for array in arrays)

@@ -14,11 +14,14 @@ import numpy as np
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.allowed_space import Region
 from tolcontact.analyses.engine import Engine
+from tolcontact.analyses.ridge import ridge_end
 
 RANDOM_DIRECTIONS = 4  # that a search tries at each step
 END_SHARES = 0.5 ** np.arange(9)  # of the way to a far end that are tried
+WAY_SHARES = np.arange(1, 9) / 8  # of the way to a better end, where a measure has to grow
 SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
+NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points about a search that did not gain, and steps there, in shares of its own step
 MAX_STEPS = 200
 MAX_FINISHES = 4
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
@@ -119,6 +122,10 @@ class Searches:
         """Return copies of some searches."""
         return Searches(*(getattr(self, field.name)[rows] for field in fields(self)))
 
+    def best_of(self, count: int) -> "Searches":
+        """Return copies of the best of each `count` searches in a row."""
+        return self.take(self.value.reshape(-1, count).argmax(axis=1) + np.arange(0, len(self.value), count))
+
     def put(self, rows: np.ndarray, searches: "Searches") -> None:
         """Replace the points, values and steps of some searches."""
         self.point[rows], self.value[rows], self.step[rows] = searches.point, searches.value, searches.step
@@ -147,14 +154,16 @@ class Searches:
 class Searcher:
     """Moves searches in a region.
 
-    spread  (measure,) difference between the largest and the least value of random points
+    spread     (measure,) difference between the largest and the least value of random points
+    is_active  (measure, contributor): contributors that a measure with contact is searched along; others stay
     """
 
     def __init__(
-        self, region: Region, evaluation: Evaluation, spread: np.ndarray, rng: np.random.Generator, finest_step: float
-    ) -> None:
-        self._region, self._evaluation, self._spread, self._rng = region, evaluation, spread, rng
-        self._finest_step = finest_step
+        self, region: Region, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray, rng: np.random.Generator,
+        finest_step: float,
+    ) -> None:  # fmt: skip
+        self._region, self._evaluation, self.spread, self._rng = region, evaluation, spread, rng
+        self._is_active, self._finest_step = is_active, finest_step
         self._ranges = np.zeros(len(region.lower))
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
         self._compass = np.diag(self._ranges)[region.moves]
@@ -169,10 +178,25 @@ class Searcher:
             candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
             gains = active.move(candidates, values, self._min_gain(active))
             gains |= self._move_towards(active, self._region.farthest(slopes))
+            gains |= self._move_along_ridges(active, gains)
             active.step[~gains] *= SHRINKAGE
             searches.put(rows, active)
             steps = np.log(np.maximum(searches.step, self._finest_step)[searches.state == terms.CORRECTED])
             advanced(float(steps.mean() / math.log(self._finest_step)))
+
+    def meet(self, searches: Searches, count: int) -> None:
+        """Move the searches with contact to the best of each `count` in a row, where the measure grows all the way there."""
+        best = np.repeat(searches.best_of(count).point, count, axis=0)
+        rows = np.flatnonzero((searches.state == terms.CORRECTED) & (searches.point != best).any(axis=1))
+        if rows.size:
+            behind = searches.take(rows)
+            ways = behind.point[:, None] + WAY_SHARES[:, None] * (best[rows] - behind.point)[:, None]
+            fixed = np.setdiff1d(self._region.varies, self._region.moves)
+            ways[:, :, fixed] = best[rows][:, None, fixed]
+            values = np.column_stack([behind.value, behind.values_at(ways, self._evaluation)])
+            ends = np.flatnonzero((np.diff(values, axis=1) >= -ROUNDING * self.spread[behind.measure][:, None]).all(axis=1))
+            behind.point[ends], behind.value[ends] = ways[ends, -1], values[ends, -1]
+            searches.put(rows, behind)
 
     def finish(self, searches: Searches) -> None:
         """Move along the slopes to the very end of round zones."""
@@ -189,7 +213,7 @@ class Searcher:
 
     def _min_gain(self, searches: Searches) -> np.ndarray:
         """Return the least gain (n,) of a step: a forcing function, which grows with the step so that searches do not creep."""
-        return np.asarray(self._spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
+        return np.asarray(self.spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
 
     def _random_steps(self) -> np.ndarray:
         """Return steps (direction, contributor) of length 1 in shares of the ranges."""
@@ -205,6 +229,7 @@ class Searcher:
         in both senses. Slopes are (n, contributor), by the differences along contributors.
         """
         steps = step[:, None, None] * np.vstack([self._compass, -self._compass, directions, -directions])
+        steps *= self._searched(searches)[:, None]
         n, count, width = steps.shape
         points, flat = np.repeat(searches.point, count, axis=0), steps.reshape(-1, width)
         candidates = (points + self._region.reach(points, flat)[:, None] * flat).reshape(n, count, width)
@@ -216,6 +241,62 @@ class Searcher:
         slopes = np.zeros_like(searches.point)
         slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
         return candidates, values, slopes
+
+    def _searched(self, searches: Searches) -> np.ndarray:
+        """Return whether each search goes along each contributor, (n, contributor)."""
+        return np.asarray(self._is_active[searches.measure] | (searches.state == terms.RAW)[:, None])
+
+    def _move_along_ridges(self, searches: Searches, gains: np.ndarray) -> np.ndarray:
+        """Move the searches with contact that did not gain along the kinks that they may have met. Return which moved, (n,).
+
+        At a kink, a measure is the least of several linear functions, and may grow along none of the contributors alone. These
+        functions follow from slopes at a few points nearby; a linear program maximizes the least of them within a step
+        (compare gradient sampling; Burke, Lewis, Overton, 2005).
+        """
+        rows = np.flatnonzero(~gains & (searches.state == terms.CORRECTED))
+        moves = np.zeros(len(gains), dtype=bool)
+        if rows.size:
+            stalled = searches.take(rows)
+            nearby = self._scattered_about(stalled)
+            slopes = self._one_sided_slopes(nearby)
+            shape = len(rows), NEARBY_POINTS
+            ends = [
+                ridge_end(self._region, search_point, step * self._ranges * is_searched, *model)
+                for search_point, step, is_searched, *model in zip(
+                    stalled.point, stalled.step, self._searched(stalled),
+                    nearby.point.reshape(*shape, -1), nearby.value.reshape(shape), slopes.reshape(*shape, -1), strict=True,
+                )
+            ]  # fmt: skip
+            moves[rows] = self._move_towards(stalled, np.array(ends))
+            searches.put(rows, stalled)
+        return moves
+
+    def _scattered_about(self, searches: Searches) -> Searches:
+        """Return searches at points within a step of each search: the point itself, and random ones."""
+        points = searches.take(np.repeat(np.arange(len(searches.value)), NEARBY_POINTS))
+        shares = self._rng.uniform(-1, 1, points.point.shape) * self._searched(points)
+        shares[::NEARBY_POINTS] = 0.0
+        offsets = shares * points.step[:, None] * self._ranges
+        points.point = points.point + self._region.reach(points.point, offsets)[:, None] * offsets
+        points.value = points.values_at(points.point[:, None], self._evaluation)[:, 0]
+        return points
+
+    def _one_sided_slopes(self, searches: Searches) -> np.ndarray:
+        """Return slopes (n, contributor) by short steps towards the middle of the region; 0 along what is not searched."""
+        n, width = searches.point.shape
+        towards = np.where(searches.point > self._region.middle, -1.0, 1.0) * self._ranges * self._searched(searches)
+        steps = (NEARBY_STEP * searches.step[:, None] * towards)[:, None] * np.eye(width)[self._region.moves]
+        points = np.repeat(searches.point, len(self._region.moves), axis=0)
+        candidates = (
+            points + self._region.reach(points, steps.reshape(-1, width))[:, None] * steps.reshape(-1, width)
+        ).reshape(n, -1, width)
+        values = searches.values_at(candidates, self._evaluation)
+        distances = (candidates - searches.point[:, None])[:, :, self._region.moves].diagonal(axis1=1, axis2=2)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            rise = np.where(distances != 0, (values - searches.value[:, None]) / distances, 0.0)
+        slopes = np.zeros_like(searches.point)
+        slopes[:, self._region.moves] = np.where(np.isfinite(rise), rise, 0.0)
+        return slopes
 
     def _move_towards(self, searches: Searches, ends: np.ndarray) -> np.ndarray:
         """Move a share of the way to far ends (n, contributor), if that gains enough. Return which searches moved, (n,).

@@ -12,6 +12,7 @@ from tolcontact.analyses.analysis import Analysis
 from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.analyses.extreme_search import Effort, Evaluation, Searcher, Searches
 from tolcontact.analyses.farthest_pose import farthest_poses
+from tolcontact.analyses.influences import Influences
 from tolcontact.analyses.linear_model import LinearModel, linear_model
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
@@ -19,7 +20,9 @@ from tolcontact.simulation import simulate_blocks
 from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Choice, Model
 
-SHARED = 1.0  # realizations that a search needs for a contributor at each length of its steps; it shares some with others
+PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
+EXCHANGES = 24  # combinations that influences are looked for at
+MAX_RESTARTS, MAX_POLISHES, RESTART_STEP = 3, 3, 0.25  # of searches that go on, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 
 
@@ -36,7 +39,8 @@ def worst_case(
                                                         penetration lies beyond (see tolcontact.analyses.farthest_pose);
                                                         infinite if contact alone would have to hold the part
         random      (measure, state, end)               the worst of `samples` random combinations
-        agreeing    (measure, state, end)               number of searches that ended at this value
+        agreeing    (measure, state, end)               number of searches that met: they ended at the value of the best one, or
+                                                        the measure grows from their end all the straight way to its end
         ends        (measure, state, end)               number of different values that searches from random combinations
                                                         ended at
         unseen      (measure, state, end)               expected share of starts that lead to an end which no search found
@@ -46,11 +50,13 @@ def worst_case(
 
     tolcontact.analyses.allowed_space describes the region that combinations lie in. With contact a measure is neither smooth
     nor concave, and the linearized resolution jumps: the searches may miss a worse combination, and `agreeing` says how many
-    of them met. `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal
-    sensitivities, and those along the slopes of a regression; `samples` / 128 begin at any of them (see
-    tolcontact.analyses.extreme_search). `unseen` is the estimate w (w + 1) / (n (n - 1)) for w different ends of n searches
-    from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first order in the deviations: large tilts
-    may exceed it.
+    of them met. Each measure is searched along the contributors that have an influence on it; the others change nothing when
+    they are exchanged all at once, in 24 random combinations and at each end (see tolcontact.analyses.influences).
+    `samples` / 256 searches begin at the best of all combinations tried: random ones, the far ends along nominal sensitivities,
+    and those along the slopes of a regression; `samples` / 128 begin at any of them (see tolcontact.analyses.extreme_search).
+    The best one goes on in other random directions until it gains no more. `unseen` is the estimate w (w + 1) / (n (n - 1))
+    for w different ends of n searches from any of them (Boender, Rinnooy Kan, 1987). The linear estimate is exact to first
+    order in the deviations: large tilts may exceed it.
     Only certified realizations count. `progress` is called with the number of realizations simulated, and with the
     approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
@@ -68,17 +74,19 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     region = Region(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)
-    forecast = Forecast(engine, analysis.samples, effort, program, region)
+    engine.total += _expected(np.full(len(program.nominal.measures), region.moves.size), effort)
     starts, measured = _starts(region, linear, rng, analysis.samples, evaluation)
     if not np.isfinite(measured[:, terms.CORRECTED]).any():
         raise OptionError(f'"{analysis.assembly}" cannot be resolved for any of {len(starts)} combinations tried')
     spread = np.nanmax(measured, axis=(0, 1)) - np.nanmin(measured, axis=(0, 1))
+    influences = Influences(region, evaluation, spread)
+    influences.explore(starts[rng.choice(len(starts), EXCHANGES)], region.scattered(rng, EXCHANGES))
     searches = Searches.begin(starts, measured, effort, rng)
-    searcher = Searcher(region, evaluation, spread, rng, effort.finest_step)
-    searcher.search(searches, forecast.advanced)
+    searcher = Searcher(region, evaluation, spread, influences.is_active, rng, effort.finest_step)
+    best = _searched(
+        searcher, searches, influences, effort, Forecast(engine, influences, effort), region.scattered(rng, EXCHANGES)
+    )
     values = searches.value.reshape(-1, effort.searches)
-    best = searches.take(values.argmax(axis=1) + values.shape[1] * np.arange(len(values)))
-    searcher.finish(best)
     tolerances = END_TOLERANCE * spread[best.measure]
     ends = np.array([_count_ends(row[effort.best :], tolerance) for row, tolerance in zip(values, tolerances, strict=True)])
     corrected = best.take(np.flatnonzero(best.state == terms.CORRECTED))
@@ -98,20 +106,52 @@ def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     return analysis.dataset(arrays, {terms.CASE: cases}, random_combinations=analysis.samples, searches=effort.searches)
 
 
-class Forecast:
-    """The number of realizations that searches will need, as the engine reports it."""
+def _searched(
+    searcher: Searcher, searches: Searches, influences: Influences, effort: Effort, forecast: "Forecast", partners: np.ndarray
+) -> Searches:
+    """Search, and return the best search for each extreme value.
 
-    def __init__(self, engine: Engine, samples: int, effort: Effort, program: Program, region: Region) -> None:
-        searches = effort.searches * len(terms.ENDS) * len(program.nominal.measures)
-        self._engine, self._samples = engine, samples
-        self._expected = SHARED * searches * effort.levels * region.moves.size
+    Where contributors without known influence turn out to have one at an end, by exchange with partners (n, contributor), the
+    searches of that measure go on along them, too.
+    """
+    for _ in range(MAX_RESTARTS):
+        searcher.search(searches, forecast.advanced)
+        searcher.meet(searches, effort.searches)
+        best = searches.best_of(effort.searches)
+        points = np.repeat(best.point[best.state == terms.CORRECTED], len(partners), axis=0)
+        is_new = influences.explore(points, np.resize(partners, points.shape))
+        rows = np.flatnonzero(is_new[searches.measure] & (searches.state == terms.CORRECTED))
+        if not rows.size:
+            break
+        searches.step[rows] = RESTART_STEP
+    for _ in range(MAX_POLISHES):
+        values = best.value.copy()
+        best.step[best.state == terms.CORRECTED] = RESTART_STEP
+        searcher.search(best, lambda _: None)
+        if (best.value <= values + END_TOLERANCE * searcher.spread[best.measure]).all():
+            break
+    searcher.finish(best)
+    return best
+
+
+def _expected(active: np.ndarray, effort: Effort) -> int:
+    """Return the approximate number of combinations of all searches, with `active` (measure,) contributors each."""
+    return round(len(terms.ENDS) * effort.searches * effort.levels * (PER_LEVEL + PER_CONTRIBUTOR * active).sum())
+
+
+class Forecast:
+    """The number of combinations that the searches will need, as the engine reports it."""
+
+    def __init__(self, engine: Engine, influences: Influences, effort: Effort) -> None:
+        self._engine, self._before = engine, engine.simulated
+        self._expected = _expected(influences.is_active.sum(axis=1), effort)
         self.advanced(0.0)
 
     def advanced(self, share: float) -> None:
         """Revise the total when a share of the searches is done."""
-        searched = max(self._engine.simulated - self._samples, 0)
-        expected = (1 - share) * self._expected + share * searched
-        self._engine.total = max(self._engine.simulated, self._samples) + round((1 - share) * expected)
+        searched = self._engine.simulated - self._before
+        expected = (1 - share) * self._expected + searched
+        self._engine.total = self._engine.simulated + round((1 - share) * expected)
 
 
 def _starts(

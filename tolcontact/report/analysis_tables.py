@@ -106,6 +106,9 @@ def _shares(dataset: xr.Dataset) -> Iterator[AnalysisTable]:
         missed.append("no linear shares: it has a kink in the assembly as drawn, or no slope there")
     small = dataset.sizes["group"] - len(rows)
     remarks = [f"and {small} of less than {100 * SMALL_SHARE:g} % each"] if small else []
+    if "minor" in dataset and dataset["minor"].any():  # older archives do not state it
+        together = percent(dataset["minor_total"].isel(state=terms.CORRECTED).values)
+        remarks.append(f"{int(dataset['minor'].sum())} minor ones, estimated together: with contact {together} in total")
     columns = ["", "without\ncontact", "with contact,\nalone", "in total", "linear"]
     if not dataset.sizes["unit"]:
         yield AnalysisTable(measure, columns, rows, [*remarks, *missed], is_detail=True)

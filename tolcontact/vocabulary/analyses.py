@@ -60,6 +60,10 @@ CONTRIBUTIONS = AnalysisRecord(
     (
         ArchiveVariable("first", _INDEX, "f8", "first-order Sobol' index: share of variance by a group alone", "1"),
         ArchiveVariable("total", _INDEX, "f8", "total Sobol' index: with all that it does with others", "1"),
+        ArchiveVariable("minor", (GROUP,), "i1", "1: estimated together with all other minor groups; 0: by itself", "1"),
+        ArchiveVariable(
+            "minor_total", (MEASURE, STATE, INTERVAL), "f8", "total Sobol' index of all minor groups together", "1"
+        ),
         ArchiveVariable(
             "shapley",
             (MEASURE, STATE, UNIT, INTERVAL),

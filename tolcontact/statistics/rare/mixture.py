@@ -13,6 +13,7 @@ MIN_PER_CENTRE = 4
 MAX_FITTED = 1500  # realizations
 MIN_GAIN = 0.01  # of the mean logarithm of the likelihood: less is no reason for another centre
 ITERATIONS = 10
+FEW_DIMENSIONS, NOISE = 10, 5.0  # with more dimensions, so many standard errors of a centre are its noise
 
 
 class Mixture(NamedTuple):
@@ -72,4 +73,8 @@ def _clustered(points: np.ndarray, number: int, rng: np.random.Generator) -> Mix
     distinct = len(np.unique(points, axis=0))
     centres, labels = cluster.vq.kmeans2(points, min(number, distinct), iter=ITERATIONS, minit="++", missing="warn", rng=rng)
     shares = np.bincount(labels, minlength=len(centres)) / len(points)
+    if points.shape[1] > FEW_DIMENSIONS:
+        # Means of contributors without influence are noise; in many dimensions it would spread the weights.
+        sizes = np.array([len(np.unique(points[labels == label], axis=0)) for label in range(len(centres))])
+        centres = np.where(np.abs(centres) * np.sqrt(sizes)[:, None] < NOISE, 0.0, centres)
     return Mixture(centres[shares > 0], shares[shares > 0])

@@ -1,0 +1,94 @@
+"""Screening: which groups of contributors matter for any measure, from few realizations; the others are estimated together.
+
+The total index of a set of groups is at least that of each group in it: T_i <= T_u for i in u. So the total index of all minor
+groups together bounds those of each of them, first-order and total, and costs as much as one group.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.analyses.designs import MixedDraws
+from tolcontact.analyses.engine import Engine
+from tolcontact.statistics.intervals import UNDEFINED, Estimate
+from tolcontact.statistics.sobol_indices import sobol_indices
+
+MIN_GROUPS = 17  # fewer are not screened
+SCREENING_SAMPLES, START = 128, 1 << 38  # base realizations of a screening, and the number of the first one
+MINOR_SHARE = 0.01  # of the variance of any measure in any state: minor groups have no more of it together
+MIN_CARRYING = 16  # base realizations that carry the variance of a measure: from fewer, nothing is minor
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    """Groups of contributors, and the minor ones among them.
+
+    groups     columns of deviations by group
+    is_minor   (group,)
+    totals     (measure, state, group): rough total indices; NaN where nothing varies
+    """
+
+    groups: Mapping[str, np.ndarray]
+    is_minor: np.ndarray
+    totals: np.ndarray
+
+    @classmethod
+    def none(cls, groups: Mapping[str, np.ndarray]) -> "Screening":
+        """Return a screening that found no minor group."""
+        return cls(groups, np.zeros(len(groups), dtype=bool), np.zeros((0, 0, len(groups))))
+
+    @property
+    def estimated(self) -> list[np.ndarray]:
+        """The columns of groups that are estimated: each major one, then the minor ones together, if there are any."""
+        columns = list(self.groups.values())
+        minor = [columns[k] for k in np.flatnonzero(self.is_minor)]
+        return [columns[k] for k in np.flatnonzero(~self.is_minor)] + ([np.concatenate(minor)] if minor else [])
+
+    def of_all_groups(
+        self, estimates: tuple[list[Estimate], list[Estimate]], measure: int, state: int
+    ) -> tuple[list[Estimate], list[Estimate], Estimate]:
+        """Return first-order and total indices of all groups, and the total index of the minor ones together.
+
+        `estimates` are first-order and total indices of the estimated groups. The interval of a minor group reaches from 0 to
+        the upper bound of all minor ones together.
+        """
+        if not self.is_minor.any():
+            return *estimates, Estimate(0.0, 0.0, 0.0)
+        together = estimates[1][-1]
+        bounded = [self._bounded(float(total), together) for total in self.totals[measure, state]]
+        first_order, total = (
+            [bounded[k] if minor else next(major) for k, minor in enumerate(self.is_minor)] for major in map(iter, estimates)
+        )
+        return first_order, total, together
+
+    def _bounded(self, total: float, together: Estimate) -> Estimate:
+        """Return the index of a minor group from its rough total, and the total of all minor groups together."""
+        if np.isnan(together.value):
+            return UNDEFINED
+        upper = together.value if np.isnan(together.upper) else max(together.upper, 0.0)
+        return Estimate(min(np.nan_to_num(total), upper), 0.0 * together.upper, together.upper)
+
+
+def screened(engine: Engine, groups: Mapping[str, np.ndarray], seed: int) -> Screening:
+    """Return the screening of groups by total indices, with realizations of its own. Few groups are all estimated."""
+    if len(groups) < MIN_GROUPS:
+        return Screening.none(groups)
+    design = MixedDraws(engine.program.draws, list(groups.values()))
+    measured, _ = engine.simulate_design(design, SCREENING_SAMPLES, seed=seed, start=START)
+    totals, accuracies = [], engine.program.accuracies
+    for states, accuracy in zip(measured.transpose(3, 2, 0, 1), accuracies, strict=True):
+        totals.append([[index.value for index in sobol_indices(f, accuracy)[1]] for f in states])
+        if any(0 < _carrying(f) < MIN_CARRYING for f in states):
+            return Screening.none(groups)
+    shares = np.nan_to_num(np.array(totals)).reshape(-1, len(groups))
+    order = np.argsort(shares.max(axis=0, initial=0.0), kind="stable")
+    is_minor = np.zeros(len(groups), dtype=bool)
+    is_minor[order] = (shares[:, order].cumsum(axis=1) <= MINOR_SHARE).all(axis=0)
+    return Screening(groups, is_minor, np.array(totals)) if is_minor.sum() > 1 else Screening.none(groups)
+
+
+def _carrying(f: np.ndarray) -> float:
+    """Return how many base realizations carry the variance of values f (n, 2 + group); 0 if there is none."""
+    squares = ((f[:, :2] - f[:, :2].mean()) ** 2).mean(axis=1)
+    return float(squares.sum() ** 2 / (squares**2).sum()) if squares.any() else 0.0
