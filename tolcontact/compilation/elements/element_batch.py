@@ -10,7 +10,7 @@ import numpy as np
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation.conditioning import idle_row
 from tolcontact.compilation.elements.element import Element
-from tolcontact.compilation.elements.element_functions import ENERGY_INPUTS, ElementFunctions
+from tolcontact.compilation.elements.element_functions import ElementFunctions
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.mechanics.pose import ENTRIES, Number
 
@@ -56,32 +56,32 @@ class ElementBatch:
             np.array([idle_row(row, self.size).full().ravel() for row in rows]).T.ravel() for rows in self.rows.tolist()
         ])  # fmt: skip
 
-    def terms(self, inputs: Arrays, shared: Arrays) -> Arrays:
-        """Return the terms of all elements (realization, element, entry), and their `filled` rows.
+    def terms(self, inputs: Arrays, shared: Arrays, *, newton: bool) -> Arrays:
+        """Return the terms of all elements (realization, element, entry), if `newton` with curvature; and `filled` rows.
 
         `inputs` are those of contact_qp, (realization, entry); `shared` those of the elements that are computed once.
         """
         local = self._common(inputs, shared) | self._points(inputs)
         local["reactions"] = inputs["reactions"][:, self.rows]
-        terms = self._call(self._functions.terms, local)
+        function = self._functions.newton if newton and self._functions.newton is not None else self._functions.terms
+        terms = self._call(function, local)
         terms["filled"] = local.get("filled", np.ones((1, 1, 1)))
         return terms
 
     def conditioned(self, terms: Arrays, V: Float[Array, "n mover 36"], length: Number) -> Arrays:
         """Return a, opening, lower and row_length of the elements for V = U^-1 of all movers."""
-        count = len(V)
         local = {name: terms[name] for name in ("slopes", "gaps", "filled")}
-        local |= {"V": V[:, self.movers], "idle": self._repeated(self._idle, count), "length": np.full((1, 1, 1), length)}
+        local |= {"V": V[:, self.movers], "idle": self._idle[None], "length": np.full((1, 1, 1), length)}
         return self._call(self._functions.rows, local)
 
     def checked(self, local: Arrays) -> Arrays:
         """Return residual, force, slack_force and multipliers of the elements; see ElementFunctions."""
         return self._call(self._functions.check, local)
 
-    def linearized(self, relative: np.ndarray, by_z: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """Return X_RM to first order (realization, element, 12) after steps (realization, mover, 6)."""
-        shape = (len(step), len(self.pairs), -1)
-        local = {"X": relative.reshape(shape), "by_z": by_z.reshape(shape), "step": step[:, self.movers]}
+    def linearized(self, poses: np.ndarray, faces: np.ndarray, step: np.ndarray, length: Number) -> np.ndarray:
+        """Return X_RM to first order (realization, element, 12) after steps (realization, mover, 6) from some poses."""
+        local = {"poses": poses[:, self.parts], "faces": faces[:, self._faces], "step": step[:, self.movers]}
+        local |= {"constants": self._constants[None], "length": np.full((1, 1, 1), length)}
         return self._call(self._functions.advance, local)["linearized"]
 
     def relative(self, poses: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -91,8 +91,7 @@ class ElementBatch:
 
     def energy(self, inputs: Arrays, shared: Arrays) -> np.ndarray:
         """Return the objective of each element (realization, element, 1)."""
-        common = self._common(inputs, shared)
-        return self._call(self._functions.energy, {name: common[name] for name in ENERGY_INPUTS})["energy"]
+        return self._call(self._functions.energy, self._common(inputs, shared))["energy"]
 
     @cached_property
     def _standing(self) -> Arrays:
@@ -104,14 +103,14 @@ class ElementBatch:
 
     def _points(self, inputs: Arrays) -> Arrays:
         """Return the inputs that hold contact points."""
-        count, element = len(inputs["poses"]), self._elements[0]
+        element = self._elements[0]
         if element.contact.round is not None:
             return {}
         if element.has_slots:
-            points = {name: inputs[name].reshape(count, -1, 3)[:, self._slots] for name in ("P_m", "P_r", "n_r")}
-            bends = inputs["bend"].reshape(count, -1, ENTRIES)[:, self._bends]
+            points = {name: split(inputs[name], 3)[:, self._slots] for name in ("P_m", "P_r", "n_r")}
+            bends = split(inputs["bend"], ENTRIES)[:, self._bends]
             return points | {"filled": inputs["filled"][:, self._slots], "bend": bends}
-        points = {name: self._repeated(values, count) for name, values in self._standing.items()}
+        points = {name: values[None] for name, values in self._standing.items()}
         if any(element.contact.offsets.columns.size for element in self._elements):
             points["P_r"] = points["P_r"] + self._raised(inputs["deviations"])
         return points
@@ -123,28 +122,29 @@ class ElementBatch:
             points = np.broadcast_to(np.asarray(element.points), (len(deviations), self.row_count))
             heights = element.contact.offsets.heights(deviations, points)
             shifts[:, k] = heights[:, :, None] * element.contact.n_r[element.points]
-        return shifts.reshape(len(deviations), len(self._elements), -1)
+        return shifts.reshape(len(deviations), len(self._elements), 3 * self.row_count)
 
     def _common(self, inputs: Arrays, shared: Arrays) -> Arrays:
         """Return the inputs that all functions of poses and objective share."""
-        count = len(inputs["poses"])
-        local = {name: inputs[name].reshape(count, -1, ENTRIES)[:, self.parts] for name in ("poses", "raw")}
-        local["moments"] = inputs["moments"].reshape(count, -1, 10)[:, self.sides]
-        local["faces"] = shared["faces"].reshape(count, -1, ENTRIES)[:, self._faces]
-        local["heights"] = shared["heights"].reshape(count, -1, 2)[:, self.pairs]
-        local["constants"] = self._repeated(self._constants, count)
+        local = {name: split(inputs[name], ENTRIES)[:, self.parts] for name in ("poses", "raw")}
+        local["moments"] = split(inputs["moments"], 10)[:, self.sides]
+        local["faces"] = split(shared["faces"], ENTRIES)[:, self._faces]
+        local["heights"] = split(shared["heights"], 2)[:, self.pairs]
+        local["constants"] = self._constants[None]
         for name in ("scale", "load", "firmness", "length", "count"):
             if name in shared:
                 local[name] = shared[name].reshape(-1, 1, 1)
         return local
 
-    def _repeated(self, values: np.ndarray, count: int) -> np.ndarray:
-        return np.broadcast_to(values, (count, *values.shape))
-
     def _call(self, function: NamedFunction, local: Arrays) -> Arrays:
         """Evaluate a function for all elements of all realizations."""
         count = max(len(values) for values in local.values())
         return evaluated(function, local, (count, len(self._elements)))
+
+
+def split(values: Float[Array, "n ..."], size: int) -> Float[Array, "n _ size"]:
+    """Return arrays (n, group, entry) of groups of `size` entries."""
+    return values.reshape(len(values), math.prod(values.shape[1:]) // size, size)
 
 
 def evaluated(function: NamedFunction, arrays: Arrays, shape: tuple[int, ...]) -> Arrays:

@@ -1,5 +1,6 @@
 """The functions of a kind of elements, of a kind of parts, and of movers: CasADi expressions of the equations of mechanics."""
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -19,24 +20,28 @@ from tolcontact.method import Method
 
 
 def function_of(name: str, inputs: Mapping[str, ca.SX], outputs: Mapping[str, ca.SX]) -> NamedFunction:
-    """Return a function of dense arrays by their names."""
-    return NamedFunction.dense(ca.Function(name, [*inputs.values()], [*outputs.values()], [*inputs], [*outputs]))
+    """Return a function of dense arrays by their names, with those of the inputs on which outputs depend."""
+    everything = ca.vertcat(*(ca.vec(output) for output in outputs.values()))
+    needed = {name: symbol for name, symbol in inputs.items() if ca.depends_on(everything, ca.vec(symbol))}
+    return NamedFunction.dense(ca.Function(name, [*needed.values()], [*outputs.values()], [*needed], [*outputs]))
 
 
 @dataclass(frozen=True, eq=False)
 class ElementFunctions:
     """The functions of a kind of elements with p parts, s sides, r rows and z increments; z and y are those of its movers.
 
-    terms     (see _inputs) -> Q, curvature, nearness (z, z), pull, hold (z), slopes (r, z), gaps (r), relative (12),
-              by_z (12, z)
+    terms     (see _inputs) -> Q (36, mover), Q_between (36, pair of movers), pull (z), slopes (r, z), gaps (r), and where
+              points are projected nearness and nearness_between
+    newton    the same inputs -> these, and curvature, curvature_between, hold (z); None if no step counts curvature
     rows      slopes, gaps, filled, V (36, mover), idle (r, z), length -> a (r, z), opening, lower, row_length (r)
     check     a, opening, lower, row_length, filled, y, slack, lam, scale -> residual, force (z), slack_force, multipliers (r)
-    advance   relative (12), by_z, step (z) -> linearized (12)
+    advance   poses (12 p), faces, constants, length, step (z) -> linearized (12): X_RM, linear in the step
     relate    poses (12 p), faces -> relative (12)
     energy    poses, raw, moments, faces, constants, length, count, scale -> energy
     """
 
     terms: NamedFunction
+    newton: NamedFunction | None
     rows: NamedFunction
     check: NamedFunction
     advance: NamedFunction
@@ -51,35 +56,28 @@ def element_functions(element: Element, method: Method, *, projects: bool) -> El
     motion = setting.motion(poses_of(inputs["poses"]))
     rows = contact_rows(setting, [points], motion.poses, motion.by(linear), inputs["reactions"])
     terms = quadratic_terms(setting, rows, motion, inputs["reactions"], inputs["load"], projects=projects)
-    outputs = {name: getattr(terms, name) for name in term_names(method, projects=projects)}
-    outputs |= {"slopes": rows.slopes, "gaps": rows.gaps}
-    outputs |= {"relative": setting.at_rest(rows.relative), "by_z": ca.jacobian(rows.relative, setting.z)}
-    X, by_z, step = (
-        ca.SX.sym(name, *shape)
-        for name, shape in (("X", (ENTRIES, 1)), ("by_z", outputs["by_z"].shape), ("step", setting.z.shape))
-    )
+    outputs = _blocks("Q", terms.Q) | {"pull": terms.pull, "slopes": rows.slopes, "gaps": rows.gaps}
+    if projects:
+        outputs |= _blocks("nearness", terms.nearness)
+    with_curvature = outputs | _blocks("curvature", terms.curvature) | {"hold": terms.hold}
     value = ca.substitute(energy(setting, motion.poses).value, setting.firmness, 1)
     return ElementFunctions(
         terms=function_of("terms", inputs, outputs),
+        newton=function_of("newton", inputs, with_curvature) if method.is_exact else None,
         rows=_rows_function(element),
         check=_check_function(element),
-        advance=function_of("advance", {"X": X, "by_z": by_z, "step": step}, {"linearized": X + by_z @ step}),
-        relate=function_of(
-            "relate",
-            {name: inputs[name] for name in ("poses", "faces")},
-            {"relative": setting.relative(motion.poses)[0].vector()},
-        ),
-        energy=function_of("energy", {name: inputs[name] for name in ENERGY_INPUTS}, {"energy": value}),
+        advance=function_of("advance", inputs | {"step": setting.z}, {"linearized": rows.relative}),
+        relate=function_of("relate", inputs, {"relative": setting.relative(motion.poses)[0].vector()}),
+        energy=function_of("energy", inputs, {"energy": value}),
     )
 
 
-ENERGY_INPUTS = ("poses", "raw", "moments", "faces", "constants", "length", "count", "scale")
-
-
-def term_names(method: Method, *, projects: bool) -> list[str]:
-    """Return the names of the QuadraticTerms that a method needs."""
-    newton = ["curvature", "hold"] if method.is_exact else []
-    return ["Q", "pull", *newton, *(["nearness"] if projects else [])]
+def _blocks(name: str, matrix: ca.SX) -> dict[str, ca.SX]:
+    """Return the blocks (36, block) of a matrix (z, z) on its diagonal, and above it, by name."""
+    movers = [slice(k, k + FREEDOMS) for k in range(0, matrix.size1(), FREEDOMS)]
+    diagonal = [ca.vec(ca.densify(matrix[k, k])) for k in movers]
+    above = [ca.vec(ca.densify(matrix[i, j])) for i, j in itertools.combinations(movers, 2)]
+    return {name: ca.horzcat(*diagonal), f"{name}_between": ca.horzcat(ca.SX(FREEDOMS**2, 0), *above)}
 
 
 def _inputs(element: Element) -> dict[str, ca.SX]:
@@ -142,7 +140,7 @@ def _rows_function(element: Element) -> NamedFunction:
         "slopes": ca.SX.sym("slopes", rows, size),
         "gaps": ca.SX.sym("gaps", rows),
         "V": ca.SX.sym("V", FREEDOMS**2, movers),
-        "idle": ca.SX.sym("idle", rows, size),
+        "idle": ca.SX.sym("idle", rows, size),  # only used in slots that can be empty
         "length": ca.SX.sym("length"),
     }
     filled = ca.SX.sym("filled", rows) if element.has_slots else ca.SX.ones(rows)

@@ -12,15 +12,14 @@ from tolcontact.compilation.contact_qp import Evaluators, Standing, row_spans
 from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.elements.corrected_poses import CorrectedPoses
 from tolcontact.compilation.elements.element import elements_of
-from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Numbers, evaluated
+from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Numbers, evaluated, split
 from tolcontact.compilation.elements.element_functions import (
     element_functions,
     function_of,
     mover_functions,
-    term_names,
 )
 from tolcontact.compilation.elements.sparse_layout import BlockSum, SparseLayout
-from tolcontact.compilation.functions import NamedFunction
+from tolcontact.compilation.functions import NamedFunction, flat
 from tolcontact.compilation.outcome import step_share
 from tolcontact.compilation.plugins import Plugin
 from tolcontact.discretization import Nominal
@@ -33,8 +32,8 @@ from tolcontact.mechanics.pose import ENTRIES
 from tolcontact.mechanics.setting import face_heights, face_poses
 from tolcontact.method import Method
 
-MANY_MOVERS = 4  # from which on a group is assembled from elements
-MAX_ENTRIES = 500_000  # of the terms of all elements of a batch of realizations
+MANY_MOVERS = 6  # from which on a group is assembled from elements
+MAX_ENTRIES = 1_000_000  # of the terms of all elements of a batch of realizations
 POINT_OBJECTIVES = ("active points", "all points")
 
 
@@ -59,7 +58,6 @@ class ElementQP:
         self.standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
         self.slacks, self.spans = len(group.pairs), row_spans(self.standing)
         self._projects = method.is_iterated or bool(curved_pairs(nominal, group))
-        self._term_names = [name for name in term_names(method, projects=self._projects) if name not in ("pull", "hold")]
         self._batches = _batches(nominal, group, method, self.standing, projects=self._projects)
         self._movers, self._size = mover_functions(), FREEDOMS * len(group.free)
         self._corrected_poses = CorrectedPoses(group, method)
@@ -94,43 +92,43 @@ class ElementQP:
         """Return h, g, a, lba and uba, and what `finish` needs beside them, for the inputs of contact_qp."""
         count, length = len(inputs["poses"]), self._group.length
         shared = self._shared_arrays(inputs)
-        terms = [batch.terms(inputs, shared) for batch in self._batches]
-        Q, Q_between, pull = self._summed(terms, inputs)
+        newton = self._method.is_exact and bool(inputs["newton"].any())
+        terms = [batch.terms(inputs, shared, newton=newton) for batch in self._batches]
+        Q, Q_between, pull = self._summed(terms, inputs, newton=newton)
         whitened = _of_blocks(self._movers.whiten, Q=Q, pull=pull)
         V, g = whitened["V"], whitened["g"]
         between = self._coupled
         H = _of_blocks(self._movers.couple, Q=Q_between, V_i=V[:, between[:, 0]], V_j=V[:, between[:, 1]])["H"]
         rows = [batch.conditioned(local, V, length) for batch, local in zip(self._batches, terms, strict=True)]
         h = np.ones((count, len(self._layouts["h"])))
-        h[:, self._coupling_places] = np.concatenate([H, H], axis=1).reshape(count, -1)
+        h[:, self._coupling_places] = flat(np.concatenate([H, H], axis=1))
         a = np.empty((count, len(self._layouts["a"])))
         by_row = {name: np.empty((count, self.spans[-1].stop)) for name in ("lba", "row_length", "filled")}
         for batch, places, opening_places, local, row in zip(self._batches, *self._row_places, terms, rows, strict=True):
             a[:, places], a[:, opening_places] = row["a"], row["opening"]
             by_row["lba"][:, batch.rows], by_row["row_length"][:, batch.rows] = row["lower"], row["row_length"]
             by_row["filled"][:, batch.rows] = local["filled"]
-        kept = {f"{name} {k}": local[name].reshape(count, -1) for k, local in enumerate(terms) for name in ("relative", "by_z")}
         prices = np.full((count, self.slacks), length)
         return {
-            "h": h, "g": np.concatenate([g.reshape(count, -1), prices], axis=1), "a": a,
-            "uba": np.full(by_row["lba"].shape, np.inf), "V": V.reshape(count, -1),
+            "h": h, "g": np.concatenate([flat(g), prices], axis=1), "a": a,
+            "uba": np.full(by_row["lba"].shape, np.inf), "V": flat(V),
             "faces": shared["faces"], "scale": shared["scale"],
-            **by_row, **kept,
+            **by_row,
         }  # fmt: skip
 
     def finish(self, **arrays: Float[Array, "realization _"]) -> Arrays:
         """Return the outputs of contact_qp."""
         count, x, lam_x = len(arrays["x"]), arrays["x"], arrays["lam_x"]
-        y, slack = x[:, : self._size].reshape(count, -1, FREEDOMS), x[:, self._size :]
-        step = _of_blocks(self._movers.step, V=arrays["V"].reshape(count, -1, FREEDOMS**2), y=y)["step"]
+        y, slack = split(x[:, : self._size], FREEDOMS), x[:, self._size :]
+        step = _of_blocks(self._movers.step, V=split(arrays["V"], FREEDOMS**2), y=y)["step"]
         stride = arrays["stride"] if self._method.is_exact else np.full((count, 1), np.inf)
         length = np.full((count, 1), self._group.length)
-        share = self._share(step=step.reshape(count, -1), y=y.reshape(count, -1), stride=stride, length=length)
+        share = self._share(step=flat(step), y=flat(y), stride=stride, length=length)
         checked = [self._checked(*entry, arrays, y, slack) for entry in zip(self._batches, *self._row_places, strict=True)]
-        between, H = self._coupled, arrays["h"][:, self._coupling_places[: 36 * len(self._coupled)]].reshape(count, -1, 36)
+        between, H = self._coupled, split(arrays["h"][:, self._coupling_places[: 36 * len(self._coupled)]], FREEDOMS**2)
         pulls = _of_blocks(self._movers.pull, H=H, y_i=y[:, between[:, 0]], y_j=y[:, between[:, 1]])
-        forces = [local["force"].reshape(count, -1, FREEDOMS) for local in checked]
-        force = self._force_sum(np.concatenate([*forces, pulls["force_i"], pulls["force_j"]], axis=1)).reshape(count, -1)
+        forces = [split(local["force"], FREEDOMS) for local in checked]
+        force = flat(self._force_sum(np.concatenate([*forces, pulls["force_i"], pulls["force_j"]], axis=1)))
         slack_force, multipliers = np.empty((count, self.slacks)), np.empty((count, self.spans[-1].stop))
         for batch, local in zip(self._batches, checked, strict=True):
             slack_force[:, batch.pairs], multipliers[:, batch.rows] = local["slack_force"][:, :, 0], local["multipliers"]
@@ -139,16 +137,16 @@ class ElementQP:
             np.abs(stationarity), np.abs(np.minimum(slack, -lam_x[:, self._size :])),
             *(local["residual"][:, :, 0] for local in checked),
         ]  # fmt: skip
-        corrected = self._corrected_poses(arrays["poses"].reshape(count, -1, ENTRIES), step * share["share"][:, :, None])
+        poses, faces = (split(arrays[name], ENTRIES) for name in ("poses", "faces"))
+        corrected = self._corrected_poses(poses, step * share["share"][:, :, None])
         linearized, relative = (np.empty((count, self.slacks, ENTRIES)) for _ in range(2))
-        faces = arrays["faces"].reshape(count, -1, ENTRIES)
-        for k, batch in enumerate(self._batches):
-            linearized[:, batch.pairs] = batch.linearized(arrays[f"relative {k}"], arrays[f"by_z {k}"], step)
+        for batch in self._batches:
+            linearized[:, batch.pairs] = batch.linearized(poses, faces, step, self._group.length)
             relative[:, batch.pairs] = batch.relative(corrected, faces)
         return {
-            "corrected": corrected.reshape(count, -1),
-            "linearized": linearized.reshape(count, -1),
-            "relative": relative.reshape(count, -1),
+            "corrected": flat(corrected),
+            "linearized": flat(linearized),
+            "relative": flat(relative),
             "multipliers": multipliers,
             "residual": np.concatenate(residuals, axis=1).max(axis=1, keepdims=True),
             "slack": SLACK * slack,
@@ -158,7 +156,7 @@ class ElementQP:
 
     def energy(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return the objective of contact_qp."""
-        inputs = {name: values.reshape(len(values), -1) for name, values in inputs.items()}
+        inputs = {name: flat(values) for name, values in inputs.items()}
         shared = self._shared_arrays(inputs)
         energies = [batch.energy(inputs, shared)[..., 0] for batch in self._batches]
         return {"energy": np.concatenate(energies, axis=1).sum(axis=1, keepdims=True)}
@@ -166,14 +164,14 @@ class ElementQP:
     def relate(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return X_RM of all pairs at `poses`."""
         count = len(inputs["poses"])
-        poses = inputs["poses"].reshape(count, -1, ENTRIES)
+        poses = split(inputs["poses"], ENTRIES)
         faces = self._shared(deviations=inputs["deviations"], moments=np.zeros((count, MOMENTS * len(self._group.sides))))[
             "faces"
         ]
         relative = np.empty((count, self.slacks, ENTRIES))
         for batch in self._batches:
-            relative[:, batch.pairs] = batch.relative(poses, faces.reshape(count, -1, ENTRIES))
-        return {"relative": relative.reshape(count, -1)}
+            relative[:, batch.pairs] = batch.relative(poses, split(faces, ENTRIES))
+        return {"relative": flat(relative)}
 
     def _shared_arrays(self, inputs: Arrays) -> Arrays:
         """Return the inputs of elements that are computed once for all of them."""
@@ -183,40 +181,32 @@ class ElementQP:
             shared |= {"firmness": inputs["firmness"], "load": inputs["reactions"].sum(axis=1, keepdims=True)}
         return shared
 
-    def _summed(self, terms: Sequence[Arrays], inputs: Arrays) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _summed(self, terms: Sequence[Arrays], inputs: Arrays, *, newton: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the blocks of Q (n, mover, 36), those between two movers (n, coupling, 36), and the pull (n, mover, 6)."""
-        blocks = {name: self._blocks([local[name] for local in terms]) for name in self._term_names}
-        pull, (Q, between) = self._vectors([local["pull"] for local in terms]), blocks["Q"]
-        if self._method.is_exact and inputs["newton"].any():
-            curvature, curvature_between = blocks["curvature"]
+        (Q, between), pull = self._blocks("Q", terms), self._vectors("pull", terms)
+        if newton:
+            curvature, curvature_between = self._blocks("curvature", terms)
             convex = _of_blocks(self._movers.factor, Q=Q, curvature=curvature)["convex"][..., 0] > 0
             counts = ((inputs["newton"][:, 0] != 0) & convex.all(axis=1))[:, None, None]
             Q, between = Q + np.where(counts, curvature, 0), between + np.where(counts, curvature_between, 0)
-            pull = pull + np.where(counts, self._vectors([local["hold"] for local in terms]), 0)
+            pull = pull + np.where(counts, self._vectors("hold", terms), 0)
         if self._projects:
             caution = inputs["caution"][:, :, None]
-            Q, between = (block + caution * near for block, near in zip((Q, between), blocks["nearness"], strict=True))
+            Q, between = (
+                block + caution * near for block, near in zip((Q, between), self._blocks("nearness", terms), strict=True)
+            )
         return Q, between, pull
 
-    def _blocks(self, matrices: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sums of the matrices (n, element, z * z) of elements, by mover and by pair of coupled movers."""
-        diagonal, between = [], [np.empty((len(matrices[0]), 0, FREEDOMS**2))]
-        for batch, matrix in zip(self._batches, matrices, strict=True):
-            movers = batch.movers.shape[1]
-            blocks = matrix.reshape(*matrix.shape[:2], movers, FREEDOMS, movers, FREEDOMS)  # columns first
-            flat = (*matrix.shape[:2], FREEDOMS**2)
-            diagonal += [blocks[:, :, k, :, k].reshape(flat) for k in range(movers)]
-            between += [blocks[:, :, j, :, i].reshape(flat) for i, j in itertools.combinations(range(movers), 2)]
-        return self._mover_sum(np.concatenate(diagonal, axis=1)), self._coupling_sum(np.concatenate(between, axis=1))
+    def _blocks(self, name: str, terms: Sequence[Arrays]) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums of the blocks (n, block, 36) of elements, by mover and by pair of coupled movers."""
+        diagonal, between = (
+            np.concatenate([split(local[key], FREEDOMS**2) for local in terms], axis=1) for key in (name, f"{name}_between")
+        )
+        return self._mover_sum(diagonal), self._coupling_sum(between)
 
-    def _vectors(self, vectors: Sequence[np.ndarray]) -> np.ndarray:
+    def _vectors(self, name: str, terms: Sequence[Arrays]) -> np.ndarray:
         """Return the sums (n, mover, 6) of vectors (n, element, z) of elements."""
-        parts = [
-            vector[:, :, FREEDOMS * k : FREEDOMS * (k + 1)]
-            for batch, vector in zip(self._batches, vectors, strict=True)
-            for k in range(batch.movers.shape[1])
-        ]
-        return self._mover_sum(np.concatenate(parts, axis=1))
+        return self._mover_sum(np.concatenate([split(local[name], FREEDOMS) for local in terms], axis=1))
 
     def _checked(
         self, batch: ElementBatch, places: np.ndarray, openings: np.ndarray, arrays: Arrays, y: np.ndarray, slack: np.ndarray
@@ -230,19 +220,18 @@ class ElementQP:
     def _number_movers(self) -> None:
         """Find out which movers are coupled, and where contributions of elements to movers are summed."""
         count = self._size // FREEDOMS
-        diagonal = [batch.movers[:, k] for batch in self._batches for k in range(batch.movers.shape[1])]
+        diagonal = [batch.movers.ravel() for batch in self._batches]
         pairs = [
-            batch.movers[:, [i, j]]
+            batch.movers[:, [*itertools.combinations(range(batch.movers.shape[1]), 2)]].reshape(-1, 2)
             for batch in self._batches
-            for i, j in itertools.combinations(range(batch.movers.shape[1]), 2)
+            if batch.movers.shape[1] > 1
         ]
         between = np.concatenate([np.zeros((0, 2), dtype=int), *pairs])
         codes, numbers = np.unique(between[:, 0] * count + between[:, 1], return_inverse=True)
         self._coupled = np.column_stack(np.divmod(codes, count))
         self._mover_sum = BlockSum(np.concatenate(diagonal), count)
         self._coupling_sum = BlockSum(numbers, len(codes))
-        force_targets = [batch.movers.ravel() for batch in self._batches]
-        self._force_sum = BlockSum(np.concatenate([*force_targets, *self._coupled.T]), count)
+        self._force_sum = BlockSum(np.concatenate([*diagonal, *self._coupled.T]), count)
 
     def _lay_out(self) -> None:
         """Find out where the entries of elements stand in the matrices."""
