@@ -11,7 +11,7 @@ anything is computed.
 >>> for face in preview(pin).descriptions:
 ...     print(face)
 1. plane, along (0, 0, -1), 77.65 mm2, at (...)
-2. cylinder, radius 5 mm, along (0, 0, 1), fitted within ... mm, 626.5 mm2, at (...)
+2. cylinder, radius 5 mm, axis through (...), along (0, 0, 1), fitted within ... mm, 626.5 mm2, at (...)
 3. plane, along (0, 0, 1), 77.65 mm2, at (...)
 
 ## Meshes
