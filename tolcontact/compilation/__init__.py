@@ -15,12 +15,13 @@ model, so that a model is compiled once for many runs.
 
 ## Solvers
 
-`solver` names any installed conic plugin of CasADi that solves a small test problem correctly.
+`solver` names any installed conic plugin of CasADi that solves a small test problem correctly, or `graph`, tolcontact's solver.
 
 | solver | choose it if |
 |---|---|
 | `qpoases` (default) | you want the safe choice: correct on every problem of the study, two to three times slower than daqp |
 | `daqp` | you want speed |
+| `graph` | you want speed, above all with many bodies; it follows the graph of bodies, and asks daqp where it fails |
 | `osqp` | you compare with a first-order method; a hundred times slower on hard problems |
 | `proxqp`, `highs`, `piqp` | you compare solvers |
 
