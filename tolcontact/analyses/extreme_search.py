@@ -24,6 +24,7 @@ ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is RO
 NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points about a search that did not gain, and steps there, in shares of its own step
 MAX_STEPS = 200
 MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step, the finest one over that before
+POLISHING_SHARE = 0.15  # of the combinations tried before: after as many more, polishing ends
 MIN_POLISH = 1e-3  # of a measure's spread: a smaller gain is no reason to go on
 MAX_FINISHES = 4
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
@@ -63,6 +64,11 @@ class Evaluation:
     def __init__(self, engine: Engine, region: Region) -> None:
         self._engine, self._region = engine, region
         self._known: dict[bytes, np.ndarray] = {}
+
+    @property
+    def count(self) -> int:
+        """The number of points simulated so far."""
+        return len(self._known)
 
     def corrected(self, points: np.ndarray) -> np.ndarray:
         """Return measures (..., state, measure) at points (..., contributor); NaN, corrected, where they are not certified."""
@@ -172,30 +178,33 @@ class Searcher:
 
     def search(self, searches: Searches, advanced: Callable[[float], None]) -> None:
         """Move until all steps are small. `advanced` is called with the share of this that is done."""
-        self._search(searches, self._finest_step, advanced, follows_kinks=False)
+        self._search(searches, self._finest_step, advanced)
 
     def polish(self, searches: Searches) -> None:
-        """Go on with searches with contact, along kinks, too, until they gain no more."""
+        """Continue the searches with contact, along kinks, too, until they gain no more, or have cost too much."""
+        limit = (1 + POLISHING_SHARE) * self._evaluation.count
         for _ in range(MAX_POLISHES):
             values = searches.value.copy()
             searches.step[searches.state == terms.CORRECTED] = POLISHING_STEP
-            self._search(searches, self._finest_step * POLISHED, lambda _: None, follows_kinks=True)
-            if (searches.value <= values + MIN_POLISH * self._spread[searches.measure]).all():
+            self._search(searches, self._finest_step * POLISHED, lambda _: None, limit)
+            gains = searches.value > values + MIN_POLISH * self._spread[searches.measure]
+            if not gains.any() or self._evaluation.count > limit:
                 break
-        self.finish(searches)
+        self.finish(searches, limit)
 
     def _search(
-        self, searches: Searches, finest_step: float, advanced: Callable[[float], None], *, follows_kinks: bool
+        self, searches: Searches, finest_step: float, advanced: Callable[[float], None], limit: float | None = None
     ) -> None:
+        """Move until all steps are small; with a `limit` of combinations along kinks, too, until as many were tried."""
         for _ in range(MAX_STEPS):
             rows = np.flatnonzero(searches.step > finest_step)
-            if not rows.size:
+            if not rows.size or (limit is not None and self._evaluation.count > limit):
                 break
             active = searches.take(rows)
             candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
             gains = active.move(candidates, values, self._min_gain(active))
             gains |= self._move_towards(active, self._region.farthest(slopes))
-            if follows_kinks:
+            if limit is not None:
                 gains |= self._move_along_ridges(active, gains)
             active.step[~gains] *= SHRINKAGE
             searches.put(rows, active)
@@ -216,8 +225,8 @@ class Searcher:
             behind.point[ends], behind.value[ends] = ways[ends, -1], values[ends, -1]
             searches.put(rows, behind)
 
-    def finish(self, searches: Searches) -> None:
-        """Move along the slopes to the very end of round zones."""
+    def finish(self, searches: Searches, limit: float) -> None:
+        """Move along the slopes to the very end of round zones; once, if more combinations than the `limit` were tried."""
         searches.step[:] = 0.0
         for _ in range(MAX_FINISHES):
             steps = np.full(len(searches.value), DIFFERENCE_STEP)
@@ -226,7 +235,7 @@ class Searcher:
                 self._region.exactly_farthest(row) if row.any() else point
                 for row, point in zip(slopes, searches.point, strict=True)
             ]
-            if not self._move_towards(searches, np.array(ends)).any():
+            if not self._move_towards(searches, np.array(ends)).any() or self._evaluation.count > limit:
                 return
 
     def _min_gain(self, searches: Searches) -> np.ndarray:

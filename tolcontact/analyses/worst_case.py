@@ -21,6 +21,7 @@ from tolcontact.variation import GivenDraws
 from tolcontact.workflow.models import Choice, Model
 
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
+PER_POLISH, PER_POLISHED_CONTRIBUTOR = 110.0, 22.0  # combinations that polishing an end needs
 EXCHANGES = 24  # combinations that influences are looked for at
 MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that go on, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
@@ -138,14 +139,16 @@ class Forecast:
 
     def __init__(self, engine: Engine, influences: Influences, effort: Effort) -> None:
         self._engine, self._before = engine, engine.simulated
-        self._expected = _expected(influences.is_active.sum(axis=1), effort)
+        active = influences.is_active.sum(axis=1)
+        self._expected = _expected(active, effort)
+        self._polishing = round(len(terms.ENDS) * (PER_POLISH + PER_POLISHED_CONTRIBUTOR * active).sum())
         self.advanced(0.0)
 
     def advanced(self, share: float) -> None:
         """Revise the total when a share of the searches is done."""
         searched = self._engine.simulated - self._before
         expected = (1 - share) * self._expected + searched
-        self._engine.total = self._engine.simulated + round((1 - share) * expected)
+        self._engine.total = self._engine.simulated + round((1 - share) * expected) + self._polishing
 
 
 def _starts(
