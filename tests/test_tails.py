@@ -15,7 +15,7 @@ from tolcontact.analyses.engine import Engine
 from tolcontact.analyses.tails import not_assemblable
 from tolcontact.simulation import map_blocks
 from tolcontact.statistics.intervals import Estimate
-from tolcontact.statistics.rare import Tail, either, tail_probability
+from tolcontact.statistics.rare import Tail, either, sufficient_tail, tail_probability
 from tolcontact.variation.plans import uniform
 
 TWELVE = np.ones(12) / np.sqrt(12)
@@ -79,6 +79,26 @@ def test_what_is_not_rare_is_counted():
     rng = np.random.default_rng(1)
     (_, lower, upper), _ = tail_probability(lambda u: u[:, 0] + 0.5, 3, samples=20_000, rng=rng)
     assert lower < stats.norm.cdf(0.5) < upper and upper - lower < 0.02
+
+
+SPARSE = np.r_[np.ones(8), np.full(8, 0.3), np.zeros(52)] / np.sqrt(8.72)
+
+
+@pytest.mark.parametrize("seeds", [range(3), *nightly(range(3, 43))])
+def test_a_quarter_of_the_realizations_suffices_for_many_contributors(seeds):
+    """68 contributors of which 16 matter, p = 1 %: all that is simulated, the intervals, and how often they cover."""
+    covered, truth = 0, stats.norm.sf(2.326)
+    for seed in seeds:
+        used = []
+
+        def score(u, used=used):
+            used.append(len(u))
+            return u @ SPARSE - 2.326
+
+        (_, lower, upper), disagreement = sufficient_tail(score, 68, samples=40_000, rng=np.random.default_rng(seed))
+        covered += lower <= truth <= upper
+        assert sum(used) < 15_000 and upper <= 1.5 * lower and disagreement == 1
+    assert covered >= 0.85 * len(seeds) - 1
 
 
 def test_what_is_never_seen_is_at_most_what_no_hit_says():

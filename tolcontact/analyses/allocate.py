@@ -54,18 +54,17 @@ def allocate(
         effect       (measure, of_effect, group, interval)  change of 6 sigma, and of the share outside, if a group's zones were
                                                          a tenth narrower: which to tighten first
 
-    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or several of these texts. `costs` maps a group that
+    `require` is "corner height: ppm 1000" or "corner height: Ppk 1.33", or several such texts. `costs` maps a group that
     may change to a number c, for the cost c * present range / new range, or to a function of the factor. Groups without costs
     keep their ranges. If `costs` is left out, all groups may change with c = 1. `by` is as in `contributions`: "contributor",
     "feature" or "part".
 
     Ranges stay between a tenth and three times the present ones. Groups without influence on any requirement keep theirs. Each
-    step replaces the margins of the requirements by functions of squared ranges, on the same draws. The slopes are those to
-    wider ranges, and only realizations near the limits are simulated again for them. scipy's SLSQP minimizes the cost within a
-    region that shrinks when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a
-    requirement, the search continues with a margin larger by as much. Effects follow from a quarter of the realizations, with
-    more than 16 groups from 4 samples / groups, but at least 512. `progress` is called with the number of realizations
-    simulated, and with the approximate number of all.
+    step replaces the margins of the requirements by functions of squared ranges with the same values and slopes, on the same
+    draws; slopes follow from realizations near the limits alone. scipy's SLSQP minimizes the cost within a region that shrinks
+    when a step fails (a sequential separable approximation; Svanberg, 1987). If the fresh run misses a requirement, the search
+    continues with a larger margin. Effects follow from samples / 4 realizations, or 4 samples / groups if that is less, but at
+    least 512. `progress` is called with the number of realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
     model in which no range varies.
     """
@@ -78,8 +77,7 @@ def allocate(
     requirements = _requirements(require, program, samples)
     groups = _groups(program, by)
     curves = _curves(costs, groups)
-    total = VERIFICATION_FACTOR * samples + _expected(samples, len(groups))
-    trials = ScaledTrials(analysis.engine(total), list(groups.values()), seed, samples)
+    trials = ScaledTrials(analysis.engine(_expected(samples, len(groups))), list(groups.values()), seed, samples)
     prices = Prices([curves.get(name, 0.0) for name in groups], np.array([name in curves for name in groups]))
     search = Search(trials, requirements, prices)
     logs, estimates, is_met = _allocated(search, _expected(samples, 0))
@@ -163,9 +161,8 @@ def _cost(curve: Cost, factor: float) -> float:
 
 def _expected(samples: int, groups: int) -> int:
     """Return the approximate number of realizations of a search and its verification, with slopes and effects of groups."""
-    return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * (
-        USUAL_STEPS * MIN_DECISIVE + _effect_samples(samples, groups)
-    )
+    of_groups = USUAL_STEPS * MIN_DECISIVE + _effect_samples(samples, groups)
+    return (VERIFICATION_FACTOR + USUAL_STEPS) * samples + groups * of_groups
 
 
 def _effect_samples(samples: int, groups: int) -> int:
@@ -260,24 +257,25 @@ class Search:
         return self.prices.total(logs) + penalty * float(np.maximum(-margins, 0).sum())
 
     def _slopes(self, logs: np.ndarray, corrected: np.ndarray) -> np.ndarray:
-        """Return derivatives (requirement, group) of the margins, linear in squared ranges; 0 for groups that do not change.
+        """Return derivatives (requirement, group) of the margins, by central differences; 0 for groups that do not change.
 
         A margin follows from the realizations beyond it and near it (Hong, 2009): only these are simulated again, and
         measures of the others (n, measure) stay. Groups that change none of them are idle from then on.
         """
-        slopes, margins = np.zeros((len(self.requirements), len(logs))), _margins(self.requirements, corrected)
+        slopes = np.zeros((len(self.requirements), len(logs)))
         rows = np.unique(np.concatenate([r.decisive(corrected[:, r.measure]) for r in self.requirements]))
         measures = sorted({requirement.measure for requirement in self.requirements})
         spreads = corrected.std(axis=0)[measures]
         for group in np.flatnonzero(self.is_free):
             step = STEP * np.eye(len(logs))[group]
-            wide = corrected.copy()
+            wide, narrow = corrected.copy(), corrected.copy()
             wide[rows] = self.trials.corrected_rows(np.exp(logs + step), rows)
             changes = np.abs(wide - corrected)[:, measures]
             if (changes.max(axis=0) <= IDLE * spreads).all():
                 self.idle[group] = True
                 continue
-            slopes[:, group] = (_margins(self.requirements, wide) - margins) / (math.expm1(2 * STEP) / 2)
+            narrow[rows] = self.trials.corrected_rows(np.exp(logs - step), rows)
+            slopes[:, group] = (_margins(self.requirements, wide) - _margins(self.requirements, narrow)) / (2 * STEP)
         return slopes
 
     def _step(self, margins: np.ndarray, slopes: np.ndarray, logs: np.ndarray, radius: float) -> np.ndarray:

@@ -23,6 +23,8 @@ SHRINKAGE = 0.25  # of a step
 ROUNDING, STEP_GAIN = 1e-10, 0.01  # of a measure's spread: the least gain is ROUNDING + STEP_GAIN step^2
 NEARBY_POINTS, NEARBY_STEP = 4, 0.1  # points about a search that did not gain, and steps there, in shares of its own step
 MAX_STEPS = 200
+MAX_POLISHES, POLISHING_STEP, POLISHED = 3, 0.25, 0.2  # of the best searches; their first step, the finest one over that before
+MIN_POLISH = 1e-3  # of a measure's spread: a smaller gain is no reason to go on
 MAX_FINISHES = 4
 DIFFERENCE_STEP = 1e-4  # of the ranges, for slopes at an end
 
@@ -32,12 +34,12 @@ class Effort:
     """The thoroughness of searches.
 
     best, random  number of searches for each extreme value, from the best combinations and from random ones
-    finest_step   the step at which a search ends, in shares of the ranges
+    finest_step   the step at which a search ends, in shares of the ranges; the best ones go on to a fifth of that
     """
 
     best: int
     random: int
-    finest_step: float = 0.01
+    finest_step: float = 0.05
 
     @classmethod
     def of(cls, samples: int) -> "Effort":
@@ -162,7 +164,7 @@ class Searcher:
         self, region: Region, evaluation: Evaluation, spread: np.ndarray, is_active: np.ndarray, rng: np.random.Generator,
         finest_step: float,
     ) -> None:  # fmt: skip
-        self._region, self._evaluation, self.spread, self._rng = region, evaluation, spread, rng
+        self._region, self._evaluation, self._spread, self._rng = region, evaluation, spread, rng
         self._is_active, self._finest_step = is_active, finest_step
         self._ranges = np.zeros(len(region.lower))
         self._ranges[region.moves] = (region.upper - region.lower)[region.moves]
@@ -170,19 +172,35 @@ class Searcher:
 
     def search(self, searches: Searches, advanced: Callable[[float], None]) -> None:
         """Move until all steps are small. `advanced` is called with the share of this that is done."""
+        self._search(searches, self._finest_step, advanced, follows_kinks=False)
+
+    def polish(self, searches: Searches) -> None:
+        """Go on with searches with contact, along kinks, too, until they gain no more."""
+        for _ in range(MAX_POLISHES):
+            values = searches.value.copy()
+            searches.step[searches.state == terms.CORRECTED] = POLISHING_STEP
+            self._search(searches, self._finest_step * POLISHED, lambda _: None, follows_kinks=True)
+            if (searches.value <= values + MIN_POLISH * self._spread[searches.measure]).all():
+                break
+        self.finish(searches)
+
+    def _search(
+        self, searches: Searches, finest_step: float, advanced: Callable[[float], None], *, follows_kinks: bool
+    ) -> None:
         for _ in range(MAX_STEPS):
-            rows = np.flatnonzero(searches.step > self._finest_step)
+            rows = np.flatnonzero(searches.step > finest_step)
             if not rows.size:
                 break
             active = searches.take(rows)
             candidates, values, slopes = self._neighbours(active, active.step, self._random_steps())
             gains = active.move(candidates, values, self._min_gain(active))
             gains |= self._move_towards(active, self._region.farthest(slopes))
-            gains |= self._move_along_ridges(active, gains)
+            if follows_kinks:
+                gains |= self._move_along_ridges(active, gains)
             active.step[~gains] *= SHRINKAGE
             searches.put(rows, active)
-            steps = np.log(np.maximum(searches.step, self._finest_step)[searches.state == terms.CORRECTED])
-            advanced(float(steps.mean() / math.log(self._finest_step)))
+            steps = np.log(np.maximum(searches.step, finest_step)[searches.state == terms.CORRECTED])
+            advanced(float(steps.mean() / math.log(finest_step)))
 
     def meet(self, searches: Searches, count: int) -> None:
         """Move the searches with contact to the best of each `count` in a row, where the measure grows all the way there."""
@@ -194,7 +212,7 @@ class Searcher:
             fixed = np.setdiff1d(self._region.varies, self._region.moves)
             ways[:, :, fixed] = best[rows][:, None, fixed]
             values = np.column_stack([behind.value, behind.values_at(ways, self._evaluation)])
-            ends = np.flatnonzero((np.diff(values, axis=1) >= -ROUNDING * self.spread[behind.measure][:, None]).all(axis=1))
+            ends = np.flatnonzero((np.diff(values, axis=1) >= -ROUNDING * self._spread[behind.measure][:, None]).all(axis=1))
             behind.point[ends], behind.value[ends] = ways[ends, -1], values[ends, -1]
             searches.put(rows, behind)
 
@@ -213,7 +231,7 @@ class Searcher:
 
     def _min_gain(self, searches: Searches) -> np.ndarray:
         """Return the least gain (n,) of a step: a forcing function, which grows with the step so that searches do not creep."""
-        return np.asarray(self.spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
+        return np.asarray(self._spread[searches.measure] * (ROUNDING + STEP_GAIN * searches.step**2))
 
     def _random_steps(self) -> np.ndarray:
         """Return steps (direction, contributor) of length 1 in shares of the ranges."""

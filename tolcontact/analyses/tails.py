@@ -15,7 +15,7 @@ from tolcontact.analyses.engine import Engine, Progress
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.limits import Limits
-from tolcontact.statistics.rare import Score, either, tail_probability
+from tolcontact.statistics.rare import Score, either, sufficient_tail
 from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
@@ -68,7 +68,7 @@ def tails(
         tails_of_sides, is_stop = [], []
         for side in event.sides:  # each has its own way, and may hide that of the other
             score, part = side(engine), samples // len(event.sides)
-            tails_of_sides.append(tail_probability(score, dimensions, samples=part, rng=rng, leads=event.leads))
+            tails_of_sides.append(sufficient_tail(score, dimensions, samples=part, rng=rng, leads=event.leads))
             is_stop.append(isinstance(score, _Beyond) and score.is_stop)
         # Beside another side, one at which values stop would only add how seldom a run of this size can see it.
         kept = [tail for tail, stop in zip(tails_of_sides, is_stop, strict=True) if not stop]

@@ -22,7 +22,7 @@ from tolcontact.workflow.models import Choice, Model
 
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
 EXCHANGES = 24  # combinations that influences are looked for at
-MAX_RESTARTS, MAX_POLISHES, RESTART_STEP = 3, 3, 0.25  # of searches that go on, and the step that they begin with
+MAX_RESTARTS, RESTART_STEP = 3, 0.25  # of searches that go on, and the step that they begin with
 END_TOLERANCE = 1e-3  # of a measure's spread: searches that end at values closer than this have the same end
 
 
@@ -124,13 +124,7 @@ def _searched(
         if not rows.size:
             break
         searches.step[rows] = RESTART_STEP
-    for _ in range(MAX_POLISHES):
-        values = best.value.copy()
-        best.step[best.state == terms.CORRECTED] = RESTART_STEP
-        searcher.search(best, lambda _: None)
-        if (best.value <= values + END_TOLERANCE * searcher.spread[best.measure]).all():
-            break
-    searcher.finish(best)
+    searcher.polish(best)
     return best
 
 

@@ -18,7 +18,7 @@ from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 
-CACHE_BYTES = 1 << 22  # a chunk; the library's own size would add up to as much memory as all else takes together
+CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
 
 
 def open_archive(path: str | Path) -> xr.DataTree:

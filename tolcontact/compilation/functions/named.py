@@ -115,9 +115,7 @@ class _Buffers:
 
 
 MIN_COMPILED_CALLS = 10_000  # evaluations after which compiling a Function pays: it takes as long as interpreting it that often
-MAX_INSTRUCTIONS = (
-    300_000  # instructions that are compiled; more are interpreted, since compiling them would take half a minute
-)
+MAX_INSTRUCTIONS = 300_000  # that are compiled; more are interpreted, since compiling them takes more than a gigabyte
 
 
 class AdaptiveFunction:

@@ -243,7 +243,7 @@ def _advance(layout, work, length):  # type: ignore[no-untyped-def]
 def enter_joints(layout, work, depths, deepest, eager):  # type: ignore[no-untyped-def]
     """Let the most violated row of each joint carry; without `eager`, only if its neighbours are violated less."""
     for j in range(deepest.size):
-        enters = deepest[j] >= 0
+        enters = deepest[j] >= 0 and not work.joints[j, CHANGED]
         if not eager:
             for q in range(layout.joints[j, NEAR], layout.joints[j + 1, NEAR]):
                 k = layout.near[q]

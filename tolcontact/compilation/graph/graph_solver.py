@@ -98,7 +98,9 @@ class _Search:
         )
         self._blocks = np.zeros((len(storage.columns) if coupled else 0, FREEDOMS, FREEDOMS))
         self._guesses = np.zeros(joints), np.zeros(joints, dtype=np.int64)
-        self._limits = np.array([ROUNDS if bodies > FEW_BODIES else ROUNDS_OF_FEW, STEPS_PER_ROW * (rows + FREEDOMS)])
+        self._limits = np.array(
+            [max(ROUNDS, bodies) if bodies > FEW_BODIES else ROUNDS_OF_FEW, STEPS_PER_ROW * (rows + FREEDOMS)]
+        )
 
     def __call__(
         self, problem: tuple[np.ndarray, ...], reactions: np.ndarray, answer: tuple[np.ndarray, ...]

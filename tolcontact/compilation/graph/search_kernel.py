@@ -42,10 +42,9 @@ def _tolerance(layout, work, refines):  # type: ignore[no-untyped-def]
 @inlined_inner
 def _hold_joints(layout, work, tolerance, depths, deepest, eager):  # type: ignore[no-untyped-def]
     """Let rows enter and leave in all joints at once; return whether the solution is reached."""
-    if release(layout, work, tolerance) + close_slacks(layout, work, tolerance):
-        return False
+    changes = release(layout, work, tolerance) + close_slacks(layout, work, tolerance)
     if not scan(layout, work, tolerance, depths, deepest):
-        return True
+        return changes == 0
     enter_joints(layout, work, depths, deepest, eager)
     return False
 

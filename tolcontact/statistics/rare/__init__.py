@@ -17,9 +17,12 @@ the event (Papaioannou and others, 2015). What both have found are the centres o
 probability is estimated by importance sampling, which is unbiased whatever was found. A way that neither search found is
 missing from it. So the estimate counts only if many realizations carry it, none of them much of it, and if neither search says
 significantly more. Otherwise the searches answer; where they disagree, the interval covers both, and `disagreement` says so.
+
+With more than ten contributors, the means of those without influence are noise in a centre, which spreads the weights: what is
+smaller than five standard errors in a centre is taken for 0.
 """
 
-from tolcontact.statistics.rare.probability import Tail, either, tail_probability
+from tolcontact.statistics.rare.probability import Tail, either, sufficient_tail, tail_probability
 from tolcontact.statistics.rare.searches import Score
 
-__all__ = ["Score", "Tail", "either", "tail_probability"]
+__all__ = ["Score", "Tail", "either", "sufficient_tail", "tail_probability"]

@@ -12,7 +12,7 @@ from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
 from tolcontact.statistics.rare.searches import INFLATIONS, Found, Score, by_inflation, by_levels, first_inflation
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
-FIRST_LOOK, PRECISE = 0.25, 1.5  # of all realizations; upper over lower bound that suffices
+FIRST_LOOK, MIN_LOOK, SUFFICIENT = 0.25, 4000, 1.5  # share and number of realizations; upper over lower bound that suffices
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
@@ -34,23 +34,26 @@ class Tail(NamedTuple):
     disagreement: float
 
 
-def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
-    """Return the probability that a score is above 0, with its 95 % interval, from at most about `samples` realizations.
+def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
+    """Return the `tail_probability` from at most about `samples` realizations.
 
     A quarter of them suffices if the searches agree and the upper bound is at most 1.5 times the lower one. Otherwise the
     others answer alone.
+    """
+    look = int(FIRST_LOOK * samples)
+    if look >= MIN_LOOK:
+        tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
+        if tail.disagreement == 1.0 and 0 < tail.probability.upper <= SUFFICIENT * tail.probability.lower:
+            return tail
+        samples -= look
+    return tail_probability(score, dimensions, samples=samples, rng=rng, leads=leads)
+
+
+def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
+    """Return the probability that a score is above 0, with its 95 % interval, from about `samples` realizations.
 
     leads   whether scores outside of the event say how near it is; otherwise inflation alone is searched by
     """
-    look = int(FIRST_LOOK * samples)
-    tail = _looked_for(score, dimensions, samples=look, rng=rng, leads=leads)
-    if tail.disagreement == 1.0 and 0 < tail.probability.upper <= PRECISE * tail.probability.lower:
-        return tail
-    return _looked_for(score, dimensions, samples=samples - look, rng=rng, leads=leads)
-
-
-def _looked_for(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool) -> Tail:
-    """Return the probability that a score is above 0, with its 95 % interval, from about `samples` realizations."""
     is_small = samples < SEARCHABLE
     pilot = (
         score(rng.standard_normal((MIN_PILOT if is_small else max(int(PILOT * samples), MIN_LEVEL_SAMPLES), dimensions))) > 0
