@@ -9,6 +9,7 @@ import pytest
 from tests.helpers import ROOT, run
 
 STUDIES = {
+    "bodies/measure.py": ["--scenes", "ring", "--sizes", "3", "--methods", "linearized", "--figure", "cost.png"],
     "cad/as1.py": ["--samples", "20"],
     "cad/as1_nine.py": ["--samples", "20", "--surfaces", "2"],
     "cad/compare_numbers.py": [ROOT / "studies" / "cad" / "as1-oc-214.stp"],
