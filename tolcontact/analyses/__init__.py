@@ -69,10 +69,11 @@ Where contact alone does not hold a part, as with a block that can be lifted off
 (True, -0.0)
 
 `tc.tails` estimates probabilities that are too small to count. Two searches look for the ways into each event, and importance
-sampling about what they found estimates the probability: from 40 000 realizations by default, or from a quarter of them where
-the upper bound of the interval is then at most 1.5 times the lower one. Each limit is searched for by itself. Where the two
-searches disagree, `disagreement` says so, and the interval covers both. What neither search finds is missing: a small region
-far from where others are common, more ways than some thirty, or more than forty contributors that matter.
+sampling about what they found estimates the probability. By default all events share 60 000 realizations, with 10 000 to 40 000
+for each; a quarter suffices where the upper bound of the interval is then at most 1.5 times the lower one. Each limit is
+searched for by itself. Where the two searches disagree, `disagreement` says so, and the interval covers both. What neither
+search finds is missing: a small region far from where others are common, more ways than some thirty, or more than forty
+contributors that matter.
 
 >>> far = tc.Assembly("far")
 >>> bar = far.part("bar", tc.Box(50, 25, 10))

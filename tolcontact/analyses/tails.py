@@ -20,12 +20,14 @@ from tolcontact.variation.draws import MIN_UNIFORM
 from tolcontact.workflow.models import Choice, Model
 
 MIN_SAMPLES = 4000  # for an event
+BUDGET, DEFAULT_RANGE = 60_000, (10_000, 40_000)  # realizations for all events, and for one
 MIN_AT_STOP = 50  # values at a limit that nothing exceeds
 
 
 def tails(
-    model: Model | Program, *, samples: int = 40_000, seed: int = 1, solver: str | None = None, method: Choice | None = None,
-    into: str | Path | None = None, client: Any = None, progress: Progress | None = None,
+    model: Model | Program, *, samples: int | None = None, seed: int = 1, solver: str | None = None,
+    method: Choice | None = None, into: str | Path | None = None, client: Any = None,
+    progress: Progress | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Return probabilities of rare events (see tolcontact.statistics.rare).
 
@@ -38,9 +40,10 @@ def tails(
 
     An event is that a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, that parts
     cannot be assembled. The score of the former is the measure itself, and each limit is searched for by itself; the latter is
-    searched for by inflation of all deviations alone. A quarter of the samples suffices where the upper bound of the interval
-    is at most 1.5 times the lower one; otherwise the other three quarters answer. Where two searches disagree, the interval
-    covers what both say, and more realizations are needed.
+    searched for by inflation of all deviations alone. By default all events share 60 000 realizations, with 10 000 to 40 000
+    for each. A quarter of the samples suffices where the upper bound of the interval is at most 1.5 times the lower one;
+    otherwise the other three quarters answer. Where two searches disagree, the interval covers what both say, and more
+    realizations are needed.
     Probabilities include realizations that are not resolved, with their last poses. `progress` is called with the number of
     realizations simulated, and with the approximate number of all.
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses. Raises OptionError also for a
@@ -49,8 +52,8 @@ def tails(
     if isinstance(samples, int) and samples < MIN_SAMPLES:
         raise OptionError(f"samples is {samples!r}; expected at least {MIN_SAMPLES} realizations for an event")
     analysis = Analysis(
-        terms.TAILS, model, samples=samples, seed=seed, solver=solver, method=method, into=into, client=client,
-        progress=progress,
+        terms.TAILS, model, samples=MIN_SAMPLES if samples is None else samples, seed=seed, solver=solver, method=method,
+        into=into, client=client, progress=progress,
     )  # fmt: skip
     program = analysis.program
     analysis.check_varies(program.draws.varying)
@@ -60,6 +63,8 @@ def tails(
             f'"{analysis.assembly}" has no rare event: no measure has limits, and parts can always be assembled; '
             "give measures tolerance=... or limits=..."
         )
+    if samples is None:
+        samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
     engine = analysis.engine(len(events) * samples)
     found, statuses, stops = [], [], []
     for number, event in enumerate(events.values()):

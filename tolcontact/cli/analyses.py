@@ -187,7 +187,7 @@ COMMANDS = (
         "Print rare-event (ppm) estimates: how often measures are outside their limits, or parts cannot be assembled.",
         tails,
         terms.TAILS,
-        "Largest number of realizations for each event, about; a quarter of them may suffice.",
+        "Largest number of realizations for each event, about; by default all events share 60 000. A quarter may suffice.",
         ("tails model.py", "tails model.py --samples 400000 --json > rare.json"),
         _intervals("probability"),
     ),
