@@ -111,14 +111,15 @@ def map_blocks(
 def block_rows(program: Program) -> int:
     """Return how many realizations are simulated together: a power of two, and fewer if one of them takes long.
 
-    Its time grows with the cube of the bodies that contact couples, and with every projection onto curved faces. A block
-    should end within seconds: then it is safe, and visible as progress.
+    Its time grows with the bodies that contact couples: with their cube by a dense solver. It grows with every projection onto
+    curved faces, too. A block should end within seconds: then it is safe, and visible as progress.
     """
     bodies = max((len(group.group.free) for group in program.groups), default=0)
     rows = BLOCK_ROWS
     if program.method.is_exact and any(curved_pairs(program.nominal, group.group) for group in program.groups):
         rows = CURVED_ROWS
-    while rows > MIN_ROWS and rows * bodies**3 > BLOCK_ROWS * MAX_BODIES**3:
+    growth = 3 if program.plugin.is_conic else 1
+    while rows > MIN_ROWS and rows * bodies**growth > BLOCK_ROWS * MAX_BODIES**growth:
         rows //= 2
     return rows
 
