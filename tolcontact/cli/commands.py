@@ -50,7 +50,7 @@ COMMANDS = {
     ),
     "faces": (
         "step_files",
-        "List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, directions, radii, areas, and points on them.",
+        "List the faces of a body of a STEP file: numbers (for tc.Brep), kinds, axes, radii, areas; slots and hole patterns.",
     ),
 }
 
