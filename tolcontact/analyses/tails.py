@@ -58,11 +58,6 @@ def tails(
     program = analysis.program
     analysis.check_varies(program.draws.varying)
     events = _events(program)
-    if not events:
-        raise OptionError(
-            f'"{analysis.assembly}" has no rare event: no measure has limits, and parts can always be assembled; '
-            "give measures tolerance=... or limits=..."
-        )
     if samples is None:
         samples = int(np.clip(BUDGET // len(events), *DEFAULT_RANGE))
     engine = analysis.engine(len(events) * samples)
@@ -116,7 +111,7 @@ class _Event(NamedTuple):
 
 
 def _events(program: Program) -> dict[str, _Event]:
-    """Return the events of a program by name."""
+    """Return the events of a program by name. Raises OptionError if it has none."""
     events = {}
     for number, measure in enumerate(program.nominal.measures):
         limits = program.limits(number)
@@ -125,6 +120,11 @@ def _events(program: Program) -> dict[str, _Event]:
             events[f"{measure.name} outside limits"] = _Event(sides, leads=True)
     if program.method.is_exact and program.nominal.pairs:
         events["not assemblable"] = _Event([not_assemblable], leads=False)
+    if not events:
+        raise OptionError(
+            f'"{program.nominal.assembly.name}" has no rare event: no measure has limits, and parts can always be assembled; '
+            "give measures tolerance=... or limits=..."
+        )
     return events
 
 
