@@ -123,6 +123,7 @@ def test_contributions_and_sensitivities_are_those_of_one_process(client):
         assert ask(program, samples=200, client=client).identical(ask(program, samples=200))
 
 
+@pytest.mark.nightly
 def test_searches_and_comparisons_are_those_of_one_process(client):
     program = tc.build(cases.ra1(), solver="daqp")
     for ask, model, options in (

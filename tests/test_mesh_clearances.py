@@ -8,8 +8,8 @@ import trimesh
 from scipy.optimize import lsq_linear
 
 import tolcontact as tc
+from tests.cases.measured import check_invariance, motions, observed, placed, two
 from tests.helpers import nightly
-from tests.test_measurements import check_invariance, motions, observed, placed, two
 
 SIZES = np.array([40.0, 30.0, 10.0]), np.array([12.0, 8.0, 6.0])
 PLACES = {  # of the second box relative to the first one: an edge over an edge, a corner over a face, a face beside a face

@@ -36,7 +36,7 @@ TAILS = {
         stats.norm.expect(lambda x: stats.norm.sf(9 - 0.5 * (x - 0.1) ** 2), lb=-12, ub=12, epsabs=0, limit=500),
     ),
 }  # fmt: skip
-SHOWN = [(name, 30) for name in ("two ways", "twenty regions", "yes or no")]
+SHOWN = [(name, 30) for name in ("two ways", "yes or no")]
 
 
 @pytest.mark.slow
