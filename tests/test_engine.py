@@ -223,16 +223,20 @@ def test_a_block_does_not_depend_on_those_before_it(solver):
 
 
 @pytest.mark.parametrize(
-    ("bodies", "rows"),
-    [(0, 4096), (1, 4096), (24, 4096), (25, 2048), (48, 512), (100, 32), (1000, MIN_ROWS)],
+    ("solver", "bodies", "rows"),
+    [
+        *(("daqp", *sizes) for sizes in [(0, 4096), (1, 4096), (24, 4096), (25, 2048), (48, 512), (100, 32), (1000, MIN_ROWS)]),
+        *(("graph", *sizes) for sizes in [(0, 4096), (24, 4096), (25, 2048), (100, 512), (1000, 64)]),
+    ],
 )
-def test_a_block_of_many_bodies_has_fewer_rows(bodies, rows):
-    """What a block takes, its rows times the cube of its bodies, is at most that of 4096 rows of 24 bodies."""
-    group = SimpleNamespace(group=SimpleNamespace(free=range(bodies)))
-    program = SimpleNamespace(groups=[group] if bodies else [], method=SimpleNamespace(is_exact=False))
-    found = inspect.unwrap(block_rows)(program)
-    assert found == rows
-    assert found * bodies**3 <= 4096 * 24**3 or found == MIN_ROWS
+def test_a_block_of_many_bodies_has_fewer_rows(solver, bodies, rows):
+    """Its rows times the cube of its bodies, or the bodies with a solver that follows their graph, are those of 24 at most."""
+    group, growth = SimpleNamespace(group=SimpleNamespace(free=range(bodies))), 1 if solver == "graph" else 3
+    groups = [group] if bodies else []
+    program = SimpleNamespace(groups=groups, plugin=plugin(solver), method=SimpleNamespace(is_exact=False))
+    block = inspect.unwrap(block_rows)(program)
+    assert block == rows
+    assert block * bodies**growth <= 4096 * 24**growth or block == MIN_ROWS
 
 
 def test_one_curved_group_is_enough_for_small_blocks():
