@@ -71,6 +71,7 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
 
 
 QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
+MAX_POLISHED_ENTRIES = 4_000_000  # of the linear systems that polish some answers together
 POLISHED_RESIDUAL = 1e-1 * ACCURACY  # mm: an answer with a larger KKT residual is polished
 SMALL_STEP, SMALL_STEP_RESIDUAL = 1e-3, 1e-2 * ACCURACY  # mm: limits for small steps, which show noise
 
@@ -84,6 +85,8 @@ class ContactSolver:
         self._qp = qp
         self._assemble, self._finish, self._energy, self._relate = qp.evaluators
         self._plugin = qp.plugin
+        size = sum(qp.sparsity("a").shape) + qp.slacks  # of the linear system that polishes an answer
+        self._max_polished = max(MAX_POLISHED_ENTRIES // size**2, 1)
         self.start_over()
 
     def twin(self) -> "ContactSolver":
@@ -142,11 +145,11 @@ class ContactSolver:
         residual = outputs["residual"][:, 0]
         is_rough = residual > np.where(outputs["step"][:, 0] < SMALL_STEP, SMALL_STEP_RESIDUAL, POLISHED_RESIDUAL)
         rough = np.flatnonzero(is_rough & np.isfinite(residual))
-        if rough.size:
-            problem = _of(problem, rough)
-            polished_outputs = self._finished(_of(inputs, rough) | problem | self._polished(problem, _of(solution, rough)))
-            better = polished_outputs["residual"][:, 0] < residual[rough]
-            _replace(outputs, rough[better], _of(polished_outputs, better))
+        for rows in np.split(rough, range(self._max_polished, len(rough), self._max_polished)) if rough.size else ():
+            systems = _of(problem, rows)
+            polished_outputs = self._finished(_of(inputs, rows) | systems | self._polished(systems, _of(solution, rows)))
+            better = polished_outputs["residual"][:, 0] < residual[rows]
+            _replace(outputs, rows[better], _of(polished_outputs, better))
         return outputs
 
     def _finished(self, arrays: Arrays) -> Arrays:

@@ -10,9 +10,10 @@ import numpy as np
 
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.mechanics.correction import FREEDOMS, Mobility
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.groups import Group
 
-CENTRE, MOMENTS = 3, 10  # entries of a nominal centre, and of the moments of all points of a side
+CENTRE = 3  # entries of a nominal centre
 
 
 @dataclass(frozen=True, eq=False)

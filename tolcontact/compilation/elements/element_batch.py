@@ -12,6 +12,7 @@ from tolcontact.compilation.conditioning import idle_row
 from tolcontact.compilation.elements.element import Element
 from tolcontact.compilation.elements.element_functions import ElementFunctions
 from tolcontact.compilation.functions import NamedFunction
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.pose import ENTRIES, Number
 
 Arrays = dict[str, np.ndarray]
@@ -127,7 +128,7 @@ class ElementBatch:
     def _common(self, inputs: Arrays, shared: Arrays) -> Arrays:
         """Return the inputs that all functions of poses and objective share."""
         local = {name: split(inputs[name], ENTRIES)[:, self.parts] for name in ("poses", "raw")}
-        local["moments"] = split(inputs["moments"], 10)[:, self.sides]
+        local["moments"] = split(inputs["moments"], MOMENTS)[:, self.sides]
         local["faces"] = split(shared["faces"], ENTRIES)[:, self._faces]
         local["heights"] = split(shared["heights"], 2)[:, self.pairs]
         local["constants"] = self._constants[None]

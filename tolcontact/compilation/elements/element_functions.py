@@ -8,11 +8,12 @@ import casadi as ca
 
 from tolcontact.compilation.conditioning import conditioned_rows, coupling, whitening
 from tolcontact.compilation.contact_rows import RowPoints, contact_rows, slot_points
-from tolcontact.compilation.elements.element import MOMENTS, Element
+from tolcontact.compilation.elements.element import Element
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.outcome import reactions, row_residuals
 from tolcontact.compilation.quadratic_terms import is_convex, quadratic_terms
 from tolcontact.mechanics.correction import FREEDOMS, Mobility, Motion, increments, linear, published, rigid
+from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.objective import energy
 from tolcontact.mechanics.pose import ENTRIES, poses_of
 from tolcontact.mechanics.setting import Setting

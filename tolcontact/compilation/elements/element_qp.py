@@ -125,7 +125,10 @@ class ElementQP:
         length = np.full((count, 1), self._group.length)
         share = self._share(step=flat(step), y=flat(y), stride=stride, length=length)
         checked = [self._checked(*entry, arrays, y, slack) for entry in zip(self._batches, *self._row_places, strict=True)]
-        between, H = self._coupled, split(arrays["h"][:, self._coupling_places[: 36 * len(self._coupled)]], FREEDOMS**2)
+        between, H = (
+            self._coupled,
+            split(arrays["h"][:, self._coupling_places[: FREEDOMS**2 * len(self._coupled)]], FREEDOMS**2),
+        )
         pulls = _of_blocks(self._movers.pull, H=H, y_i=y[:, between[:, 0]], y_j=y[:, between[:, 1]])
         forces = [split(local["force"], FREEDOMS) for local in checked]
         force = flat(self._force_sum(np.concatenate([*forces, pulls["force_i"], pulls["force_j"]], axis=1)))
