@@ -3,8 +3,8 @@
 import numpy as np
 
 from tolcontact.compilation import ACCURACY
+from tolcontact.contact.least_penetration import PATIENCE, LeastPenetration
 from tolcontact.contact.record import initial_numbers
-from tolcontact.contact.repeated_steps import better_state
 from tolcontact.contact.resolver import is_better
 from tolcontact.contact.slots import Slots
 from tolcontact.contact.state import State
@@ -47,10 +47,23 @@ def test_the_better_of_two_states_is_kept():
     best, here = (State.start(poses + number, relative, 2, []) for number in (1.0, 2.0))
     best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
     here.astray[:] = [0, 0, 1e-3, 0]
-    found = better_state(best, here, inside)
-    assert found.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
-    assert found.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
-    assert better_state(None, here, inside).slack.tolist() == inside.tolist()
+    least = LeastPenetration.unknown(best)
+    assert not least.is_known.any()
+    least.look(best, best.slack.copy(), is_held=False)
+    least.look(here, inside, is_held=False)
+    assert least.is_known.all()
+    assert least.state.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
+    assert least.state.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
+
+
+def test_steps_are_no_longer_expected_to_gain_after_some_that_did_not():
+    state = State.start(np.zeros((3, 1, 12)), np.zeros((3, 1, 12)), 2, [])
+    least = LeastPenetration.unknown(state)
+    falls = 0.9 ** np.arange(2 * PATIENCE + 1)  # the second goes on to fall, the third does so half way
+    for number, fall in enumerate(falls):
+        least.look(state, np.array([[0.1], [0.1 * fall], [0.1 * falls[min(number, PATIENCE)]]]), is_held=number == 0)
+        assert least.is_final.tolist() == [number >= PATIENCE, False, number >= 2 * PATIENCE]
+    assert least.take(np.array([True, False, False])).is_final.tolist() == [True]
 
 
 def test_another_answer_is_preferred_by_its_rank_then_its_energy_or_its_depth():

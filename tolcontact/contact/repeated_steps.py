@@ -13,6 +13,7 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
+from tolcontact.contact.least_penetration import LeastPenetration
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.state import State, Task, Unsettled
@@ -20,7 +21,6 @@ from tolcontact.contact.state import State, Task, Unsettled
 STEP_TOLERANCE = 1e-9  # mm: a smaller step is the last one
 ROUNDING = 1e-10  # mm, in the norm of the objective: a smaller step is rounding, in freedoms that next to nothing holds
 CLOSED = 1e-6  # mm, and of rotation matrices: steps that come back so near to where they were will do so again
-ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
 
 
 class StepKind(NamedTuple):
@@ -48,7 +48,7 @@ STEPS_WHERE_FACES_END = (
 
 def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
-    unsettled, best = Unsettled(task, state), None
+    unsettled, least = Unsettled(task, state), LeastPenetration.unknown(state)
     trail: list[np.ndarray] = []
     if not len(task):
         return
@@ -77,7 +77,7 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         unsettled.settle(~moves)
         # What rests while it is held back need not be held back longer.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
-        unrest, best, trail = unrest[moves], None if best is None else best.take(moves), [poses[moves] for poses in trail]
+        unrest, least, trail = unrest[moves], least.take(moves), [poses[moves] for poses in trail]
         if not len(unsettled):
             return
         if candidates.bounded:
@@ -86,13 +86,21 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
             )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
-            best = better_state(best, unsettled.state, true_penetration(unsettled.task, unsettled.state))
-    final = unsettled.state
-    if best is not None:
-        stuck = np.flatnonzero((final.slack > PENETRATION).any(axis=1))
-        final.put_answer(stuck, best.take(stuck))
-    final.kkt_residual[:] = np.maximum(final.kkt_residual, np.where(final.in_conflict, 0, unrest))
-    unsettled.settle(np.ones(len(unsettled), dtype=bool))
+            least.look(unsettled.state, _true_penetration(unsettled.task, unsettled.state), is_held=kind.firmness > 1)
+            ends = least.is_final & (unsettled.state.slack > PENETRATION).any(axis=1)
+            _end(unsettled, least, unrest, ends)
+            asleep, unrest, least, trail = asleep[~ends], unrest[~ends], least.take(~ends), [poses[~ends] for poses in trail]
+    _end(unsettled, least, unrest, np.ones(len(unsettled), dtype=bool))
+
+
+def _end(unsettled: Unsettled, least: LeastPenetration, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
+    """End realizations without rest (n,): parts that contradict each other where their penetration was least."""
+    state = unsettled.state
+    stuck = np.flatnonzero(ends & (state.slack > PENETRATION).any(axis=1) & least.is_known)
+    state.put_answer(stuck, least.state.take(stuck))
+    residual = np.maximum(state.kkt_residual, np.where(state.in_conflict, 0, unrest))
+    state.kkt_residual[ends] = residual[ends]
+    unsettled.settle(ends)
 
 
 def _take(step: LinearStep, unsettled: Unsettled, rows: np.ndarray, kind: StepKind, stride: float) -> Step:
@@ -114,22 +122,6 @@ def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
     return (two < CLOSED) & (one > 10 * CLOSED) & ~(state.slack > PENETRATION).any(axis=1)
 
 
-def true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:
+def _true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:
     """Return the penetration of each pair at the poses reached (n, pair) [mm]."""
     return np.maximum(-min_gaps(task.scans, state.relative, task.deviations), 0)
-
-
-def better_state(best: State | None, state: State, penetration: Float[Array, "n pair"]) -> State:
-    """Return the better of two states, realization by realization; its `slack` is the true `penetration` of each pair."""
-    candidate = state.take(np.arange(len(state)))
-    candidate.slack[:] = penetration
-    if best is None:
-        return candidate
-    better = np.flatnonzero(_violation(candidate) < _violation(best))
-    best.put(better, candidate.take(better))
-    return best
-
-
-def _violation(state: State) -> np.ndarray:
-    """Return the penetration of the worst pair, and how far locators are astray, as one number (n,) [mm]."""
-    return state.slack.max(axis=1) + ASTRAY_WEIGHT * state.astray
