@@ -103,6 +103,7 @@ class ContactSolver:
     def __call__(self, **arrays: Float[Array, "realization ..."]) -> Arrays:
         """Return the outputs of contact_qp by name, (realization, entry), for its inputs by name, (realization, ...).
 
+        A further input is `guess` (realization, row): reactions that are probable, from which a solver may start.
         A further output is `second` (realization, 1): whether another plugin had to answer. Other plugins solve the problems
         that this plugin misses, without curvature. If all fail, `residual` is infinite, and other outputs may be NaN.
         """
@@ -139,7 +140,7 @@ class ContactSolver:
 
     def _solved_batch(self, solver: "_Solver", inputs: Arrays) -> Arrays:
         problem = self._assemble(**inputs)
-        solution, failed = solver(problem, inputs["reactions"])
+        solution, failed = solver(problem, inputs["guess"])
         outputs = self._finished(inputs | problem | solution)
         outputs["residual"][failed] = np.inf
         residual = outputs["residual"][:, 0]

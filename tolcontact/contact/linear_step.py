@@ -142,7 +142,10 @@ class LinearStep:
             for vectors in ([row[i] for row in points] for i in range(3))
         )
         filled = np.concatenate([np.zeros((count, 0)), *(slot.filled for slot in slots)], axis=1)
-        answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled)
+        guess = state.multipliers.copy()
+        for k, of_pair in zip(self.varying, slots, strict=True):
+            guess[:, self.spans[k]] = of_pair.reactions * of_pair.filled
+        answer = self._solve(**inputs, P_m=P_m, P_r=P_r, n_r=n_r, filled=filled, guess=guess)
         slack, residual = np.maximum(answer["slack"], 0), answer["residual"][:, 0]
         solved = residual <= self._max_residual  # what no solver could solve moves nothing
         deepest = self._deepest(task, answer["linearized"].reshape(state.relative.shape))
