@@ -229,8 +229,11 @@ def draw(curves: dict[tuple[str, str, str], dict[int, float]], figure: Path) -> 
     for (name, method, solver), curve in curves.items():
         style = {"color": f"C{scenes.index(name)}", "linestyle": ("-", "--", ":", "-.")[solvers.index(solver) % 4]}
         axes[0, methods.index(method)].loglog(*zip(*curve.items(), strict=True), marker=".", **style)
+    sizes = sorted({size for curve in curves.values() for size in curve})
     for ax, method in zip(axes[0], methods, strict=True):
         ax.set(xlabel="free bodies", title=method)
+        ax.set_xticks(sizes, labels=map(str, sizes))
+        ax.minorticks_off()
         ax.grid(alpha=0.3)
     axes[0, 0].set_ylabel("CPU time of a realization [us]")
     colours = [plt.Line2D([], [], color=f"C{k}", marker=".", label=name) for k, name in enumerate(scenes)]

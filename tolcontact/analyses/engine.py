@@ -13,7 +13,7 @@ from tolcontact.simulation.cluster import MapBlocks
 from tolcontact.simulation.threads import Sampler
 from tolcontact.variation import GivenDraws
 
-MAX_ROWS_OF_BODIES = 2048  # realizations of a block, times the bodies that contact couples: a block ends within some seconds
+MAX_ROWS_OF_BODIES = 8192  # realizations of a block, times the bodies that contact couples: a block ends within some seconds
 MIN_BLOCKS = 8  # of few realizations, so that these occupy all processors
 
 Progress = Callable[[int, int], None]  # is called with the number of finished steps, and of all
