@@ -1,33 +1,15 @@
 """The poses of parts after the increments of the movers, part by part."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Int
-from tolcontact.compilation.elements.element_batch import evaluated
+from tolcontact.arrays import Array, Float
+from tolcontact.compilation.elements.element_batch import blocks
 from tolcontact.compilation.elements.element_functions import advance_function
-from tolcontact.compilation.functions import NamedFunction
+from tolcontact.compilation.functions import IndexedFunction
+from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.groups import Group
+from tolcontact.mechanics.pose import ENTRIES
 from tolcontact.method import Method
-
-
-@dataclass(frozen=True, eq=False)
-class Chains:
-    """The parts that chains of equally many movers move.
-
-    function      of one part, see advance_function
-    parts         (part,) positions of the parts
-    movers        (part, mover) numbers of the movers, and the positions `mover_parts` of these
-    centre        (part, 3) and `centres` (part, mover, 3): nominal centres of part and movers [mm]
-    """
-
-    function: NamedFunction
-    parts: Int[Array, " part"]
-    movers: Int[Array, "part mover"]
-    mover_parts: Int[Array, "part mover"]
-    centre: Float[Array, "part 3"]
-    centres: Float[Array, "part mover 3"]
 
 
 class CorrectedPoses:
@@ -38,23 +20,32 @@ class CorrectedPoses:
         for part, mobility in enumerate(group.mobilities):
             if mobility.movers:
                 kinds.setdefault((len(mobility.movers), mobility.is_reference), []).append(part)
-        of_movers = np.array([group.position(part) for part in group.free])
-        centres = np.array([np.asarray(mobility.centre) for mobility in group.mobilities])
-        self._length = group.length
-        self._chains = []
-        for parts in kinds.values():
-            movers = np.array([group.mobilities[part].movers for part in parts])
-            function, mover_parts = advance_function(group.mobilities[parts[0]], method), of_movers[movers]
-            chains = Chains(function, np.array(parts), movers, mover_parts, centres[parts], centres[mover_parts])
-            self._chains.append(chains)
+        self._centres = np.concatenate([np.asarray(mobility.centre).ravel() for mobility in group.mobilities])[None]
+        self._length = np.full((1, 1), group.length)
+        self._functions = [_of_parts(group, method, np.array(parts)) for parts in kinds.values()]
 
-    def __call__(self, poses: Float[Array, "n part 12"], step: Float[Array, "n mover 6"]) -> Float[Array, "n part 12"]:
-        """Return the poses after steps [mm]."""
-        corrected, length = poses.copy(), np.full((1, 1, 1), self._length)
-        for chains in self._chains:
-            arrays = {
-                "pose": poses[:, chains.parts], "movers": poses[:, chains.mover_parts], "steps": step[:, chains.movers],
-                "centre": chains.centre[None], "centres": chains.centres[None], "length": length,
-            }  # fmt: skip
-            corrected[:, chains.parts] = evaluated(chains.function, arrays, (len(poses), len(chains.parts)))["corrected"]
+    def __call__(self, poses: Float[Array, "n _"], step: Float[Array, "n _"]) -> Float[Array, "n _"]:
+        """Return the poses (n, 12 * part) after steps (n, 6 * mover) [mm]."""
+        corrected = poses.copy()
+        arrays = {
+            "pose": poses, "movers": poses, "steps": step, "centre": self._centres, "centres": self._centres,
+            "length": self._length, "corrected": corrected,
+        }  # fmt: skip
+        for function in self._functions:
+            function(len(poses), arrays)
         return corrected
+
+
+def _of_parts(group: Group, method: Method, parts: np.ndarray) -> IndexedFunction:
+    """Return the function of parts that chains of equally many movers move."""
+    movers = np.array([group.mobilities[part].movers for part in parts])
+    mover_parts = np.array([group.position(part) for part in group.free])[movers]
+    function, own = advance_function(group.mobilities[parts[0]], method), parts[:, None]
+    return function.at({
+        **dict.fromkeys(("pose", "corrected"), blocks(own, ENTRIES)),
+        "movers": blocks(mover_parts, ENTRIES),
+        "steps": blocks(movers, FREEDOMS),
+        "centre": blocks(own, 3),
+        "centres": blocks(mover_parts, 3),
+        "length": np.zeros(own.shape, dtype=int),
+    })  # fmt: skip

@@ -1,8 +1,8 @@
-"""The elements of one kind, evaluated together: their numbers in the whole group, and their constants."""
+"""The elements of one kind, evaluated together: where their numbers stand among those of the whole group."""
 
-import math
-from collections.abc import Sequence
-from functools import cached_property
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +11,17 @@ from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation.conditioning import idle_row
 from tolcontact.compilation.elements.element import Element
 from tolcontact.compilation.elements.element_functions import ElementFunctions
-from tolcontact.compilation.functions import NamedFunction
+from tolcontact.compilation.functions import IndexedFunction
+from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
-from tolcontact.mechanics.pose import ENTRIES, Number
+from tolcontact.mechanics.pose import ENTRIES
 
-Arrays = dict[str, np.ndarray]
+Arrays = dict[str, Float[Array, "_ column"]]
+Columns = Int[Array, "element entry"]
+
+BLOCK = FREEDOMS**2
+VALUES_OF_ALL = ("firmness", "length", "count", "scale", "load")
+POINTS = ("P_m", "P_r", "n_r")
 
 
 class Numbers(NamedTuple):
@@ -33,126 +39,121 @@ class Numbers(NamedTuple):
         return cls(*(np.cumsum([0, *column[:-1]]) for column in zip(*counts, strict=True)))
 
 
-class ElementBatch:
-    """Elements of one kind in a group; arrays of theirs are (realization, element, ...).
+class Elements:
+    """Elements of one kind in a group.
 
     pairs      (element,) positions of the pairs
     parts, movers, sides, rows   (element, ...) numbers of what belongs to each element
+    couplings  (element * coupling, 2) movers that an element couples
     """
 
     def __init__(self, elements: Sequence[Element], functions: ElementFunctions, numbers: Numbers) -> None:
-        self._elements, self._functions = elements, functions
+        self.functions, self._elements = functions, elements
         self.pairs = np.array([element.pair for element in elements])
-        self.parts = np.array([element.parts for element in elements])
         self.movers = np.array([element.movers for element in elements])
-        self.sides = np.array([element.sides for element in elements], dtype=int)
         self.size, self.row_count = elements[0].size, elements[0].rows
         self.rows = numbers.row[self.pairs][:, None] + np.arange(self.row_count)
-        self._faces = numbers.face[self.pairs][:, None] + np.arange(sum(elements[0].deviating))
-        self._slots = numbers.slot[self.pairs][:, None] + np.arange(self.row_count)
-        self._bends = numbers.bend[self.pairs]
-        self._constants = np.array([element.constants for element in elements])
-        # Columns of a matrix stand one after the other in the arrays of CasADi.
-        self._idle = np.array([
-            np.array([idle_row(row, self.size).full().ravel() for row in rows]).T.ravel() for rows in self.rows.tolist()
-        ])  # fmt: skip
+        pairs_of_movers = [*itertools.combinations(range(self.movers.shape[1]), 2)]
+        self.couplings = self.movers[:, np.array(pairs_of_movers, dtype=int).reshape(-1, 2)].reshape(-1, 2)
+        self.slots = numbers.slot[self.pairs][:, None] + np.arange(self.row_count)
+        self._numbers = numbers
 
-    def terms(self, inputs: Arrays, shared: Arrays, *, newton: bool) -> Arrays:
-        """Return the terms of all elements (realization, element, entry), if `newton` with curvature; and `filled` rows.
+    @property
+    def has_slots(self) -> bool:
+        """Whether changing points take the rows in turns."""
+        return self._elements[0].has_slots
 
-        `inputs` are those of contact_qp, (realization, entry); `shared` those of the elements that are computed once.
-        """
-        local = self._common(inputs, shared) | self._points(inputs)
-        local["reactions"] = inputs["reactions"][:, self.rows]
-        function = self._functions.newton if newton and self._functions.newton is not None else self._functions.terms
-        terms = self._call(function, local)
-        terms["filled"] = local.get("filled", np.ones((1, 1, 1)))
-        return terms
+    def constants(self) -> Arrays:
+        """Return what never changes (1, column): constants, idle rows, and points that always have a row."""
+        constants = {
+            "constants": np.array([element.constants for element in self._elements]),
+            # Columns of a matrix stand one after the other in the arrays of CasADi.
+            "idle": np.array([
+                np.array([idle_row(row, self.size).full().ravel() for row in rows]).T.ravel() for rows in self.rows.tolist()
+            ]),
+        }  # fmt: skip
+        if self._has_standing_points:
+            for name in POINTS:
+                constants[name] = np.array([getattr(e.contact, name)[e.points].ravel() for e in self._elements])
+        return {name: values.reshape(1, values.size) for name, values in constants.items()}
 
-    def conditioned(self, terms: Arrays, V: Float[Array, "n mover 36"], length: Number) -> Arrays:
-        """Return a, opening, lower and row_length of the elements for V = U^-1 of all movers."""
-        local = {name: terms[name] for name in ("slopes", "gaps", "filled")}
-        local |= {"V": V[:, self.movers], "idle": self._idle[None], "length": np.full((1, 1, 1), length)}
-        return self._call(self._functions.rows, local)
-
-    def checked(self, local: Arrays) -> Arrays:
-        """Return residual, force, slack_force and multipliers of the elements; see ElementFunctions."""
-        return self._call(self._functions.check, local)
-
-    def linearized(self, poses: np.ndarray, faces: np.ndarray, step: np.ndarray, length: Number) -> np.ndarray:
-        """Return X_RM to first order (realization, element, 12) after steps (realization, mover, 6) from some poses."""
-        local = {"poses": poses[:, self.parts], "faces": faces[:, self._faces], "step": step[:, self.movers]}
-        local |= {"constants": self._constants[None], "length": np.full((1, 1, 1), length)}
-        return self._call(self._functions.advance, local)["linearized"]
-
-    def relative(self, poses: np.ndarray, faces: np.ndarray) -> np.ndarray:
-        """Return X_RM (realization, element, 12) at poses (realization, part, 12)."""
-        local = {"poses": poses[:, self.parts], "faces": faces[:, self._faces]}
-        return self._call(self._functions.relate, local)["relative"]
-
-    def energy(self, inputs: Arrays, shared: Arrays) -> np.ndarray:
-        """Return the objective of each element (realization, element, 1)."""
-        return self._call(self._functions.energy, self._common(inputs, shared))["energy"]
-
-    @cached_property
-    def _standing(self) -> Arrays:
-        """P_m, P_r and n_r (element, 3 * row) of points that always have a row."""
-        return {
-            name: np.array([getattr(e.contact, name)[e.points].ravel() for e in self._elements])
-            for name in ("P_m", "P_r", "n_r")
-        }
-
-    def _points(self, inputs: Arrays) -> Arrays:
-        """Return the inputs that hold contact points."""
-        element = self._elements[0]
-        if element.contact.round is not None:
+    def points(self, P_r: Float[Array, "1 _"] | None, deviations: np.ndarray) -> Arrays:
+        """Return P_r (realization, column) of points that always have a row, where deviations shift them along the normals."""
+        if P_r is None or not any(element.contact.offsets.columns.size for element in self._elements):
             return {}
-        if element.has_slots:
-            points = {name: split(inputs[name], 3)[:, self._slots] for name in ("P_m", "P_r", "n_r")}
-            bends = split(inputs["bend"], ENTRIES)[:, self._bends]
-            return points | {"filled": inputs["filled"][:, self._slots], "bend": bends}
-        points = {name: values[None] for name, values in self._standing.items()}
-        if any(element.contact.offsets.columns.size for element in self._elements):
-            points["P_r"] = points["P_r"] + self._raised(inputs["deviations"])
-        return points
-
-    def _raised(self, deviations: np.ndarray) -> np.ndarray:
-        """Return by what deviations shift P_r along the normals (realization, element, 3 * row)."""
         shifts = np.empty((len(deviations), len(self._elements), self.row_count, 3))
         for k, element in enumerate(self._elements):
             points = np.broadcast_to(np.asarray(element.points), (len(deviations), self.row_count))
             heights = element.contact.offsets.heights(deviations, points)
             shifts[:, k] = heights[:, :, None] * element.contact.n_r[element.points]
-        return shifts.reshape(len(deviations), len(self._elements), 3 * self.row_count)
+        return {"P_r": P_r + shifts.reshape(len(deviations), -1)}
 
-    def _common(self, inputs: Arrays, shared: Arrays) -> Arrays:
-        """Return the inputs that all functions of poses and objective share."""
-        local = {name: split(inputs[name], ENTRIES)[:, self.parts] for name in ("poses", "raw")}
-        local["moments"] = split(inputs["moments"], MOMENTS)[:, self.sides]
-        local["faces"] = split(shared["faces"], ENTRIES)[:, self._faces]
-        local["heights"] = split(shared["heights"], 2)[:, self.pairs]
-        local["constants"] = self._constants[None]
-        for name in ("scale", "load", "firmness", "length", "count"):
-            if name in shared:
-                local[name] = shared[name].reshape(-1, 1, 1)
-        return local
+    def places(self) -> dict[str, Columns]:
+        """Return the columns of what elements read from, or write into, the arrays of the whole group, by name."""
+        elements, count = self._elements, len(self._elements)
+        parts = np.array([element.parts for element in elements])
+        faces = self._numbers.face[self.pairs][:, None] + np.arange(sum(elements[0].deviating))
+        pairs, own = self.pairs[:, None], np.arange(count)[:, None]
+        places = {
+            **dict.fromkeys(("poses", "raw"), blocks(parts, ENTRIES)),
+            "moments": blocks(np.array([element.sides for element in elements], dtype=int), MOMENTS),
+            "faces": blocks(faces, ENTRIES),
+            "heights": blocks(pairs, 2),
+            "constants": blocks(own, len(elements[0].constants)),
+            "idle": blocks(own, self.row_count * self.size),
+            "slopes": blocks(own, self.row_count * self.size),
+            **dict.fromkeys(VALUES_OF_ALL, np.zeros((count, 1), dtype=int)),
+            **dict.fromkeys(("reactions", "gaps", "filled", "lower", "row_length", "lam", "multipliers"), self.rows),
+            "V": blocks(self.movers, BLOCK),
+            **dict.fromkeys(("y", "step"), blocks(self.movers, FREEDOMS)),
+            **dict.fromkeys(("residual", "slack_force", "energy"), pairs),
+            **dict.fromkeys(("linearized", "relative"), blocks(pairs, ENTRIES)),
+            "bend": blocks(self._numbers.bend[pairs], ENTRIES),
+        }
+        points = blocks(own, 3 * self.row_count) if self._has_standing_points else blocks(self.slots, 3)
+        return places | dict.fromkeys(POINTS, points)
 
-    def _call(self, function: NamedFunction, local: Arrays) -> Arrays:
-        """Evaluate a function for all elements of all realizations."""
-        count = max(len(values) for values in local.values())
-        return evaluated(function, local, (count, len(self._elements)))
+    @property
+    def _has_standing_points(self) -> bool:
+        return self._elements[0].contact.round is None and not self.has_slots
 
 
-def split(values: Float[Array, "n ..."], size: int) -> Float[Array, "n _ size"]:
-    """Return arrays (n, group, entry) of groups of `size` entries."""
-    return values.reshape(len(values), math.prod(values.shape[1:]) // size, size)
+@dataclass(frozen=True, eq=False)
+class ElementBatch:
+    """The functions of a kind on the arrays of the whole group, see ElementFunctions; and arrays that are its own.
+
+    elements   what they are
+    own        arrays (1, column) that never change, by name
+    slopes     (1,): number of slopes of all elements, in an array of their own
+    """
+
+    elements: Elements
+    own: Arrays
+    terms: IndexedFunction
+    newton: IndexedFunction | None
+    rows: IndexedFunction
+    check: IndexedFunction
+    advance: IndexedFunction
+    relate: IndexedFunction
+    energy: IndexedFunction
+
+    @classmethod
+    def of(cls, elements: Elements, places: Mapping[str, Columns]) -> "ElementBatch":
+        """Return the functions of elements, with the `places` of contributions to sums, and of entries of matrices."""
+        functions, places = elements.functions, {**elements.places(), **places}
+        newton = functions.newton
+        return cls(
+            elements,
+            elements.constants(),
+            newton=None if newton is None else newton.at(places),
+            **{name: getattr(functions, name).at(places) for name in ("terms", "rows", "check", "advance", "relate", "energy")},
+        )
+
+    def arrays(self, deviations: np.ndarray) -> Arrays:
+        """Return the arrays that are its own, (1, column) or (realization, column)."""
+        return self.own | self.elements.points(self.own.get("P_r"), deviations)
 
 
-def evaluated(function: NamedFunction, arrays: Arrays, shape: tuple[int, ...]) -> Arrays:
-    """Return the outputs (n, entry, ...) of a function for arrays that have this `shape` (n, entry), or 1 in its place."""
-    rows = {}
-    for name in function.names:
-        values = arrays[name]
-        size = math.prod(values.shape[2:])
-        rows[name] = np.broadcast_to(values, shape + values.shape[2:]).reshape(shape[0] * shape[1], size)
-    return {name: values.reshape(*shape, values.shape[1]) for name, values in function(**rows).items()}
+def blocks(numbers: Int[Array, "element block"], size: int) -> Columns:
+    """Return the columns (element, block * size) of blocks of `size` entries, by their numbers."""
+    return (numbers[:, :, None] * size + np.arange(size)).reshape(len(numbers), -1)

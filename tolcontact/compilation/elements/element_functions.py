@@ -181,7 +181,7 @@ class MoverFunctions:
 
     factor    Q, curvature -> convex
     whiten    Q, pull (6) -> V, g (6)
-    couple    Q, V_i, V_j -> H
+    couple    Q, V_i, V_j -> H, and the same once more for its mirrored place
     pull      H, y_i, y_j (6) -> force_i, force_j (6): the forces on both movers by their coupling
     step      V, y (6) -> step (6)
     """
@@ -198,10 +198,11 @@ def mover_functions() -> MoverFunctions:
     Q, second, V_i, V_j = (ca.SX.sym(name, FREEDOMS, FREEDOMS) for name in ("Q", "second", "V_i", "V_j"))
     p, q = (ca.SX.sym(name, FREEDOMS) for name in ("p", "q"))
     V, upper = whitening(Q), ca.triu(V_i)
+    H = coupling(Q, upper, ca.triu(V_j))
     return MoverFunctions(
         factor=function_of("factor", {"Q": Q, "curvature": second}, {"convex": is_convex(Q + second)}),
         whiten=function_of("whiten", {"Q": Q, "pull": p}, {"V": V, "g": V.T @ p}),
-        couple=function_of("couple", {"Q": Q, "V_i": V_i, "V_j": V_j}, {"H": coupling(Q, upper, ca.triu(V_j))}),
+        couple=function_of("couple", {"Q": Q, "V_i": V_i, "V_j": V_j}, {"H": H, "mirrored": H}),
         pull=function_of("pull", {"H": Q, "y_i": p, "y_j": q}, {"force_i": Q @ q, "force_j": Q.T @ p}),
         step=function_of("step", {"V": V_i, "y": p}, {"step": upper @ p}),
     )

@@ -1,6 +1,5 @@
 """The contact QP of a group of many bodies, assembled from its elements."""
 
-import itertools
 from collections.abc import Sequence
 
 import casadi as ca
@@ -12,13 +11,9 @@ from tolcontact.compilation.contact_qp import Evaluators, Standing, row_spans
 from tolcontact.compilation.contact_rows import standing_points
 from tolcontact.compilation.elements.corrected_poses import CorrectedPoses
 from tolcontact.compilation.elements.element import elements_of
-from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Numbers, evaluated, split
-from tolcontact.compilation.elements.element_functions import (
-    element_functions,
-    function_of,
-    mover_functions,
-)
-from tolcontact.compilation.elements.sparse_layout import BlockSum, SparseLayout
+from tolcontact.compilation.elements.element_batch import Arrays, ElementBatch, Elements, Numbers
+from tolcontact.compilation.elements.element_functions import element_functions, function_of
+from tolcontact.compilation.elements.element_layout import ElementLayout
 from tolcontact.compilation.functions import NamedFunction, flat
 from tolcontact.compilation.outcome import step_share
 from tolcontact.compilation.plugins import Plugin
@@ -54,17 +49,20 @@ class ElementQP:
     def __init__(
         self, nominal: Nominal, group: Group, gaps: Sequence[GapMap | None], method: Method, plugin: Plugin, standing: Standing
     ) -> None:
-        self.plugin, self._group, self._method = plugin, group, method
+        self.plugin, self._method = plugin, method
         self.standing = standing or [standing_points(nominal.pairs[k], gaps[k], method) for k in group.pairs]
         self.slacks, self.spans = len(group.pairs), row_spans(self.standing)
         self._projects = method.is_iterated or bool(curved_pairs(nominal, group))
-        self._batches = _batches(nominal, group, method, self.standing, projects=self._projects)
-        self._movers, self._size = mover_functions(), FREEDOMS * len(group.free)
+        self._size = FREEDOMS * len(group.free)
+        kinds = _kinds(nominal, group, method, self.standing, projects=self._projects)
+        self._layout = ElementLayout(kinds, movers=len(group.free), rows=self.spans[-1].stop)
+        self._batches = [ElementBatch.of(elements, places) for elements, places in zip(kinds, self._layout.places, strict=True)]
+        self._movers = self._layout.of_movers()
         self._corrected_poses = CorrectedPoses(group, method)
         self._shared = _shared_function(nominal, group)
         self._share = _share_function(self._size)
-        self._number_movers()
-        self._lay_out()
+        self._values = {name: np.full((1, 1), value) for name, value in (("length", group.length), ("count", group.count))}
+        self._no_moments = np.zeros((1, MOMENTS * len(group.sides)))
 
     @property
     def kinds(self) -> int:
@@ -74,7 +72,8 @@ class ElementQP:
     @property
     def max_batch(self) -> int:
         """The number of realizations whose terms fit into little memory."""
-        entries = sum(batch.pairs.size * batch.size * (2 * batch.size + ENTRIES) for batch in self._batches)
+        kinds = [batch.elements for batch in self._batches]
+        entries = sum(kind.pairs.size * kind.size * (2 * kind.size + ENTRIES) for kind in kinds)
         return max(16, MAX_ENTRIES // entries)
 
     @property
@@ -85,72 +84,66 @@ class ElementQP:
     def sparsity(self, name: str) -> ca.Sparsity:
         """Return the sparsity of h, g, a or lba."""
         if name in ("h", "a"):
-            return self._layouts[name].sparsity
+            return self._layout.matrices[name].sparsity
         return ca.Sparsity.dense(self._size + self.slacks if name == "g" else self.spans[-1].stop, 1)
 
     def assemble(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return h, g, a, lba and uba, and what `finish` needs beside them, for the inputs of contact_qp."""
-        count, length = len(inputs["poses"]), self._group.length
-        shared = self._shared_arrays(inputs)
+        count, layout, rows = len(inputs["poses"]), self._layout, self.spans[-1].stop
         newton = self._method.is_exact and bool(inputs["newton"].any())
-        terms = [batch.terms(inputs, shared, newton=newton) for batch in self._batches]
-        Q, Q_between, pull = self._summed(terms, inputs, newton=newton)
-        whitened = _of_blocks(self._movers.whiten, Q=Q, pull=pull)
-        V, g = whitened["V"], whitened["g"]
-        between = self._coupled
-        H = _of_blocks(self._movers.couple, Q=Q_between, V_i=V[:, between[:, 0]], V_j=V[:, between[:, 1]])["H"]
-        rows = [batch.conditioned(local, V, length) for batch, local in zip(self._batches, terms, strict=True)]
-        h = np.ones((count, len(self._layouts["h"])))
-        h[:, self._coupling_places] = flat(np.concatenate([H, H], axis=1))
-        a = np.empty((count, len(self._layouts["a"])))
-        by_row = {name: np.empty((count, self.spans[-1].stop)) for name in ("lba", "row_length", "filled")}
-        for batch, places, opening_places, local, row in zip(self._batches, *self._row_places, terms, rows, strict=True):
-            a[:, places], a[:, opening_places] = row["a"], row["opening"]
-            by_row["lba"][:, batch.rows], by_row["row_length"][:, batch.rows] = row["lower"], row["row_length"]
-            by_row["filled"][:, batch.rows] = local["filled"]
-        prices = np.full((count, self.slacks), length)
+        filled = np.ones((count, rows))
+        filled[:, layout.slot_rows] = inputs["filled"]
+        arrays = inputs | self._shared_arrays(inputs) | {"filled": filled, "gaps": np.empty((count, rows))}
+        terms = {name: np.empty((count, size)) for name, size in layout.sizes_of_terms.items()}
+        local = [arrays | terms | batch.arrays(inputs["deviations"]) for batch in self._batches]
+        for batch, own in zip(self._batches, local, strict=True):
+            own["slopes"] = np.empty((count, batch.elements.rows.size * batch.elements.size))
+            function = batch.newton if newton and batch.newton is not None else batch.terms
+            function(count, own)
+        Q, between, pull = self._summed(terms, inputs, newton=newton)
+        V, h, a = (np.ones((count, size)) for size in (Q.shape[1], len(layout.matrices["h"]), len(layout.matrices["a"])))
+        g = np.full((count, self._size + self.slacks), self._values["length"][0, 0])  # the prices of slacks
+        self._movers.whiten(count, {"Q": Q, "pull": pull, "V": V, "g": g})
+        self._movers.couple(count, {"Q": between, "V_i": V, "V_j": V, "H": h, "mirrored": h})
+        by_row = {name: np.empty((count, rows)) for name in ("lower", "row_length")}
+        for batch, own in zip(self._batches, local, strict=True):
+            batch.rows(count, own | by_row | {"V": V, "a": a, "opening": a})
         return {
-            "h": h, "g": np.concatenate([flat(g), prices], axis=1), "a": a,
-            "uba": np.full(by_row["lba"].shape, np.inf), "V": flat(V),
-            "faces": shared["faces"], "scale": shared["scale"],
-            **by_row,
+            "h": h, "g": g, "a": a, "lba": by_row["lower"], "uba": np.full((count, rows), np.inf), "V": V, "filled": filled,
+            "faces": arrays["faces"], "scale": arrays["scale"], "row_length": by_row["row_length"],
         }  # fmt: skip
 
     def finish(self, **arrays: Float[Array, "realization _"]) -> Arrays:
         """Return the outputs of contact_qp."""
-        count, x, lam_x = len(arrays["x"]), arrays["x"], arrays["lam_x"]
-        y, slack = split(x[:, : self._size], FREEDOMS), x[:, self._size :]
-        step = _of_blocks(self._movers.step, V=split(arrays["V"], FREEDOMS**2), y=y)["step"]
+        count, x, lam_x, layout = len(arrays["x"]), arrays["x"], arrays["lam_x"], self._layout
+        slack, steps = x[:, self._size :], np.empty((count, self._size))
+        self._movers.step(count, {"V": arrays["V"], "y": x, "step": steps})
         stride = arrays["stride"] if self._method.is_exact else np.full((count, 1), np.inf)
-        length = np.full((count, 1), self._group.length)
-        share = self._share(step=flat(step), y=flat(y), stride=stride, length=length)
-        checked = [self._checked(*entry, arrays, y, slack) for entry in zip(self._batches, *self._row_places, strict=True)]
-        between, H = (
-            self._coupled,
-            split(arrays["h"][:, self._coupling_places[: FREEDOMS**2 * len(self._coupled)]], FREEDOMS**2),
-        )
-        pulls = _of_blocks(self._movers.pull, H=H, y_i=y[:, between[:, 0]], y_j=y[:, between[:, 1]])
-        forces = [split(local["force"], FREEDOMS) for local in checked]
-        force = flat(self._force_sum(np.concatenate([*forces, pulls["force_i"], pulls["force_j"]], axis=1)))
-        slack_force, multipliers = np.empty((count, self.slacks)), np.empty((count, self.spans[-1].stop))
-        for batch, local in zip(self._batches, checked, strict=True):
-            slack_force[:, batch.pairs], multipliers[:, batch.rows] = local["slack_force"][:, :, 0], local["multipliers"]
-        stationarity = x + arrays["g"] + np.concatenate([force, slack_force], axis=1) + lam_x
-        residuals = [
-            np.abs(stationarity), np.abs(np.minimum(slack, -lam_x[:, self._size :])),
-            *(local["residual"][:, :, 0] for local in checked),
-        ]  # fmt: skip
-        poses, faces = (split(arrays[name], ENTRIES) for name in ("poses", "faces"))
-        corrected = self._corrected_poses(poses, step * share["share"][:, :, None])
-        linearized, relative = (np.empty((count, self.slacks, ENTRIES)) for _ in range(2))
+        length = np.repeat(self._values["length"], count, axis=0)
+        share = self._share(step=steps, y=x[:, : self._size], stride=stride, length=length)
+        corrected = self._corrected_poses(arrays["poses"], steps * share["share"])
+        sizes = {
+            "residual": self.slacks, "slack_force": self.slacks, "multipliers": self.spans[-1].stop,
+            "linearized": ENTRIES * self.slacks, "relative": ENTRIES * self.slacks,
+        }  # fmt: skip
+        results = {name: np.empty((count, size)) for name, size in sizes.items()}
+        forces = np.empty((count, FREEDOMS * len(layout.force_sum.places)))
+        checked = results | {"opening": arrays["a"], "y": x, "slack": x, "lam": arrays["lam_a"], "lower": arrays["lba"]}
+        checked |= {name: arrays[name] for name in ("a", "row_length", "filled", "scale", "faces")} | {"force": forces}
         for batch in self._batches:
-            linearized[:, batch.pairs] = batch.linearized(poses, faces, step, self._group.length)
-            relative[:, batch.pairs] = batch.relative(corrected, faces)
+            own = checked | batch.own | self._values
+            batch.check(count, own)
+            batch.advance(count, own | {"poses": arrays["poses"], "step": steps})
+            batch.relate(count, own | {"poses": corrected})
+        self._movers.pull(count, {"H": arrays["h"], "y_i": x, "y_j": x, "force_i": forces, "force_j": forces})
+        force = np.concatenate([layout.force_sum(forces), results["slack_force"]], axis=1)
+        stationarity = np.abs(x + arrays["g"] + force + lam_x)
+        residuals = [stationarity, np.abs(np.minimum(slack, -lam_x[:, self._size :])), results["residual"]]
         return {
-            "corrected": flat(corrected),
-            "linearized": flat(linearized),
-            "relative": flat(relative),
-            "multipliers": multipliers,
+            "corrected": corrected,
+            "linearized": results["linearized"],
+            "relative": results["relative"],
+            "multipliers": results["multipliers"],
             "residual": np.concatenate(residuals, axis=1).max(axis=1, keepdims=True),
             "slack": SLACK * slack,
             "step": share["size"],
@@ -160,115 +153,58 @@ class ElementQP:
     def energy(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return the objective of contact_qp."""
         inputs = {name: flat(values) for name, values in inputs.items()}
-        shared = self._shared_arrays(inputs)
-        energies = [batch.energy(inputs, shared)[..., 0] for batch in self._batches]
-        return {"energy": np.concatenate(energies, axis=1).sum(axis=1, keepdims=True)}
+        arrays = inputs | self._shared_arrays(inputs) | {"energy": np.empty((len(inputs["poses"]), self.slacks))}
+        for batch in self._batches:
+            batch.energy(len(inputs["poses"]), arrays | batch.own)
+        return {"energy": arrays["energy"].sum(axis=1, keepdims=True)}
 
     def relate(self, **inputs: Float[Array, "realization _"]) -> Arrays:
         """Return X_RM of all pairs at `poses`."""
-        count = len(inputs["poses"])
-        poses = split(inputs["poses"], ENTRIES)
-        faces = self._shared(deviations=inputs["deviations"], moments=np.zeros((count, MOMENTS * len(self._group.sides))))[
-            "faces"
-        ]
-        relative = np.empty((count, self.slacks, ENTRIES))
+        poses, deviations = flat(inputs["poses"]), flat(inputs["deviations"])
+        count = len(poses)
+        moments = np.repeat(self._no_moments, count, axis=0)
+        arrays = {"poses": poses, "faces": self._shared(deviations=deviations, moments=moments)["faces"]}
+        arrays["relative"] = np.empty((count, ENTRIES * self.slacks))
         for batch in self._batches:
-            relative[:, batch.pairs] = batch.relative(poses, split(faces, ENTRIES))
-        return {"relative": flat(relative)}
+            batch.relate(count, arrays)
+        return {"relative": arrays["relative"]}
 
     def _shared_arrays(self, inputs: Arrays) -> Arrays:
         """Return the inputs of elements that are computed once for all of them."""
-        shared = self._shared(**{name: inputs[name] for name in ("deviations", "moments")})
-        shared |= {"length": np.full((1, 1), self._group.length), "count": np.full((1, 1), self._group.count)}
-        if "firmness" in inputs:
-            shared |= {"firmness": inputs["firmness"], "load": inputs["reactions"].sum(axis=1, keepdims=True)}
+        shared = self._shared(**{name: inputs[name] for name in ("deviations", "moments")}) | self._values
+        if "reactions" in inputs:
+            shared["load"] = inputs["reactions"].sum(axis=1, keepdims=True)
         return shared
 
-    def _summed(self, terms: Sequence[Arrays], inputs: Arrays, *, newton: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the blocks of Q (n, mover, 36), those between two movers (n, coupling, 36), and the pull (n, mover, 6)."""
-        (Q, between), pull = self._blocks("Q", terms), self._vectors("pull", terms)
+    def _summed(self, terms: Arrays, inputs: Arrays, *, newton: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the blocks of Q (n, 36 * mover), those between two movers (n, 36 * coupling), and the pull (n, 6 * mover)."""
+        layout, count = self._layout, len(inputs["newton"])
+        (Q, between), pull = self._blocks("Q", terms), layout.mover_sum(terms["pull"])
         if newton:
             curvature, curvature_between = self._blocks("curvature", terms)
-            convex = _of_blocks(self._movers.factor, Q=Q, curvature=curvature)["convex"][..., 0] > 0
-            counts = ((inputs["newton"][:, 0] != 0) & convex.all(axis=1))[:, None, None]
+            convex = np.empty((count, self._size // FREEDOMS))
+            self._movers.factor(count, {"Q": Q, "curvature": curvature, "convex": convex})
+            counts = (inputs["newton"] != 0) & (convex > 0).all(axis=1, keepdims=True)
             Q, between = Q + np.where(counts, curvature, 0), between + np.where(counts, curvature_between, 0)
-            pull = pull + np.where(counts, self._vectors("hold", terms), 0)
+            pull = pull + np.where(counts, layout.mover_sum(terms["hold"]), 0)
         if self._projects:
-            caution = inputs["caution"][:, :, None]
-            Q, between = (
-                block + caution * near for block, near in zip((Q, between), self._blocks("nearness", terms), strict=True)
-            )
+            nearness, nearness_between = self._blocks("nearness", terms)
+            Q, between = Q + inputs["caution"] * nearness, between + inputs["caution"] * nearness_between
         return Q, between, pull
 
-    def _blocks(self, name: str, terms: Sequence[Arrays]) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sums of the blocks (n, block, 36) of elements, by mover and by pair of coupled movers."""
-        diagonal, between = (
-            np.concatenate([split(local[key], FREEDOMS**2) for local in terms], axis=1) for key in (name, f"{name}_between")
-        )
-        return self._mover_sum(diagonal), self._coupling_sum(between)
-
-    def _vectors(self, name: str, terms: Sequence[Arrays]) -> np.ndarray:
-        """Return the sums (n, mover, 6) of vectors (n, element, z) of elements."""
-        return self._mover_sum(np.concatenate([split(local[name], FREEDOMS) for local in terms], axis=1))
-
-    def _checked(
-        self, batch: ElementBatch, places: np.ndarray, openings: np.ndarray, arrays: Arrays, y: np.ndarray, slack: np.ndarray
-    ) -> Arrays:
-        """Return what is left of the optimality conditions of the rows of some elements, see ElementFunctions."""
-        local = {"a": arrays["a"][:, places], "opening": arrays["a"][:, openings], "y": y[:, batch.movers]}
-        local |= {name: arrays[key][:, batch.rows] for name, key in (("lower", "lba"), ("lam", "lam_a"))}
-        local |= {name: arrays[name][:, batch.rows] for name in ("row_length", "filled")}
-        return batch.checked(local | {"slack": slack[:, batch.pairs, None], "scale": arrays["scale"][:, :, None]})
-
-    def _number_movers(self) -> None:
-        """Find out which movers are coupled, and where contributions of elements to movers are summed."""
-        count = self._size // FREEDOMS
-        diagonal = [batch.movers.ravel() for batch in self._batches]
-        pairs = [
-            batch.movers[:, [*itertools.combinations(range(batch.movers.shape[1]), 2)]].reshape(-1, 2)
-            for batch in self._batches
-            if batch.movers.shape[1] > 1
-        ]
-        between = np.concatenate([np.zeros((0, 2), dtype=int), *pairs])
-        codes, numbers = np.unique(between[:, 0] * count + between[:, 1], return_inverse=True)
-        self._coupled = np.column_stack(np.divmod(codes, count))
-        self._mover_sum = BlockSum(np.concatenate(diagonal), count)
-        self._coupling_sum = BlockSum(numbers, len(codes))
-        self._force_sum = BlockSum(np.concatenate([*diagonal, *self._coupled.T]), count)
-
-    def _lay_out(self) -> None:
-        """Find out where the entries of elements stand in the matrices."""
-        freedoms, slacks = np.arange(FREEDOMS), np.arange(self._size, self._size + self.slacks)
-        i, j = (FREEDOMS * self._coupled.T)[:, :, None, None]
-        row, column = (block.ravel() for block in np.broadcast_arrays(i + freedoms, j + freedoms[:, None]))
-        ones = np.arange(self._size + self.slacks)
-        shape = (self._size + self.slacks, self._size + self.slacks)
-        h = SparseLayout(shape, np.concatenate([row, column, ones]), np.concatenate([column, row, ones]))
-        self._coupling_places = h.places[: 2 * row.size]
-        rows, columns = [], []
-        for batch in self._batches:
-            z = (FREEDOMS * batch.movers[:, :, None] + freedoms).reshape(len(batch.pairs), -1)
-            blocks = np.broadcast_arrays(batch.rows[:, None, :], z[:, :, None])
-            rows += [blocks[0].ravel(), batch.rows.ravel()]
-            columns += [blocks[1].ravel(), np.repeat(slacks[batch.pairs], batch.row_count)]
-        a = SparseLayout((self.spans[-1].stop, shape[1]), np.concatenate(rows), np.concatenate(columns))
-        places = np.split(a.places, np.cumsum([part.size for part in rows])[:-1])
-        entries = [places[2 * k].reshape(len(batch.pairs), -1) for k, batch in enumerate(self._batches)]
-        openings = [places[2 * k + 1].reshape(batch.rows.shape) for k, batch in enumerate(self._batches)]
-        self._row_places = entries, openings
-        self._layouts = {"h": h, "a": a}
+    def _blocks(self, name: str, terms: Arrays) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sums of the blocks of elements, by mover and by pair of coupled movers."""
+        return self._layout.mover_sum(terms[name]), self._layout.coupling_sum(terms[f"{name}_between"])
 
 
-def _batches(nominal: Nominal, group: Group, method: Method, standing: Standing, *, projects: bool) -> list[ElementBatch]:
+def _kinds(nominal: Nominal, group: Group, method: Method, standing: Standing, *, projects: bool) -> list[Elements]:
     """Return the elements by their kinds."""
     elements = elements_of(nominal, group, standing)
     kinds: dict[object, list] = {}
     for element in elements:
         kinds.setdefault(element.kind, []).append(element)
     numbers = Numbers.of(elements)
-    return [
-        ElementBatch(members, element_functions(members[0], method, projects=projects), numbers) for members in kinds.values()
-    ]
+    return [Elements(members, element_functions(members[0], method, projects=projects), numbers) for members in kinds.values()]
 
 
 def _shared_function(nominal: Nominal, group: Group) -> NamedFunction:
@@ -299,8 +235,3 @@ def _share_function(size: int) -> NamedFunction:
     share = step_share(inputs["step"], inputs["stride"], inputs["length"])
     step_size = ca.vertcat(ca.norm_inf(inputs["step"]), ca.norm_inf(inputs["y"]))
     return function_of("share", inputs, {"share": share, "size": step_size})
-
-
-def _of_blocks(function: NamedFunction, **arrays: np.ndarray) -> Arrays:
-    """Evaluate a function for all entries of arrays (n, entry, ...)."""
-    return evaluated(function, arrays, np.broadcast_shapes(*(values.shape[:2] for values in arrays.values())))

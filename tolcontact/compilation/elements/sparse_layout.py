@@ -7,19 +7,28 @@ from tolcontact.arrays import Array, Float, Int
 
 
 class BlockSum:
-    """Sums of contributions by their targets, always in the same order, so that results do not depend on the block size."""
+    """Sums of contributions by their targets, always in the same order, so that results do not depend on the block size.
+
+    places   (contribution,): the place that each contribution takes in an array of all, which is sorted by targets
+    """
 
     def __init__(self, targets: Int[Array, " contribution"], count: int) -> None:
         self._count = count
-        self._order = np.argsort(targets, kind="stable")
-        self._present, self._starts = np.unique(targets[self._order], return_index=True)
+        order = np.argsort(targets, kind="stable")
+        self.places = np.empty(len(order), dtype=int)
+        self.places[order] = np.arange(len(order))
+        self._present, self._starts = np.unique(targets[order], return_index=True)
 
-    def __call__(self, contributions: Float[Array, "n contribution entry"]) -> Float[Array, "n target entry"]:
-        """Return the sums, zero for targets without contributions."""
-        sums = np.zeros((len(contributions), self._count, contributions.shape[2]))
-        if self._present.size:
-            sums[:, self._present] = np.add.reduceat(contributions[:, self._order], self._starts, axis=1)
-        return sums
+    def __call__(self, contributions: Float[Array, "n _"]) -> Float[Array, "n _"]:
+        """Return the sums (n, target * entry) of (n, contribution * entry), zero for targets without contributions."""
+        count, contribution = len(contributions), len(self.places)
+        if contribution == self._count == len(self._present):
+            return contributions
+        entries = contributions.shape[1] // max(contribution, 1)
+        sums = np.zeros((count, self._count, entries))
+        if contribution:
+            sums[:, self._present] = np.add.reduceat(contributions.reshape(count, contribution, entries), self._starts, axis=1)
+        return sums.reshape(count, self._count * entries)
 
 
 class SparseLayout:

@@ -1,5 +1,5 @@
 """Ways to call a CasADi Function for many realizations at once: by name, interpreted, compiled, or whichever is faster."""
 
-from tolcontact.compilation.functions.named import InterpretedFunction, NamedFunction, flat
+from tolcontact.compilation.functions.named import IndexedFunction, InterpretedFunction, NamedFunction, flat
 
-__all__ = ["InterpretedFunction", "NamedFunction", "flat"]
+__all__ = ["IndexedFunction", "InterpretedFunction", "NamedFunction", "flat"]

@@ -8,8 +8,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 import casadi as ca
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Real
+from tolcontact.arrays import Array, Float, Int, Real
 from tolcontact.compilation.functions.native import NativeFunction, UnknownInstructionError
+from tolcontact.compilation.functions.places import Places
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 WIDTHS = (256, 16)  # realizations in a call of CasADi
@@ -137,14 +138,33 @@ class AdaptiveFunction:
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
         """Return outputs (realization, stored entry) for inputs (realization, stored entry)."""
-        if self.native is None and (compiler := self._due_compiler(len(inputs[0]))):
+        if native := self._compiled(len(inputs[0])):
+            return native(inputs)
+        with self._lock:
+            return self._interpreted(inputs)[0]
+
+    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ column"]], places: Places) -> None:
+        """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
+        if native := self._compiled(count * places.elements):
+            native.evaluate(count, arrays, places)
+            return
+        rows, cut = count * places.elements, len(arrays) - len(self.sizes_out)
+        inputs = [
+            np.broadcast_to(array[:, columns], (count, *columns.shape)).reshape(rows, columns.shape[1])
+            for array, columns in zip(arrays[:cut], places.columns, strict=False)
+        ]
+        with self._lock:
+            results = self._interpreted(inputs)[0]
+        for array, columns, values in zip(arrays[cut:], places.columns[cut:], results, strict=True):
+            array[:, columns] = values.reshape(count, *columns.shape)
+
+    def _compiled(self, count: int) -> NativeFunction | None:
+        """Return the machine code for `count` more evaluations, None while CasADi interprets."""
+        if self.native is None and (compiler := self._due_compiler(count)):
             # CasADi interprets what LLVM cannot compile on this machine.
             with contextlib.suppress(UnknownInstructionError, RuntimeError):
                 self.native = compiler(self._function)  # other threads interpret meanwhile
-        if self.native is not None:
-            return self.native(inputs)
-        with self._lock:
-            return self._interpreted(inputs)[0]
+        return self.native
 
     def _due_compiler(self, count: int) -> Callable[[ca.Function], NativeFunction | None] | None:
         """Return the way to get machine code before `count` evaluations, or None; each way is returned to one caller only."""
@@ -171,6 +191,11 @@ class NamedFunction:
         """The names of its inputs."""
         return self._names
 
+    def at(self, places: Mapping[str, Int[Array, "element entry"]]) -> "IndexedFunction":
+        """Return the function of several elements, whose inputs and results stand in these columns of arrays, by name."""
+        names = [*self._names, *self._results]
+        return IndexedFunction(self._evaluate, names, Places([places[name] for name in names]))
+
     @classmethod
     def dense(cls, function: ca.Function) -> "NamedFunction":
         """Return a function with all entries of inputs and outputs, including those that are always zero."""
@@ -185,6 +210,18 @@ class NamedFunction:
         """
         outputs = self._evaluate([flat(arrays[name]) for name in self._names])
         return dict(zip(self._results, outputs, strict=True))
+
+
+class IndexedFunction:
+    """A Function that is evaluated for several elements of each realization, on arrays that hold the numbers of all."""
+
+    def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: Places) -> None:
+        self._function, self._names, self._places = function, names, places
+
+    def __call__(self, count: int, arrays: Mapping[str, Float[Array, "_ column"]]) -> None:
+        """Read inputs of `count` realizations from arrays by name, of one row if all share it; write results into others."""
+        if self._places.elements:
+            self._function.evaluate(count, [arrays[name] for name in self._names], self._places)
 
 
 def flat(array: Real[Array, "realization ..."]) -> Float[Array, "realization _"]:

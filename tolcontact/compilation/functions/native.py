@@ -6,6 +6,9 @@ that the results are the same to the last bit.
 
 LLVM's time for a straight line grows faster than its length. So it is cut into segments, functions of their own, which pass
 numbers on in memory.
+
+A Function may be evaluated for several elements of every realization, each with its own places in arrays that hold the numbers
+of all: the machine code gathers its inputs and scatters its results by itself.
 """
 
 import ctypes
@@ -21,12 +24,15 @@ import numpy as np
 from llvmlite import binding, ir
 
 from tolcontact import code_cache
+from tolcontact.arrays import Array, Float
+from tolcontact.compilation.functions.places import Places, pointers
 
 LANES = 4
 SEGMENT = 1000  # instructions
 _INDEX = ir.IntType(64)
 _DOUBLE = ir.DoubleType()
 _LANES = ir.VectorType(_DOUBLE, LANES)
+_POINTERS = _DOUBLE.as_pointer().as_pointer(), _INDEX.as_pointer(), _INDEX.as_pointer().as_pointer()
 VECTOR_ALIGNMENT = 8  # bytes: what is sure of memory on the stack
 
 
@@ -35,7 +41,7 @@ class UnknownInstructionError(Exception):
 
 
 class NativeFunction:
-    """A compiled Function, called for many realizations at once: `inputs` and results are (realization, stored entry)."""
+    """A compiled Function, called for many realizations at once."""
 
     def __init__(self, function: ca.Function, code: bytes | None = None) -> None:
         """Load the given machine code of the Function, or compile the Function and store its code in the cache.
@@ -46,8 +52,8 @@ class NativeFunction:
         self.sizes_out = [function.nnz_out(i) for i in range(function.n_out())]
         self._engine = _loaded(code) if code else _compiled(_module(function), key_of(function))
         address = self._engine.get_function_address("evaluate")
-        pointers = ctypes.POINTER(ctypes.c_void_p)
-        self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, pointers, pointers)(address)
+        self._evaluate = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_int64, *[ctypes.c_void_p] * 3)(address)
+        self._whole = Places.of_one([*self.sizes_in, *self.sizes_out])
 
     @classmethod
     def from_cache(cls, function: ca.Function) -> "NativeFunction | None":
@@ -56,43 +62,57 @@ class NativeFunction:
         return None if code is None else cls(function, code)
 
     def __call__(self, inputs: Sequence[np.ndarray]) -> list[np.ndarray]:
+        """Return results (realization, stored entry) for inputs (realization, stored entry)."""
         count = len(inputs[0])
         inputs = [np.ascontiguousarray(array, dtype=float) for array in inputs]
         results = [np.empty((count, size)) for size in self.sizes_out]
-        self._evaluate(count, _pointers(inputs), _pointers(results))
+        self.evaluate(count, [*inputs, *results], self._whole)
         return results
 
+    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ column"]], places: Places) -> None:
+        """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
-def _pointers(arrays: Sequence[np.ndarray]) -> ctypes.Array:
-    return (ctypes.c_void_p * len(arrays))(*(array.ctypes.data for array in arrays))
+        Arrays of numbers lie row by row in memory. Inputs of one row are the same for all realizations.
+        """
+        steps = [array.shape[1] if len(array) > 1 else 0 for array in arrays]
+        self._evaluate(count, places.elements, pointers(arrays), (ctypes.c_int64 * len(steps))(*steps), places.addresses)
 
 
 def _module(function: ca.Function) -> ir.Module:
-    """Return a module with `void evaluate(count, inputs, results)`: all instructions, for LANES realizations at once.
+    """Return a module with `void evaluate(count, elements, arrays, steps, tables)`: all instructions, for LANES realizations.
 
-    In the last turn of the loop the lanes beyond `count` repeat the last realization.
+    The arguments stand in `arrays` of rows that are `steps` apart, in the columns that their `tables` (element, entry) say. In
+    the last turn of the loop over realizations the lanes beyond `count` repeat the last one.
     """
     module = ir.Module("contact")
-    pointer = _DOUBLE.as_pointer()
-    evaluate = ir.Function(
-        module, ir.FunctionType(ir.VoidType(), [_INDEX, pointer.as_pointer(), pointer.as_pointer()]), "evaluate"
+    evaluate = ir.Function(module, ir.FunctionType(ir.VoidType(), [_INDEX, _INDEX, *_POINTERS]), "evaluate")
+    count, elements, *arguments = evaluate.args
+    entry, outer, body, following_element, done = (
+        evaluate.append_basic_block(name) for name in ("entry", "outer", "body", "following", "done")
     )
-    count, inputs, results = evaluate.args
-    entry, body, done = (evaluate.append_basic_block(name) for name in ("entry", "body", "done"))
     builder = ir.IRBuilder(entry)
     memory = builder.alloca(_LANES, _INDEX(max(function.sz_w(), 1)))
     last = builder.sub(count, _INDEX(1))
-    builder.cbranch(builder.icmp_signed(">", count, _INDEX(0)), body, done)
+    nothing = builder.or_(builder.icmp_signed("<=", count, _INDEX(0)), builder.icmp_signed("<=", elements, _INDEX(0)))
+    builder.cbranch(nothing, done, outer)
+    builder.position_at_end(outer)
+    element = builder.phi(_INDEX)
+    element.add_incoming(_INDEX(0), entry)
+    builder.branch(body)
     builder.position_at_end(body)
     k = builder.phi(_INDEX)
-    k.add_incoming(_INDEX(0), entry)
+    k.add_incoming(_INDEX(0), outer)
     lanes = [builder.add(k, _INDEX(lane)) for lane in range(LANES)]
     lanes = [builder.select(builder.icmp_signed("<", lane, last), lane, last) for lane in lanes]
     for segment in _segments(function, module):
-        builder.call(segment, [inputs, results, memory, *lanes])
+        builder.call(segment, [*arguments, memory, element, *lanes])
     following = builder.add(k, _INDEX(LANES))
     k.add_incoming(following, builder.block)
-    builder.cbranch(builder.icmp_signed("<", following, count), body, done)
+    builder.cbranch(builder.icmp_signed("<", following, count), body, following_element)
+    builder.position_at_end(following_element)
+    next_element = builder.add(element, _INDEX(1))
+    element.add_incoming(next_element, following_element)
+    builder.cbranch(builder.icmp_signed("<", next_element, elements), outer, done)
     ir.IRBuilder(done).ret_void()
     return module
 
@@ -106,7 +126,7 @@ class Instruction(NamedTuple):
 
 
 def _segments(function: ca.Function, module: ir.Module) -> list[ir.Function]:
-    """Return functions `void (inputs, results, memory, lanes...)` that together are all instructions of a Function.
+    """Return functions `void (arrays, steps, tables, memory, element, lanes...)` that together are all instructions.
 
     A segment stores in `memory` the work entries that later segments read.
     """
@@ -143,17 +163,15 @@ def _segment(
     function: ca.Function, module: ir.Module, name: str, part: tuple[int, Sequence[Instruction]], kept: set[int]
 ) -> ir.Function:
     """Return the function of the instructions from a number on, which stores the work entries that are `kept`."""
-    pointers = _DOUBLE.as_pointer().as_pointer()
-    arguments = [pointers, pointers, _LANES.as_pointer(), *[_INDEX] * LANES]
+    arguments = [*_POINTERS, _LANES.as_pointer(), _INDEX, *[_INDEX] * LANES]
     segment = ir.Function(module, ir.FunctionType(ir.VoidType(), arguments), name)
     segment.linkage = "internal"
     segment.attributes.add("noinline")
-    inputs, results, memory, *lanes = segment.args
+    arrays, steps, tables, memory, element, *lanes = segment.args
     builder = ir.IRBuilder(segment.append_basic_block("entry"))
-    sizes = ([function.nnz_in(i) for i in range(function.n_in())], [function.nnz_out(i) for i in range(function.n_out())])
-    places = [_Places(builder, array, of_array, lanes) for array, of_array in zip((inputs, results), sizes, strict=True)]
-    work = _Work(builder, memory)
-    _translate(function, builder, part, work, *places)
+    sizes = [function.nnz_in(i) for i in range(function.n_in())] + [function.nnz_out(i) for i in range(function.n_out())]
+    work, addresses = _Work(builder, memory), _Addresses(builder, (arrays, steps, tables), sizes, (element, *lanes))
+    _translate(function, builder, part, work, addresses)
     for index in sorted(kept):
         builder.store(work[index], builder.gep(memory, [_INDEX(index)]), align=VECTOR_ALIGNMENT)
     builder.ret_void()
@@ -172,19 +190,32 @@ class _Work(dict[int, ir.Value]):
         return self[index]
 
 
-class _Places:
-    """The addresses of arguments for each lane, computed when a segment first needs them."""
+class _Addresses:
+    """The addresses of entries of arguments for each lane; what all entries share is computed when a segment first needs it."""
 
-    def __init__(self, builder: ir.IRBuilder, arrays: ir.Value, sizes: Sequence[int], lanes: Sequence[ir.Value]) -> None:
-        self._builder, self._arrays, self._sizes, self._lanes = builder, arrays, sizes, lanes
-        self._known: dict[int, list[ir.Value]] = {}
+    def __init__(
+        self, builder: ir.IRBuilder, pointers: Sequence[ir.Value], sizes: Sequence[int], place: Sequence[ir.Value]
+    ) -> None:
+        self._builder, self._sizes = builder, sizes
+        self._arrays, self._steps, self._tables = pointers
+        self._element, *self._lanes = place
+        self._known: dict[int, tuple[ir.Value, list[ir.Value]]] = {}
 
-    def __getitem__(self, argument: int) -> list[ir.Value]:
+    def __call__(self, argument: int, entry: int) -> list[ir.Value]:
+        table, rows = self._of_argument(argument)
+        column = self._builder.load(self._builder.gep(table, [_INDEX(entry)]))
+        return [self._builder.gep(row, [column]) for row in rows]
+
+    def _of_argument(self, argument: int) -> tuple[ir.Value, list[ir.Value]]:
+        """Return the table of the element, and the row of each lane."""
         if argument not in self._known:
             builder = self._builder
-            start = builder.load(builder.gep(self._arrays, [_INDEX(argument)]))
-            size = _INDEX(self._sizes[argument])
-            self._known[argument] = [builder.gep(start, [builder.mul(lane, size)]) for lane in self._lanes]
+            array, step, table = (
+                builder.load(builder.gep(pointers, [_INDEX(argument)]))
+                for pointers in (self._arrays, self._steps, self._tables)
+            )
+            start = builder.gep(table, [builder.mul(self._element, _INDEX(self._sizes[argument]))])
+            self._known[argument] = start, [builder.gep(array, [builder.mul(lane, step)]) for lane in self._lanes]
         return self._known[argument]
 
 
@@ -193,21 +224,18 @@ def _translate(
     builder: ir.IRBuilder,
     part: tuple[int, Sequence[Instruction]],
     work: _Work,
-    inputs: _Places,
-    results: _Places,
+    addresses: _Addresses,
 ) -> None:
-    """Emit instructions of a Function from a number on; `inputs` and `results` hold the address of each argument and lane."""
-    start, instructions = part
+    """Emit instructions of a Function from a number on."""
+    (start, instructions), inputs = part, function.n_in()
     for number, (operation, to, names) in enumerate(instructions, start):
         if operation == ca.OP_OUTPUT:
-            for lane, place in enumerate(results[to[0]]):
-                value = builder.extract_element(work[names[0]], ir.IntType(32)(lane))
-                builder.store(value, builder.gep(place, [_INDEX(to[1])]))
+            for lane, address in enumerate(addresses(inputs + to[0], to[1])):
+                builder.store(builder.extract_element(work[names[0]], ir.IntType(32)(lane)), address)
         elif operation == ca.OP_INPUT:
             value = _LANES(ir.Undefined)
-            for lane, place in enumerate(inputs[names[0]]):
-                loaded = builder.load(builder.gep(place, [_INDEX(names[1])]))
-                value = builder.insert_element(value, loaded, ir.IntType(32)(lane))
+            for lane, address in enumerate(addresses(names[0], names[1])):
+                value = builder.insert_element(value, builder.load(address), ir.IntType(32)(lane))
             work[to[0]] = value
         elif operation == ca.OP_CONST:
             work[to[0]] = _constant(function.instruction_constant(number))

@@ -1,0 +1,130 @@
+"""Where the contributions of elements stand in sums over movers, and in the matrices of the whole QP."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.arrays import Array, Int
+from tolcontact.compilation.elements.element_batch import BLOCK, Columns, Elements, blocks
+from tolcontact.compilation.elements.element_functions import mover_functions
+from tolcontact.compilation.elements.sparse_layout import BlockSum, SparseLayout
+from tolcontact.compilation.functions import IndexedFunction
+from tolcontact.mechanics.correction import FREEDOMS
+
+
+@dataclass(frozen=True, eq=False)
+class Movers:
+    """The functions of movers on the arrays of the whole group, see MoverFunctions."""
+
+    factor: IndexedFunction
+    whiten: IndexedFunction
+    couple: IndexedFunction
+    pull: IndexedFunction
+    step: IndexedFunction
+
+
+class ElementLayout:
+    """The places of a QP of movers, with rows and slacks, that is assembled from elements of some kinds.
+
+    mover_sum, coupling_sum, force_sum   sums of what elements contribute to movers, to pairs of coupled ones, and to forces
+    places          for each kind the columns of its contributions, by name
+    matrices        h and a
+    slot_rows       (slot,) the rows of the slots
+    """
+
+    def __init__(self, kinds: Sequence[Elements], *, movers: int, rows: int) -> None:
+        self._movers, self._slacks = movers, sum(kind.pairs.size for kind in kinds)
+        couplings = np.concatenate([np.zeros((0, 2), dtype=int), *(kind.couplings for kind in kinds)])
+        codes, numbers = np.unique(couplings[:, 0] * movers + couplings[:, 1], return_inverse=True)
+        self._coupled = np.column_stack(np.divmod(codes, movers))
+        diagonal = np.concatenate([kind.movers.ravel() for kind in kinds])
+        self.mover_sum = BlockSum(diagonal, movers)
+        self.coupling_sum = BlockSum(numbers.ravel(), len(codes))
+        self.force_sum = BlockSum(np.concatenate([diagonal, *self._coupled.T]), movers)
+        self._contributions = len(diagonal)
+        slots = np.zeros(rows, dtype=int)
+        is_slot = np.zeros(rows, dtype=bool)
+        for kind in kinds:
+            if kind.has_slots:
+                is_slot[kind.slots] = True
+                slots[kind.slots] = kind.rows
+        self.slot_rows = slots[is_slot]
+        self.matrices = {"h": self._lay_out_h(), "a": self._lay_out_a(kinds, rows)}
+        self.places = self._places_of(kinds)
+
+    @property
+    def sizes_of_terms(self) -> dict[str, int]:
+        """The number of entries that all elements contribute, by name."""
+        between = BLOCK * len(self.coupling_sum.places)
+        sizes = {"pull": FREEDOMS * self._contributions, "hold": FREEDOMS * self._contributions}
+        for name in ("Q", "curvature", "nearness"):
+            sizes |= {name: BLOCK * self._contributions, f"{name}_between": between}
+        return sizes
+
+    def of_movers(self) -> Movers:
+        """Return the functions of movers."""
+        functions, own = mover_functions(), np.arange(self._movers)[:, None]
+        one_each = {
+            **dict.fromkeys(("Q", "curvature", "V"), blocks(own, BLOCK)),
+            **dict.fromkeys(("pull", "g", "y", "step"), blocks(own, FREEDOMS)),
+            "convex": own,
+        }
+        i, j = self._coupled[:, :1], self._coupled[:, 1:]
+        count = len(self._coupled)
+        above, below = self._coupling_places.reshape(2, count, BLOCK)
+        forces = self.force_sum.places[self._contributions :].reshape(2, count, 1)
+        pairs = {
+            "Q": blocks(np.arange(count)[:, None], BLOCK), "V_i": blocks(i, BLOCK), "V_j": blocks(j, BLOCK),
+            "H": above, "mirrored": below, "y_i": blocks(i, FREEDOMS), "y_j": blocks(j, FREEDOMS),
+            "force_i": blocks(forces[0], FREEDOMS), "force_j": blocks(forces[1], FREEDOMS),
+        }  # fmt: skip
+        of_one = {name: getattr(functions, name).at(one_each) for name in ("factor", "whiten", "step")}
+        return Movers(**of_one, **{name: getattr(functions, name).at(pairs) for name in ("couple", "pull")})
+
+    def _lay_out_h(self) -> SparseLayout:
+        freedoms = np.arange(FREEDOMS)
+        i, j = (FREEDOMS * self._coupled.T)[:, :, None, None]
+        row, column = (block.ravel() for block in np.broadcast_arrays(i + freedoms, j + freedoms[:, None]))
+        size = FREEDOMS * self._movers + self._slacks
+        ones = np.arange(size)
+        h = SparseLayout((size, size), np.concatenate([row, column, ones]), np.concatenate([column, row, ones]))
+        self._coupling_places = h.places[: 2 * row.size]
+        return h
+
+    def _lay_out_a(self, kinds: Sequence[Elements], row_count: int) -> SparseLayout:
+        freedoms, slack = np.arange(FREEDOMS), FREEDOMS * self._movers
+        rows, columns = [], []
+        for kind in kinds:
+            z = (FREEDOMS * kind.movers[:, :, None] + freedoms).reshape(len(kind.pairs), -1)
+            entries = np.broadcast_arrays(kind.rows[:, None, :], z[:, :, None])
+            rows += [entries[0].ravel(), kind.rows.ravel()]
+            columns += [entries[1].ravel(), np.repeat(slack + kind.pairs, kind.row_count)]
+        a = SparseLayout((row_count, slack + self._slacks), np.concatenate(rows), np.concatenate(columns))
+        self._row_places = np.split(a.places, np.cumsum([part.size for part in rows])[:-1])
+        return a
+
+    def _places_of(self, kinds: Sequence[Elements]) -> list[dict[str, Columns]]:
+        """Return the columns of what elements of each kind contribute."""
+        of_kinds, start, start_between = [], 0, 0
+        for number, kind in enumerate(kinds):
+            count, movers = kind.movers.shape
+            couplings = len(kind.couplings)
+            own = slice(start, start := start + count * movers)
+            between = slice(start_between, start_between := start_between + couplings)
+            diagonal, force = (_by_element(sums.places[own], count) for sums in (self.mover_sum, self.force_sum))
+            coupled = _by_element(self.coupling_sum.places[between], count)
+            of_kinds.append({
+                **dict.fromkeys(("Q", "curvature", "nearness"), blocks(diagonal, BLOCK)),
+                **dict.fromkeys(("Q_between", "curvature_between", "nearness_between"), blocks(coupled, BLOCK)),
+                **dict.fromkeys(("pull", "hold"), blocks(diagonal, FREEDOMS)),
+                "force": blocks(force, FREEDOMS),
+                "a": self._row_places[2 * number].reshape(count, -1),
+                "opening": self._row_places[2 * number + 1].reshape(count, -1),
+                "slack": FREEDOMS * self._movers + kind.pairs[:, None],
+            })  # fmt: skip
+        return of_kinds
+
+
+def _by_element(places: Int[Array, " contribution"], elements: int) -> Int[Array, "element _"]:
+    return places.reshape(elements, len(places) // elements)
