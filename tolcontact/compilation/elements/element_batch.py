@@ -16,8 +16,8 @@ from tolcontact.mechanics.correction import FREEDOMS
 from tolcontact.mechanics.displacement import MOMENTS
 from tolcontact.mechanics.pose import ENTRIES
 
-Arrays = dict[str, Float[Array, "_ column"]]
-Columns = Int[Array, "element entry"]
+Arrays = dict[str, Float[Array, "_ _"]]
+Columns = Int[Array, "element _"]
 
 BLOCK = FREEDOMS**2
 VALUES_OF_ALL = ("firmness", "length", "count", "scale", "load")
@@ -156,4 +156,4 @@ class ElementBatch:
 
 def blocks(numbers: Int[Array, "element block"], size: int) -> Columns:
     """Return the columns (element, block * size) of blocks of `size` entries, by their numbers."""
-    return (numbers[:, :, None] * size + np.arange(size)).reshape(len(numbers), -1)
+    return (numbers[:, :, None] * size + np.arange(size)).reshape(len(numbers), numbers.shape[1] * size)

@@ -143,7 +143,7 @@ class AdaptiveFunction:
         with self._lock:
             return self._interpreted(inputs)[0]
 
-    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ column"]], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
         """Evaluate the Function for all elements of `count` realizations; see NativeFunction."""
         if native := self._compiled(count * places.elements):
             native.evaluate(count, arrays, places)
@@ -191,7 +191,7 @@ class NamedFunction:
         """The names of its inputs."""
         return self._names
 
-    def at(self, places: Mapping[str, Int[Array, "element entry"]]) -> "IndexedFunction":
+    def at(self, places: Mapping[str, Int[Array, "element _"]]) -> "IndexedFunction":
         """Return the function of several elements, whose inputs and results stand in these columns of arrays, by name."""
         names = [*self._names, *self._results]
         return IndexedFunction(self._evaluate, names, Places([places[name] for name in names]))
@@ -218,7 +218,7 @@ class IndexedFunction:
     def __init__(self, function: AdaptiveFunction, names: Sequence[str], places: Places) -> None:
         self._function, self._names, self._places = function, names, places
 
-    def __call__(self, count: int, arrays: Mapping[str, Float[Array, "_ column"]]) -> None:
+    def __call__(self, count: int, arrays: Mapping[str, Float[Array, "_ _"]]) -> None:
         """Read inputs of `count` realizations from arrays by name, of one row if all share it; write results into others."""
         if self._places.elements:
             self._function.evaluate(count, [arrays[name] for name in self._names], self._places)

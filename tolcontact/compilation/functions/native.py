@@ -69,7 +69,7 @@ class NativeFunction:
         self.evaluate(count, [*inputs, *results], self._whole)
         return results
 
-    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ column"]], places: Places) -> None:
+    def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
         """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
         Arrays of numbers lie row by row in memory. Inputs of one row are the same for all realizations.

@@ -11,7 +11,7 @@ from tolcontact.arrays import Array, Int
 class Places:
     """Where the arguments of a Function, inputs first, stand in their arrays: columns (element, entry) of each argument."""
 
-    def __init__(self, columns: Sequence[Int[Array, "element entry"]]) -> None:
+    def __init__(self, columns: Sequence[Int[Array, "element _"]]) -> None:
         self.columns = [np.ascontiguousarray(table, dtype=np.int64) for table in columns]
         self.elements = len(self.columns[0])
         self.addresses = pointers(self.columns)
