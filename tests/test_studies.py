@@ -9,6 +9,9 @@ import pytest
 from tests.helpers import ROOT, run
 
 STUDIES = {
+    "benchmarks/pages.py": ["pages"],
+    "benchmarks/references.py": ["linear_stack"],
+    "benchmarks/run.py": ["linear_stack"],
     "bodies/measure.py": ["--scenes", "ring", "--sizes", "3", "--methods", "linearized", "--figure", "cost.png"],
     "cad/as1.py": ["--samples", "20"],
     "cad/as1_nine.py": ["--samples", "20", "--surfaces", "2"],

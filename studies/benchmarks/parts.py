@@ -1,0 +1,56 @@
+"""Parts that several models declare."""
+
+from __future__ import annotations  # references.py reads this module without tolcontact
+
+from typing import Any
+
+import tolcontact as tc
+
+AXES = "xyz"
+
+
+def sliding(size: tuple[float, float, float], along: str, tolerance: Any) -> list[tc.Locator]:
+    """Return six locators of a box, of which "S" alone varies: it moves the box `along` an axis without turning it."""
+    k = AXES.index(along)
+    i, j = (k + 1) % 3, (k + 2) % 3
+
+    def corner(*axes: int) -> tuple[float, ...]:
+        return tuple(size[axis] if axis in axes else 0.0 for axis in range(3))
+
+    first = [tc.Locator(f"I{n}", point, AXES[i], 0.0) for n, point in enumerate((corner(), corner(k), corner(j)))]
+    second = [tc.Locator(f"J{n}", point, AXES[j], 0.0) for n, point in enumerate((corner(), corner(k)))]
+    return [tc.Locator("S", corner(), along, tolerance), *first, *second]
+
+
+def slider(
+    model: tc.Assembly, name: str, tolerance: Any, *, along: str = "z", at: Any = (0, 0, 0), on: tc.Part | None = None,
+    size: tuple[float, float, float] = (10, 10, 10),
+) -> tc.Part:  # fmt: skip
+    """Declare a box that moves along one axis by a deviation; `on` another part it follows that part."""
+    part = model.part(name, tc.Box(*size), at=at)
+    model.locate(part, sliding(size, along, tolerance), on=on)
+    return part
+
+
+def dimensions(model: tc.Assembly, **tolerances: Any) -> dict[str, tc.Part]:
+    """Declare a slider along x for each dimension of a drawing: how far it has moved is the deviation of the dimension."""
+    places = enumerate(tolerances.items())
+    return {name: slider(model, name, tolerance, along="x", at=(0, 20.0 * k, 0)) for k, (name, tolerance) in places}
+
+
+def leaning_wall(
+    model: tc.Assembly, name: str, x: float, *, off: Any, tilt: Any, arm: float, on: tc.Part | None = None
+) -> tc.Part:
+    """Declare a wall of 1 x 2 arm x 2 arm whose lower corner is (x, -arm, 0); it moves along x, and leans in the plane x, y.
+
+    `off` [mm] is the distribution of its displacement, and `tilt` [rad] that of its angle; None for what does not vary.
+    """
+    part = model.part(name, tc.Box(1, 2 * arm, 2 * arm), at=(x, -arm, 0), fixed=True)
+    rest = {"Z1": ((0, 0, 0), "z"), "Z2": ((1, 0, 0), "z"), "Z3": ((0, 2 * arm, 0), "z"), "Y": ((0, 0, 0), "y")}
+    ends = [tc.Locator(f"X{k}", (0, y, 0), "x", 0.0) for k, y in enumerate((0, 2 * arm))]
+    model.locate(part, [*(tc.Locator(key, point, axis, 0.0) for key, (point, axis) in rest.items()), *ends], on=on)
+    for cause, tolerance, arms, units in (("off", off, (1.0, 1.0), "mm"), ("tilt", tilt, (-arm, arm), "rad")):
+        if tolerance is not None:
+            drives = {f"{name}.X{k}": arms[k] for k in (0, 1)}
+            model.variable(f"{name} {cause}", tolerance, drives=drives, units=units)
+    return part
