@@ -64,6 +64,14 @@ def deviation(x: np.ndarray) -> Estimate:
     return Estimate(*np.sqrt(variance(x)))
 
 
+def skewness(x: np.ndarray) -> Estimate:
+    """Return the skewness of a sample; its interval follows from the influence of each realization (delta method)."""
+    z = (x - x.mean()) / x.std()
+    value = (z**3).mean()
+    half = Z * (z**3 - 3 * z - 1.5 * value * (z**2 - 1)).std() / np.sqrt(len(x))
+    return Estimate(value, value - half, value + half)
+
+
 def share(hits: np.ndarray) -> Estimate:
     """Return the share of True, with the exact interval."""
     interval = stats.binomtest(int(hits.sum()), len(hits)).proportion_ci(0.999)
