@@ -14,10 +14,10 @@ N = numbers(__file__)
 def solution():
     z, w = np.polynomial.hermite_e.hermegauss(24)
     w = w / w.sum()
-    r, l, t = (nominal + spread / 3 * z for nominal, spread in ((N.r, N.dr), (N.l, N.dl), (N.t, N.dt)))
-    r, l, t = np.meshgrid(r, l, np.radians(t), indexing="ij")
+    r, rod, t = (nominal + spread / 3 * z for nominal, spread in ((N.r, N.dr), (N.l, N.dl), (N.t, N.dt)))
+    r, rod, t = np.meshgrid(r, rod, np.radians(t), indexing="ij")
     weights = w[:, None, None] * w[:, None] * w
-    x = r * np.cos(t) + np.sqrt(l**2 - (r * np.sin(t)) ** 2)
+    x = r * np.cos(t) + np.sqrt(rod**2 - (r * np.sin(t)) ** 2)
     mean = (weights * x).sum()
     return mean, np.sqrt((weights * (x - mean) ** 2).sum())
 
@@ -44,8 +44,8 @@ def assembly():
 
     def place(poses):
         moved = {name: poses.translation(part)[0] for name, part in size.items()}
-        r, l, t = N.r + moved["r"], N.l + moved["l"], np.radians(N.t) + moved["t"]
-        return r * ca.cos(t) + ca.sqrt(l**2 - (r * ca.sin(t)) ** 2)
+        r, rod, t = N.r + moved["r"], N.l + moved["l"], np.radians(N.t) + moved["t"]
+        return r * ca.cos(t) + ca.sqrt(rod**2 - (r * ca.sin(t)) ** 2)
 
     model.measure("x", place)
     return model
