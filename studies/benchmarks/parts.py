@@ -4,6 +4,8 @@ from __future__ import annotations  # references.py reads this module without to
 
 from typing import Any
 
+from scipy import stats
+
 import tolcontact as tc
 
 AXES = "xyz"
@@ -54,3 +56,27 @@ def leaning_wall(
             drives = {f"{name}.X{k}": arms[k] for k in (0, 1)}
             model.variable(f"{name} {cause}", tolerance, drives=drives, units=units)
     return part
+
+
+def pins_and_slots(*, off: Any, tilt: Any, pin: float, slot: float, places: Any) -> tc.Assembly:
+    """Return a plate with square pins in slots, free to slide along x only, and pushed along x to where the pins fit.
+
+    `off` and `tilt` are as for leaning walls, the faces of pins and slots.
+    """
+    model = tc.Assembly("pins and slots", method=tc.Method(search="fixed", resolution="exact", objective="seating"))
+    plate = model.part("plate", tc.Box(130, 40, 5), at=(0, -20, pin), fixed=False)
+    rest = {"A1": ((10, 5, 0), "z"), "A2": ((120, 5, 0), "z"), "A3": ((65, 35, 0), "z")}
+    rest |= {"B1": ((10, 0, 2), "y"), "B2": ((120, 0, 2), "y")}
+    stop = tc.Locator("stop", (0, 20, 2), "x", stats.uniform(-1, 1e-9), one_sided=True)
+    model.locate(plate, [*(tc.Locator(name, point, axis, 0.0) for name, (point, axis) in rest.items()), stop])
+    model.force("push", at=plate.point(0, 20, 2), vector=(1, 0, 0))
+    spread = {"off": off, "tilt": tilt, "arm": pin / 2}
+    for k, x in enumerate(places):
+        left = leaning_wall(model, f"pin {k} left", x - pin / 2, on=plate, **spread)
+        right = leaning_wall(model, f"pin {k} right", x + pin / 2 - 1, on=plate, **spread)
+        slot_left = leaning_wall(model, f"slot {k} left", x - slot / 2 - 1, **spread)
+        slot_right = leaning_wall(model, f"slot {k} right", x + slot / 2, **spread)
+        model.contact(f"left {k}", moving=left.face("-x"), reference=slot_left.face("+x"), points="vertices")
+        model.contact(f"right {k}", moving=right.face("+x"), reference=slot_right.face("-x"), points="vertices")
+    model.measure("slide", plate.point(0, 0, 0), along="x")
+    return model

@@ -20,9 +20,9 @@ def solution():
 def check():
     # The top of the block is the only face that the plate's underside could reach: it is the highest point of the block.
     rng = np.random.default_rng(1)
-    corners = np.array(list(itertools.product((-N.plate / 2, N.plate / 2), (-25, 25), (0, 3)))) + [0, 0, N.gap]
+    corners = np.array(list(itertools.product((-N.plate / 2, N.plate / 2), (-25, 25), (N.gap, N.gap + 3))))
     heights = [
-        (Rotation.from_rotvec((0, 0, turn)).apply(corners) + [x, y, 0])[:, 2].min()
+        np.add(Rotation.from_rotvec((0, 0, turn)).apply(corners), (x, y, 0))[:, 2].min()
         for x, y, turn in rng.normal(0, N.t / 6, (2000, 3)) * [1, 1, 1.5 / N.plate]
     ]
     return float(np.mean(np.array(heights) < 0)), float(np.max(np.abs(np.array(heights) - N.gap)))

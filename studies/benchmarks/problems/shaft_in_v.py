@@ -1,5 +1,7 @@
 """A shaft in a V of two walls."""
 
+import itertools
+
 import numpy as np
 import trimesh
 from scipy.spatial.transform import Rotation
@@ -24,9 +26,8 @@ def check():
 
     z, w = np.polynomial.hermite_e.hermegauss(4)
     w = w / w.sum()
-    grid = [(a, b, c, u * v * x) for a, u in zip(z, w) for b, v in zip(z, w) for c, x in zip(z, w)]
-    places = np.array([centre(N.s * a, N.s * b, N.r + N.td / 12 * c) for a, b, c, _ in grid])
-    weights = np.array([row[3] for row in grid])
+    nodes, weights = np.array(list(itertools.product(z, repeat=3))), np.prod(list(itertools.product(w, repeat=3)), axis=1)
+    places = np.array([centre(N.s * a, N.s * b, N.r + N.td / 12 * c) for a, b, c in nodes])
     across, height = np.sqrt(weights @ (places - weights @ places) ** 2)
     return height, across
 
