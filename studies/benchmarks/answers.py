@@ -72,6 +72,12 @@ def skewness(x: np.ndarray) -> Estimate:
     return Estimate(value, value - half, value + half)
 
 
+def quantile(x: np.ndarray, p: float) -> Estimate:
+    """Return a quantile of a sample; its interval is between order statistics."""
+    half = Z * np.sqrt(p * (1 - p) / len(x))
+    return Estimate(*map(float, np.quantile(x, [p, p - half, p + half])))
+
+
 def share(hits: np.ndarray) -> Estimate:
     """Return the share of True, with the exact interval."""
     interval = stats.binomtest(int(hits.sum()), len(hits)).proportion_ci(0.999)

@@ -4,6 +4,7 @@ from __future__ import annotations  # references.py reads this module without to
 
 from typing import Any
 
+import trimesh
 from scipy import stats
 
 import tolcontact as tc
@@ -80,3 +81,22 @@ def pins_and_slots(*, off: Any, tilt: Any, pin: float, slot: float, places: Any)
         model.contact(f"right {k}", moving=right.face("+x"), reference=slot_right.face("-x"), points="vertices")
     model.measure("slide", plate.point(0, 0, 0), along="x")
     return model
+
+
+def ring(model: tc.Assembly, radius: float, height: float, feature: str, *tolerances: Any) -> tc.Feature:
+    """Return a toleranced bore or rim of a fixed ring about z, its lower plane datum A and the other cylinder datum B."""
+    shape = trimesh.creation.annulus(radius, 4 * radius, height, sections=48)
+    part = model.part("ring", tc.Mesh(shape), fixed=True)
+    part.feature("bottom", part.face("-z"), datum="A")
+    bore, rim = part.face(tc.Cylinder(inner=True)), part.face(tc.Cylinder(inner=False))
+    own, other = (bore, rim) if feature == "bore" else (rim, bore)
+    part.feature("other", other, datum="B")
+    return part.feature(feature, own, *tolerances)
+
+
+def block(model: tc.Assembly, size: tuple[float, float, float], *tolerances: Any) -> tc.Feature:
+    """Return the toleranced top of a fixed block, its lower plane datum A, a side datum B and an end datum C."""
+    part = model.part("block", tc.Box(*size), fixed=True)
+    for letter, direction in (("A", "-z"), ("B", "-y"), ("C", "-x")):
+        part.feature(letter, part.face(direction), datum=letter)
+    return part.feature("top", part.face("+z"), *tolerances)
