@@ -18,11 +18,11 @@ def solution():
 
 def check():
     def beyond(radius, s):  # one minus the mass of strips across the disk
-        strip = integrate.quad(
-            lambda a: stats.norm.pdf(radius * np.sin(a), 0, s) * radius * np.cos(a) * (2 * stats.norm.cdf(radius * np.cos(a) / s) - 1),
-            -np.pi / 2, np.pi / 2, epsabs=1e-14,
-        )  # fmt: skip
-        return 1 - strip[0]
+        def strip(angle):
+            half = radius * np.cos(angle)
+            return stats.norm.pdf(radius * np.sin(angle), 0, s) * half * (2 * stats.norm.cdf(half / s) - 1)
+
+        return 1 - integrate.quad(strip, -np.pi / 2, np.pi / 2, epsabs=1e-14)[0]
 
     s = optimize.brentq(lambda s: beyond(N.t / 2, s) - (1 - INSIDE), N.t / 20, N.t / 3, xtol=1e-14)
     return s, beyond(N.r, s)
