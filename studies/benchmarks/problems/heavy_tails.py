@@ -19,8 +19,8 @@ def solution():
 
 
 def check():
-    # P(X > x) = -1/pi Im of the integral of f(w) exp(-i w x) / w with f = exp(-2 r w) (1 + r w)², r = sqrt 3; along w = -i v / x
-    # the exponential falls, and what is left is the odd part of f: exp(2 i r v / x) (1 - i r v / x)².
+    # P(X > x) = -1/pi Im of the integral of f(w) exp(-i w x) / w with f = exp(-2 r w) (1 + r w)², r = sqrt 3. Along
+    # w = -i v / x the exponential falls, and what is left is the odd part of f: exp(2 i r v / x) (1 - i r v / x)².
     r = np.sqrt(3) / PULL
 
     def integrand(v):
