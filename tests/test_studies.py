@@ -37,7 +37,6 @@ STUDIES = {
     "speed/measure.py": ["--quick", "--figure", "cost.png"],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
-    "verification/verify.py": [],
 }
 EXTRAS = {"solvers/measure.py": ["qpsolvers"], "speed/measure.py": ["qpsolvers", "daqp"], "report/picture.py": ["playwright"]}
 

@@ -27,10 +27,11 @@ class Shape:
 
     def __init__(self, text: str) -> None:
         self.kind, *words = text.split()
-        self.numbers = [float(word) for word in takewhile(_is_number, words)]
+        numbers = list(takewhile(_is_number, words))[: COUNTS.get(self.kind)]
+        self.numbers = [float(word) for word in numbers]
         self.label = " ".join(words[len(self.numbers) :])
-        if self.kind not in ELEMENTS:
-            raise ValueError(f"the shape {text!r} is none of: {', '.join(ELEMENTS)}")
+        if self.kind not in ELEMENTS or len(numbers) < COUNTS.get(self.kind, 6):
+            raise ValueError(f"the shape {text!r} is none of: {', '.join(ELEMENTS)}, with its numbers")
 
     @property
     def points(self) -> Points:
@@ -77,6 +78,7 @@ ELEMENTS: dict[str, Callable[[Points], str]] = {
     "force": lambda p: _line(p, ' marker-end="url(#head)"'),
     "text": lambda p: "",
 }
+COUNTS = {"box": 4, "circle": 3, "line": 4, "arrow": 4, "force": 4, "text": 2}  # numbers of a shape; a polygon has any
 STYLE = (
     ".body { fill: #7aa2c833; stroke: #35618f; } .line { stroke: #888; } "
     "text { font: 12px sans-serif; fill: currentColor; text-anchor: middle; }"

@@ -5,6 +5,7 @@ script with the reference solutions and the model. Nothing is computed.
 """
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,7 @@ def shown(problem: Problem) -> dict[str, Any]:
     }
 
 
-def write(folder: Path, chosen: list[Problem]) -> None:
+def write(folder: Path, chosen: Sequence[Problem]) -> None:
     """Write the pages of problems into a folder, which is created if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, trim_blocks=True)
