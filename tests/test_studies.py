@@ -9,6 +9,7 @@ import pytest
 from tests.helpers import ROOT, run
 
 STUDIES = {
+    "benchmarks/others.py": ["two_causes", "ishigami"],
     "benchmarks/pages.py": ["pages"],
     "benchmarks/references.py": ["linear_stack"],
     "benchmarks/run.py": ["linear_stack"],
@@ -38,7 +39,12 @@ STUDIES = {
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
 }
-EXTRAS = {"solvers/measure.py": ["qpsolvers"], "speed/measure.py": ["qpsolvers", "daqp"], "report/picture.py": ["playwright"]}
+EXTRAS = {
+    "benchmarks/others.py": ["openturns", "SALib"],
+    "solvers/measure.py": ["qpsolvers"],
+    "speed/measure.py": ["qpsolvers", "daqp"],
+    "report/picture.py": ["playwright"],
+}
 
 
 def test_no_script_is_forgotten():
