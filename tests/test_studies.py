@@ -40,7 +40,7 @@ STUDIES = {
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
 }
 EXTRAS = {
-    "benchmarks/others.py": ["openturns", "SALib"],
+    "benchmarks/others.py": ["openturns", "otaf", "SALib"],
     "solvers/measure.py": ["qpsolvers"],
     "speed/measure.py": ["qpsolvers", "daqp"],
     "report/picture.py": ["playwright"],

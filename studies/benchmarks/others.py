@@ -1,8 +1,9 @@
 """Other open tools on the problems that are functions of independent deviations: python -m studies.benchmarks.others [NAMES].
 
 OpenTURNS computes moments, shares (Monte Carlo) and rare events (FORM, subset sampling), SALib computes Sobol' indices. Neither
-has parts or contact: contact stands here in closed form, as in max(0, g). An environment of its own suffices, with NumPy,
-SciPy, rich and the two packages. Figures without an interval are compared with a tolerance of 1 %.
+has parts or contact: contact stands here in closed form, as in max(0, g). otaf solves a linear program for each realization of
+an assembly; the pins in slots are among its own examples. An environment of its own suffices, with NumPy, SciPy, rich and the
+three packages (otaf from https://github.com/Kramer84/otaf). Figures without an interval are compared with a tolerance of 1 %.
 """
 
 import argparse
@@ -13,6 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import openturns as ot
+from otaf.example_models.models_2_D import _model_2D_16_dof as pins
+from otaf.uncertainty import compute_gap_optimizations_on_sample_batch
 from rich.console import Console
 from rich.table import Table
 from SALib.analyze import sobol as sobol_analysis
@@ -22,7 +25,7 @@ from scipy import stats
 from studies.benchmarks.problem import Problem, read
 
 Z = float(stats.norm.ppf(0.9995))
-SAMPLES = 200_000
+SAMPLES, PROGRAMS = 200_000, 20_000
 NO_VALUE = (np.nan, np.nan, np.nan)
 COLUMNS = ("problem", "quantity", "method", "expected", "computed", "interval", "verdict", "calls", "CPU s")
 
@@ -80,6 +83,7 @@ def models(name: str, n: Any) -> Model:
 
 MOMENTS = ("linear_stack", "uniform_stack", "skewed_stack", "clutch_by_formula", "block_on_plane")
 RARE = ("two_causes", "limit_above_a_stop", "highest_of_four", "twelve_uniform_parts", "forty_parts", "heavy_tails")
+ASSEMBLIES = ("square_pins_in_slots",)
 INDICES = ("ishigami", "contributions_through_contact")
 
 
@@ -160,16 +164,36 @@ def indices(problem: Problem, model: Model) -> Iterator[tuple]:
             yield quantity, "SALib, Sobol'", (value, value - half, value + half), len(x)
 
 
+def assembled(problem: Problem) -> Iterator[tuple]:
+    """Yield the share of plates that otaf cannot assemble: the largest slack of all gaps is negative."""
+    n = SimpleNamespace(**problem.numbers)
+    constraints = pins.get_system_of_constraints_assembly_model(n.pin, n.pin, n.x1, n.x2 - n.x1, n.x1, n.pin, n.slot)
+    law, *_ = pins.get_distribution_params(n.t, 1.0, n.pin, n.pin)
+    slack = compute_gap_optimizations_on_sample_batch(constraints, np.asarray(law.getSample(PROGRAMS)), batch_size=PROGRAMS)[
+        :, -1
+    ]
+    interval = stats.binomtest(int((slack < 0).sum()), PROGRAMS).proportion_ci(0.999)
+    yield problem.quantities[0], "otaf, Monte Carlo", ((slack < 0).mean(), interval.low, interval.high), PROGRAMS
+
+
+def rows(name: str) -> Iterator[tuple]:
+    """Yield what another tool answers to a problem."""
+    problem = read(name)
+    if name in ASSEMBLIES:
+        yield from assembled(problem)
+    else:
+        solve = moments if name in MOMENTS else rare if name in RARE else indices
+        yield from solve(problem, models(name, SimpleNamespace(**problem.numbers)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("names", nargs="*", default=[*MOMENTS, *RARE, *INDICES])
+    parser.add_argument("names", nargs="*", default=[*MOMENTS, *RARE, *INDICES, *ASSEMBLIES])
     ot.RandomGenerator.SetSeed(1)
     table = Table(*COLUMNS)
     for name in parser.parse_args().names:
-        problem = read(name)
-        solve = moments if name in MOMENTS else rare if name in RARE else indices
         start = time.process_time()
-        for quantity, method, (value, lower, upper), calls in solve(problem, models(name, SimpleNamespace(**problem.numbers))):
+        for quantity, method, (value, lower, upper), calls in rows(name):
             seconds, start = time.process_time() - start, time.process_time()
             agrees = lower - quantity.tolerance <= quantity.expected <= upper + quantity.tolerance
             verdict = "no answer" if np.isnan(value) else "agrees" if agrees else "DIFFERS"
