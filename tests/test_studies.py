@@ -9,6 +9,10 @@ import pytest
 from tests.helpers import ROOT, run
 
 STUDIES = {
+    "benchmarks/others.py": ["two_causes", "ishigami"],
+    "benchmarks/pages.py": ["pages"],
+    "benchmarks/references.py": ["linear_stack"],
+    "benchmarks/run.py": ["linear_stack"],
     "bodies/measure.py": ["--scenes", "ring", "--sizes", "3", "--methods", "linearized", "--figure", "cost.png"],
     "cad/as1.py": ["--samples", "20"],
     "cad/as1_nine.py": ["--samples", "20", "--surfaces", "2"],
@@ -34,9 +38,13 @@ STUDIES = {
     "speed/measure.py": ["--quick", "--figure", "cost.png"],
     "verification/intervals.py": ["--repeats", "3", "--sizes", "100"],
     "verification/rare.py": ["--seeds", "1", "--samples", "4000", "--only", "two ways", "does not fit"],
-    "verification/verify.py": [],
 }
-EXTRAS = {"solvers/measure.py": ["qpsolvers"], "speed/measure.py": ["qpsolvers", "daqp"], "report/picture.py": ["playwright"]}
+EXTRAS = {
+    "benchmarks/others.py": ["openturns", "otaf", "SALib"],
+    "solvers/measure.py": ["qpsolvers"],
+    "speed/measure.py": ["qpsolvers", "daqp"],
+    "report/picture.py": ["playwright"],
+}
 
 
 def test_no_script_is_forgotten():

@@ -1,4 +1,4 @@
-"""The site: guide and reference from docstrings, a gallery of the models, and every problem with a known answer, computed anew.
+"""The site: guide and reference from docstrings, a gallery of the models, and every problem of the benchmarks, computed anew.
 
 python -m studies.site.build FOLDER [--samples N]
 """
@@ -17,8 +17,10 @@ import pdoc
 from PIL import Image
 
 import tolcontact as tc
-from studies.verification.problems import PROBLEMS, Problem
-from studies.verification.verify import COLUMNS, row
+from studies.benchmarks import pages
+from studies.benchmarks.drawing import svg
+from studies.benchmarks.problem import Problem, problems
+from studies.benchmarks.run import COLUMNS, DIFFERS, UNSUPPORTED, solved
 from tolcontact.report.html import summary_table, write_page
 from tolcontact.report.html.page import HERE as REPORT
 
@@ -62,22 +64,23 @@ def shown(path: Path, folder: Path, samples: int) -> dict[str, Any]:
 
 def computed(problem: Problem) -> dict[str, Any]:
     """Return the section of a problem with its figures."""
-    rows = [row(figure) for figure in problem.figures()]
-    return {"number": problem.number, "name": problem.name, "text": problem.text, "rows": rows}
+    rows = [figure.cells for figure in solved(problem).figures]
+    return {"problem": problem, "drawing": markupsafe.Markup(svg(problem.drawing)), "rows": rows}
 
 
-def build(folder: Path, samples: int, scripts: Sequence[Path], problems: Sequence[Problem] = PROBLEMS) -> None:
+def build(folder: Path, samples: int, scripts: Sequence[Path], chosen: Sequence[Problem]) -> None:
     """Write the pages of these models and problems into a folder, which is created if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     pdoc.render.configure(show_source=False)
     pdoc.pdoc(*REFERENCE, output_directory=folder / "reference")
-    found = [computed(problem) for problem in problems]
-    figures = [line for problem in found for line in problem["rows"]]
-    differ = sum(line[-1] == "DIFFERS" for line in figures)
+    pages.write(folder / "benchmarks", chosen)
+    sections = [computed(problem) for problem in chosen]
+    verdicts = [line[-1] for section in sections for line in section["rows"]]
     _write(
         folder / "verification.html", "Verification",
-        f"{len(figures)} figures of {len(found)} problems, computed anew by tolcontact {tc.__version__}; {differ} of them "
-        "differ from what is expected. Bounds of estimates cover 99.9 % of runs; other bounds are tolerances.", problems=found,
+        f"{len(verdicts)} figures of {len(sections)} problems, computed anew by tolcontact {tc.__version__}: "
+        f"{verdicts.count(DIFFERS)} differ from what is expected, and {verdicts.count(UNSUPPORTED)} are not supported. "
+        "Intervals of estimates cover 99.9 % of runs; other intervals are tolerances.", problems=sections,
     )  # fmt: skip
     _write(
         folder / "gallery.html", "Gallery",
@@ -99,7 +102,7 @@ def main() -> None:
     options.add_argument("folder", type=Path)
     options.add_argument("--samples", type=int, default=1000)
     chosen = options.parse_args()
-    build(chosen.folder, chosen.samples, models())
+    build(chosen.folder, chosen.samples, models(), problems())
 
 
 if __name__ == "__main__":
