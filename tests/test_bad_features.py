@@ -54,7 +54,9 @@ CASES = {
         lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B"), tc.Straightness(0.2)), "which contains it"
     ),
     "roundness wider than the zone of an axis": (
-        lambda p: p.feature("f", p.face(BORE), tc.Position(0.1, "A|B"), tc.Roundness(0.2), tc.Cylindricity(0.3)), None
+        lambda p: p.feature(
+            "f", p.face(BORE), tc.Position(0.1, "A|B"), tc.Roundness(0.2, form=None), tc.Cylindricity(0.3, form=None)
+        ), None
     ),
     "roundness wider than profile": (
         lambda p: p.feature("f", p.face(BORE), tc.Profile(0.1, "A|B"), tc.Roundness(0.2)), "roundness 0.2 is wider than profile"

@@ -17,11 +17,18 @@ from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_sa
 from tolcontact.vocabulary import FORMAT
 
 STORED = {int(path.name.split("_")[1].split(".")[0]): path for path in Path(__file__).parent.glob("archives/format_*.nc.gz")}
-# Of the corner, raw and corrected.
+# Of the corner, raw and corrected: points count once each in archives before format 5, and by their areas since.
 PINNED = {
     "mean": (0.006953289641898, 0.03176192756255),
     "6 sigma": (0.7870888491507, 0.3424490287245),
+    "largest": (0.5591756338771934, 0.45877503188437524),
 }
+PINNED_BY_AREA = {
+    "mean": (0.006953289641898, 0.0270723931181215),
+    "6 sigma": (0.7870888491507, 0.290889040411673),
+    "largest": (0.5591756338771934, 0.4464181523825759),
+}
+BY_AREA = 5  # the first format of archives whose points count by area
 
 AS_THEN = tc.Method(search="fixed", objective="active points")  # of the archives
 
@@ -34,19 +41,25 @@ def stored(request, tmp_path):
     return path
 
 
+def format_of(path):
+    with netCDF4.Dataset(path) as file:
+        return int(getattr(file, "format", 1))
+
+
 def test_there_is_an_archive_of_every_format():
     assert sorted(STORED) == [*range(1, FORMAT + 1)], "write the missing one with tests/scripts/write_archive.py"
 
 
 @pytest.mark.slow
 def test_it_is_opened_and_summarized(stored):
-    summary = tc.summarize(stored)
+    summary, by_area = tc.summarize(stored), format_of(stored) >= BY_AREA
+    pinned = PINNED_BY_AREA if by_area else PINNED
     corner = summary["statistic_value"].sel(measure="corner", interval="estimate")
-    for statistic, expected in PINNED.items():
-        assert corner.sel(statistic=statistic).values == pytest.approx(expected, rel=1e-9)
+    for statistic in ("mean", "6 sigma"):
+        assert corner.sel(statistic=statistic).values == pytest.approx(pinned[statistic], rel=1e-9)
     assert summary["by_status"].values.tolist() == [0, 8, 0, 0, 0]
     largest = summary["field_extreme"].sel(part="block", extreme="largest", interval="estimate")
-    assert largest.values == pytest.approx([0.5591756338771934, 0.45877503188437524], rel=1e-9)
+    assert largest.values == pytest.approx(pinned["largest"], rel=1e-9)
     assert_resolved(stored)
     assert_gaps_recompute(stored)
 
@@ -59,7 +72,8 @@ def test_its_model_is_rebuilt_and_comes_to_the_same(stored):
         now = tc.run(model, samples=8, seed=1, solver="daqp", method=AS_THEN, surfaces=4)
         apart = abs(now["measured"] - then["measured"]).max(["realization", "measure"]).values
         # Of the corrected state gaps alone: contact points counted once each, and count now by the areas that they stand for.
-        assert apart[0] < 1e-9 < apart[1] and (now["gap_min"].sel(state="corrected") > -1e-9).all()
+        assert apart[0] < 1e-9 and (apart[1] < 1e-9) == (format_of(stored) >= BY_AREA)
+        assert (now["gap_min"].sel(state="corrected") > -1e-9).all()
         assert (now["status"].values == then["status"].values).all()
 
 
@@ -85,8 +99,25 @@ def test_an_earlier_format_is_not_resumed_and_the_file_is_left_alone(stored):
 @pytest.mark.parametrize("stored", [FORMAT], indirect=True, ids=lambda number: f"format {number}")
 def test_the_present_format_is_resumed_but_not_with_points_that_count_otherwise(stored, tmp_path):
     settings = {"seed": 1, "solver": "daqp", "method": AS_THEN, "surfaces": 4, "fields": 16_384}
+    other = tmp_path / "other.nc"
+    other.write_bytes(stored.read_bytes())
+    with netCDF4.Dataset(other, "a") as file:
+        file.weighting = "active points"
     with pytest.raises(tc.TolcontactError, match="weighting = active points, now it is active points, by area"):
-        tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings)
-    tc.run(model_in(stored), samples=8, out=tmp_path / "new.nc", **settings).close()
-    tc.run(model_in(stored), samples=16, out=tmp_path / "new.nc", resume=True, **settings).close()
-    assert_same_run(tmp_path / "new.nc", tc.run(model_in(stored), samples=16, **settings))
+        tc.run(model_in(stored), samples=16, out=other, resume=True, **settings)
+    tc.run(model_in(stored), samples=16, out=stored, resume=True, **settings).close()
+    assert_same_run(stored, tc.run(model_in(stored), samples=16, **settings))
+
+
+def test_tolerances_of_form_drew_nothing_in_earlier_formats():
+    a = tc.Assembly("block")
+    block = a.part("block", tc.Box(10, 10, 10))
+    block.feature("top", block.face("+z"), tc.Flatness(0.1))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=1), tolerance=0.1)
+    a.measure("corner", block.point(0, 0, 0), along="z")
+    results = tc.run(a, samples=2, seed=1)
+    (feature,) = tc.model_of(results).features
+    assert feature.tolerances == (tc.Flatness(0.1),)
+    results.attrs["format"] = 4
+    (feature,) = tc.model_of(results).features
+    assert feature.tolerances == (tc.Flatness(0.1, form=None),)

@@ -66,9 +66,12 @@ def test_every_field_of_a_declared_class_stands_in_the_document():
 
 
 def with_everything(folder):
-    a = toleranced.block_with("top", tc.Profile(0.3, "A|B", rule="uniform", tangent=True), tc.Flatness(0.1, per=(25, 10)))
+    a = toleranced.block_with(
+        "top", tc.Profile(0.3, "A|B", rule="uniform", tangent=True), tc.Flatness(0.1, form=tc.Form("matern 3/2", 20))
+    )
+    own = tc.Flatness(0.1, per=(25, 10), form=None)
     block = a.parts[0]
-    block.feature("far", block.face("+x"), tc.Position(0.2, "A|B|C", cp=1.5, cpk=1.2))
+    block.feature("far", block.face("+x"), tc.Position(0.2, "A|B|C", cp=1.5, cpk=1.2), own)
     block.feature("deep", block.face("+y"), block.face("-y"), tc.Size(50, 0.1, -0.02, moves="first"))
     sides = block.pattern("X", block.features[0], block.features[1], datum="X")
     block.datum_targets("T", block.features[-2].point(100, 0, 0), sides.members[1].point(0, 0, 0))

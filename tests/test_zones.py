@@ -169,7 +169,7 @@ def test_one_rule_for_a_tail_is_enough_that_no_share_is_stated():
 
 def test_a_tangent_plane_and_form_per_length_are_stated_and_draw_as_the_plane_does():
     rigid = toleranced.block_with("top", tc.Profile(0.3, "A"), tc.Parallelism(0.1, "A"))
-    flatness = tc.Flatness(0.02, per=(25, 25)), tc.Straightness(0.01, per=10)
+    flatness = tc.Flatness(0.02, per=(25, 25), form=None), tc.Straightness(0.01, per=10, form=None)
     tangent = toleranced.block_with("top", tc.Profile(0.3, "A"), tc.Parallelism(0.1, "A", tangent=True), *flatness)
     spreads = [[each.spread for each in Draws(discretize(model)).contributors] for model in (rigid, tangent)]
     assert spreads[0] == spreads[1] and len(spreads[0]) == 3

@@ -29,6 +29,7 @@ from .declaration import (
     Flatness as Flatness,
     Flush as Flush,
     Force as Force,
+    Form as Form,
     Gap as Gap,
     Inside as Inside,
     Largest as Largest,

@@ -7,6 +7,7 @@ import netCDF4
 import numpy as np
 
 from tolcontact import vocabulary as terms
+from tolcontact.archive.form_values import form_sizes, form_values
 from tolcontact.archive.settings import Run, declaration, kept_rows, now, run_settings, versions
 from tolcontact.archive.stored_rows import empty_checks
 from tolcontact.archive.variables import Contents, define, labels_of_rows, units_of_rows
@@ -186,6 +187,7 @@ def _write_contact(contents: Contents, group: netCDF4.Group, program: Program) -
             terms.FEATURE_FACE: len(nominal.faces),
             terms.FREEDOM: len(terms.FREEDOMS),
             terms.CONTRIBUTOR: len(nominal.contributors),
+            **form_sizes(program),
         }
         for name, size in sizes.items():
             group.createDimension(name, size)
@@ -201,7 +203,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_PART: [-1 if pair.reference is None else pair.reference for pair in pairs],
     }
     if not pairs:
-        return parts | _face_values(nominal)
+        return parts | _face_values(nominal) | form_values(program)
     locators = [np.full(len(pair.P_m), -1) if pair.locators is None else pair.locators for pair in pairs]
     values = parts | {
         terms.PAIR_OF_POINT: np.repeat(np.arange(len(pairs)), [len(pair.P_m) for pair in pairs]),
@@ -210,7 +212,7 @@ def contact_values(program: Program) -> dict[ArchiveVariable, Any]:
         terms.REFERENCE_NORMAL: np.vstack([pair.n_r for pair in pairs]),
         terms.LOCATOR_OF_POINT: np.concatenate(locators),
     }
-    return values | _bounded_values(program) | _round_values(nominal) | _face_values(nominal)
+    return values | _bounded_values(program) | _round_values(nominal) | _face_values(nominal) | form_values(program)
 
 
 def _bounded_values(program: Program) -> dict[ArchiveVariable, Any]:

@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, form, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -49,7 +49,7 @@ OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
 CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field")
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation)
+    for module in (archive, variation, form)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)
@@ -217,6 +217,8 @@ def _check_needed(file: netCDF4.Dataset) -> None:
     _need_together(file["contact"], terms.ROUND)
     if any(variable.name in file["contact"].variables for variable in terms.FEATURE_FACES):
         _need(file["contact"], terms.FEATURE_FACES)
+    if any(variable.name in file["contact"].variables for variable in terms.FORMS):
+        _need(file["contact"], terms.FORMS)
     for group, needed in (("contact", OF_CONTACT), ("sample", OF_SAMPLE), ("model", (terms.DECLARATION,))):
         _need(file[group], needed)
     _need(file, (terms.MEASURE_NOMINAL, terms.MEASURE_TOLERANCE, terms.MEASURE_UNITS))

@@ -14,10 +14,13 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive.inspection import inspect
 from tolcontact.declaration import Assembly
 from tolcontact.declaration.document import from_document
+from tolcontact.declaration.feature_tolerance import KINDS
 from tolcontact.errors import ArchiveError
 from tolcontact.geometry import surfaces_of, with_known_surfaces
 from tolcontact.method import Method
 
+FIRST_WITH_FORM = 5  # the first format of archives with faces that are not flat
+FORM_KINDS = [kind for kind, tolerance in KINDS.items() if tolerance.is_form]
 CACHE_BYTES = 1 << 20  # a chunk of most variables; with the size that is usual, all would take as much memory as all else
 
 
@@ -56,6 +59,8 @@ def model_of(results: xr.DataTree) -> Assembly:
         document = json.loads(str(results["model"][terms.DECLARATION.name].values))
     except (KeyError, ValueError, RecursionError) as error:
         raise ArchiveError(f"the declared model in the archive is damaged: {error}") from error
+    if int(results.attrs.get("format", 1)) < FIRST_WITH_FORM:
+        _state_form_alone(document)
     meshes = {}
     if "mesh" in results["model"].children:
         for name, group in results["model/mesh"].children.items():
@@ -63,6 +68,22 @@ def model_of(results: xr.DataTree) -> Assembly:
             # Groups of format 1 do not say the part's name: it was their own.
             meshes[str(mesh.attrs.get("part", name))] = _mesh(mesh)
     return from_document(document, meshes)
+
+
+def _state_form_alone(document: Any) -> None:
+    """Let tolerances of form in a document leave the shape of features as it is: formats before form drew none."""
+    try:
+        tolerances = [
+            tolerance
+            for part in document["parts"]
+            for feature in part.get("features", ())
+            for tolerance in feature["tolerances"]
+        ]
+        for tolerance in tolerances:
+            if tolerance["kind"] in FORM_KINDS:
+                tolerance.setdefault("form", None)
+    except (KeyError, TypeError, AttributeError):  # the reading of the document finds what is wrong with it
+        return
 
 
 def method_of_run(results: xr.DataTree) -> Method:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
-from tolcontact.discretization import ContactPoints, Nominal
+from tolcontact.discretization import ContactPoints, Nominal, raised_places
 from tolcontact.errors import ContactWarning, shown
 from tolcontact.geometry.meeting import Meeting, Reach, meeting
 
@@ -39,10 +39,7 @@ def push(pair: ContactPoints, X_RM: Float[Array, "n 12"], deviations: Float[Arra
     deviations   (n, contributor)
     presses      whether forces close the gaps, too
     """
-    if pair.round is not None:
-        depth = _travel(pair, X_RM)
-    else:
-        depth = max(-float(pair.least_gap(X_RM, pair.heights(deviations)).min()), 0.0)
+    depth = _travel(pair, X_RM) if pair.round is not None else max(-float(pair.least_gap(X_RM, deviations).min()), 0.0)
     return depth + (clearance(pair) if presses else 0.0)
 
 
@@ -68,15 +65,17 @@ def bounded_pair(
         return nothing
     if not np.isfinite(smallest):
         return nothing
-    heights = pair.heights(deviations)
-    travel = _travel(pair, X_RM) + float(np.abs(heights).max())
+    highest = float(np.abs(pair.heights(deviations)).max())
+    if pair.has_form:
+        highest += float(pair.form(deviations).highest().max())
+    travel = _travel(pair, X_RM) + highest
     tilt = float(pose.turn(X_RM, pose.AT_REST[None]).max())
     size = float(np.ptp(pair.moving_face.mesh.vertices, axis=0).max())
     bodies = nominal.parts[pair.moving].body, nominal.parts[pair.reference].body
     reach = Reach(
         travel=TRAVEL_FACTOR * travel + pushed + MIN_TRAVEL_SHARE * size,
         tilt=tilt + pushed / size,
-        overlap=max(-float(pair.least_gap(pose.AT_REST[None], np.zeros(1))[0]), 0.0),
+        overlap=max(-float(pair.least_gap(pose.AT_REST[None])[0]), 0.0),
         clearance=clearance(pair),
     )
     places = meeting((pair.moving_face, pair.reference_face), bodies, reach)
@@ -88,14 +87,14 @@ def bounded_pair(
             stacklevel=2,
         )
         return nothing
-    fixed = pair.least_gap(X_RM, heights)
+    fixed = pair.least_gap(X_RM, deviations)
     room = max(room, float(np.ptp(fixed)))  # rarer poses than those of the trial may be as much deeper
     error, most = 0.0, 0
     for k in range(0, len(X_RM), POSES_AT_ONCE):
         rows = slice(k, k + POSES_AT_ONCE)
-        gaps = places.at(X_RM[rows]).gaps
+        gaps = raised_places(pair, places, X_RM[rows], deviations[rows]).gaps
         most = max(most, int(np.isfinite(gaps).sum(axis=1).max()))
-        bounded = gaps.min(axis=1, initial=np.inf) - heights[rows]
+        bounded = gaps.min(axis=1, initial=np.inf)
         differences = np.minimum(bounded, room) - np.minimum(fixed[rows], room)
         error = max(error, float(np.abs(differences).max(initial=0)))
     bulge = max(pair.moving_face.bulge, pair.reference_face.bulge)

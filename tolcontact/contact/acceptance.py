@@ -83,8 +83,9 @@ class Limits:
                     realization = carriers.realization[points]
                     overhang = side.face.overhang(pose.apply(motion[realization], carriers.places[points, None])[:, 0])
                     doubtful[rows[realization[overhang > carriers.spacing]]] = True
-                heights = self._group_pairs[k].heights(task.deviations[rows])
-                doubtful[rows] |= faces.depth(X_RM, heights) > self.allowed(k)
+                pair, deviations = self._group_pairs[k], task.deviations[rows]
+                form = pair.form(deviations) if pair.has_form else None
+                doubtful[rows] |= faces.depth(X_RM, pair.heights(deviations), form) > self.allowed(k)
         return doubtful
 
     def _is_turned(self, task: Task, state: State) -> Bool[Array, " n"]:

@@ -7,13 +7,13 @@ from tolcontact.compiled import compiled, uncounted
 
 @compiled
 def gaps(relative, places, feet, normals, heights, values):  # type: ignore[no-untyped-def]
-    """Add to values (n, place), 0 or infinite before, the gaps at X_RM (n, 12), above planes grown by heights (n,)."""
+    """Add to values (n, place), 0 or infinite before, the gaps at X_RM (n, 12), above planes raised by heights (n, place)."""
     for k in range(relative.shape[0]):
         X = relative[k]
         for p in range(places.shape[1]):
             if values[k, p] == np.inf:
                 continue
-            gap = -heights[k]
+            gap = -heights[k, p]
             for i in range(3):
                 x = X[9 + i] - feet[k, p, i]
                 for j in range(3):
@@ -73,7 +73,7 @@ def gather(points, labels, places, feet, normals, heights, P_m, P_r, n_r):  # ty
                     break
             for i in range(3):
                 P_m[k, s, i], n_r[k, s, i] = places[k, column, i], normals[k, column, i]
-                P_r[k, s, i] = feet[k, column, i] + heights[k] * normals[k, column, i]
+                P_r[k, s, i] = feet[k, column, i] + heights[k, column] * normals[k, column, i]
 
 
 @compiled

@@ -8,6 +8,7 @@ from tolcontact.arrays import Array, Bool, Float, Int
 from tolcontact.compilation import SLOTS
 from tolcontact.contact import bounded_kernel
 from tolcontact.contact.scan import Deepest, Scan, SlotScan
+from tolcontact.discretization import FIRST_POINT, ContactPoints, raised_places
 from tolcontact.geometry.kernel import CORNER_ON_FACET
 from tolcontact.geometry.meeting import NEARNESS, Meeting
 
@@ -20,7 +21,7 @@ class BoundedScan(SlotScan):
 
     labels              (realization, place): numbers of the places among those of the pair's meeting
     places, feet, normals   (realization, place, 3): P^m, P^r, n^r
-    heights             (realization,) [mm] by which both faces have grown
+    heights             (realization, place) [mm] by which both faces have grown there, with their forms
     """
 
     fills = True
@@ -31,7 +32,7 @@ class BoundedScan(SlotScan):
     feet: Float[Array, "realization place 3"]
     normals: Float[Array, "realization place 3"]
     valid: Bool[Array, "realization place"]
-    heights: Float[Array, " realization"]
+    heights: Float[Array, "realization place"]
 
     def take(self, rows: np.ndarray) -> "BoundedScan":
         return BoundedScan(
@@ -66,19 +67,21 @@ class BoundedScan(SlotScan):
         return found
 
     def moves(self, points: np.ndarray) -> np.ndarray:
-        return self.meeting.kinds[points] == CORNER_ON_FACET
+        at_ends = np.where(points < FIRST_POINT, points, 0)
+        return (self.meeting.kinds[at_ends] == CORNER_ON_FACET) & (points < FIRST_POINT)
 
 
 def bounded_scan(
     scan: Scan,
+    pair: ContactPoints,
     meeting: Meeting,
     X_RM: Float[Array, "n 12"],
-    heights: Float[Array, " n"],
+    deviations: Float[Array, "n contributor"],
     kept: Int[Array, "n k"] | None = None,
     error: float = 0.0,
     nearness: float = NEARNESS,
 ) -> BoundedScan:
     """Return the places at which a pair can touch at X_RM (n, 12); see Meeting.at for `kept`, `error` and `nearness`."""
-    found = meeting.at(X_RM, kept, error, nearness)
+    found, heights = raised_places(pair, meeting, X_RM, deviations, kept, error, nearness)
     arrays = found.labels, found.P_m, found.P_r, found.n_r, np.isfinite(found.gaps)
-    return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, heights)
+    return BoundedScan(scan.tables, scan.P_m, scan.offsets, meeting, *arrays, np.ascontiguousarray(heights))

@@ -164,8 +164,7 @@ class Candidates:
         for k, places in self.bounded.items():
             kept, error = (slots[self._varying.index(k)].labels, width * self._edge_error) if slots else (None, 0.0)
             nearness = NEARNESS if width == 1 else np.inf
-            heights = self._pairs[k].heights(deviations)
-            scans[k] = bounded_scan(scans[k], places, relative[:, k], heights, kept, error, nearness)
+            scans[k] = bounded_scan(scans[k], self._pairs[k], places, relative[:, k], deviations, kept, error, nearness)
         return scans
 
     def hold(self, task: Task, state: State) -> Bool[Array, " n"]:

@@ -262,6 +262,7 @@ from tolcontact.declaration.feature_tolerance import (
     TotalRunout,
 )
 from tolcontact.declaration.force import Force
+from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
@@ -291,8 +292,8 @@ from tolcontact.declaration.values import degrees
 __all__ = [
     "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
-    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Gap", "GeometricTolerance", "Geometry", "Inside", "Largest",
-    "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum", "Near",
+    "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
+    "Largest", "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum", "Near",
     "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
     "Roundness", "Size", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import KW_ONLY, dataclass
 from typing import Any, ClassVar
 
+from tolcontact.declaration.form import Form
 from tolcontact.declaration.values import Vector, direction as _direction, is_finite, is_length
 from tolcontact.readable import Readable
 
@@ -17,6 +18,7 @@ MATERIALS = ("", "M", "L")
 SYMBOLS = {"M": "Ⓜ", "L": "Ⓛ"}
 ZONES = ("round", "flat")
 AROUND_ROUND = ("profile", "line profile", "circular run-out", "total run-out")  # kinds with zones for walls, not for axes
+USUAL_FORM = Form()
 COMPARTMENT = re.compile(r"([A-Z]{1,2}(?:-[A-Z]{1,2})*)(?:\(([ML])\))?(><)?")
 
 
@@ -33,6 +35,7 @@ class GeometricTolerance(Readable):
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
     per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
     tangent     True for a zone of the plane that touches a plane from outside the material; its form may then be outside
+    form        of a tolerance of form: how the form deviates; None if it is stated alone, and the feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
                 at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
@@ -42,7 +45,7 @@ class GeometricTolerance(Readable):
 
     A kind of tolerance is a subclass: `kind` is its name in messages, JSON and archives. `options` names the fields among
     zone, along, material, projected, outside, per and tangent that it accepts. `is_form` is True for a kind that limits form
-    alone; the zones of the kinds `around` it contain it, or those of all others if there are none.
+    alone, and draws it by its `form`; the zones of the kinds `around` it contain it, or those of all others if there are none.
     `features/tolerance_kinds.py` defines the zones.
     """
 
@@ -63,6 +66,7 @@ class GeometricTolerance(Readable):
     outside: float | None = None
     per: float | tuple[float, float] | None = None
     tangent: bool = False
+    form: Form | None = USUAL_FORM
     rule: str = INSIDE
     cp: float = 1.0
     cpk: float | None = None
@@ -120,6 +124,7 @@ class GeometricTolerance(Readable):
             is_given = value not in ("", False) if isinstance(value, str | bool) else value is not None
             if is_given and option not in self.options:
                 yield f"{option} is given, which {self.kind} does not have; leave it out"
+        yield from self._form_faults()
         if self.zone not in (None, *ZONES):
             yield f"zone is {self.zone!r}; expected one of {', '.join(ZONES)}"
         if self.zone == "flat" and self.along is None:
@@ -137,6 +142,18 @@ class GeometricTolerance(Readable):
             yield f"per is {self.per!r}; expected a length in mm above 0, or two of them, as in per=(25, 25)"
         if not isinstance(self.tangent, bool):
             yield f"tangent is {self.tangent!r}; expected True or False"
+
+    def _form_faults(self) -> Iterator[str]:
+        if not self.is_form and self.form != USUAL_FORM:
+            yield f"form is given, which {self.kind} does not have; leave it out"
+        elif isinstance(self.form, Form):
+            yield from (f"form: {fault}" for fault in self.form.faults())
+        elif self.form is not None:
+            yield f'form is {self.form!r}; expected tc.Form("squared exponential", length=, modes=), or None'
+        if self.is_form and self.form is not None and self.cpk is not None:
+            yield f"cpk is given, but the form of {self.kind} has no mean; leave it out"
+        if self.is_form and self.form is not None and self.rule != INSIDE:
+            yield f'the rule is "{self.rule}"; form is drawn by the rule "{INSIDE}" alone'
 
     def _process_faults(self) -> Iterator[str]:
         for option, choices in (("material", MATERIALS), ("bonus", BONUSES), ("rule", RULES)):

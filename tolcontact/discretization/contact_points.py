@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +10,7 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
+from tolcontact.discretization.form_points import check_flat, check_resolved, form_lengths, form_spacing
 from tolcontact.discretization.nominal import ContactPoints, NominalPart, Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
@@ -39,11 +40,14 @@ def contact_points(
     reference_face = patch(pair.reference, meshes).placed(*reference.placement)
     reach = pair.within if pair.within is not None else DEFAULT_REACH * moving.mesh.scale
     deviating = _deviation(pair.moving, moving, meshes, features), _deviation(pair.reference, reference, meshes, features)
-    balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) else []
+    lengths = form_lengths(deviating)
+    if lengths:
+        check_flat(moving_face, reference_face, deviating)
+    balls_and_shafts = round_points(moving_face, reference_face, reach) if _is_open(pair) and not lengths else []
     if balls_and_shafts:
         P_m, P_r, n_r = (np.array(rows) for rows in zip(*(point.nominal() for point in balls_and_shafts), strict=True))
     else:
-        P_m = _candidates(assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach)
+        P_m = _candidates(assembly, pair, moving, unplaced.mesh, (moving_face, reference_face), reach, lengths)
         P_m, P_r, n_r = _touching(pair, P_m, moving_face, reference_face, reach)
     points = ContactPoints(
         name=pair.name,
@@ -61,7 +65,7 @@ def contact_points(
     )
     if balls_and_shafts or not any(deviating):
         return points
-    return replace(points, offsets=_height_offsets(deviating, points.facing))
+    return replace(points, offsets=_height_offsets(points))
 
 
 def _is_open(pair: ContactPair) -> bool:
@@ -76,19 +80,24 @@ def _candidates(
     mesh: trimesh.Trimesh,
     faces: tuple[Surface, Surface],
     reach: float,
+    lengths: Sequence[float],
 ) -> np.ndarray:
     """Return points (point, 3) of the moving face that become contact points if they lie over the reference face.
 
-    `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places.
+    `mesh` is the moving face in its part's own frame, `faces` are both faces in their nominal places, `lengths` are those of
+    their forms.
     """
     moving_face, reference_face = faces
     if isinstance(pair.points, str):
         points = distinct_vertices(mesh)
     else:
+        spacing = form_spacing(lengths) if lengths and _is_open(pair) else pair.spacing
         count = DEFAULT_POINTS if _is_open(pair) else pair.points
-        if pair.spacing is not None:
-            _check_number(mesh.area / pair.spacing**2, f"a spacing of {pair.spacing:g} mm gives")
-        points = spread(mesh, count, pair.spacing)
+        if spacing is not None:
+            _check_number(mesh.area / spacing**2, f"a spacing of {spacing:g} mm gives")
+        points = spread(mesh, count if spacing is None else None, spacing)
+    if lengths:
+        check_resolved(points, mesh, lengths)
     P_m, finest = moving.placed(points), assembly.smallest_zone()
     if is_flat(moving_face) and is_flat(reference_face):
         if _is_open(pair):
@@ -130,14 +139,14 @@ def _deviation(face: Face, part: NominalPart, meshes: Meshes, features: Features
     return features.face_at(face, meshes, part.placement) if part.part.features else None
 
 
-def _height_offsets(deviating: tuple[FaceDeviation | None, FaceDeviation | None], facing: np.ndarray) -> Offsets:
-    """Return the heights of points as faces grow; `facing` (point,) is 1 where the faces are parallel."""
-    sides = zip(deviating, (facing, np.ones_like(facing)), strict=True)
-    offsets = [
-        Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share))
-        for face, share in sides
-        if face is not None and face.grows
-    ]
+def _height_offsets(points: ContactPoints) -> Offsets:
+    """Return the heights of points as faces grow, the moving one as far as they are parallel, and those of their forms."""
+    offsets, facing = list[Offsets](), points.facing
+    for face, share, P in zip(points.deviating, (facing, np.ones_like(facing)), (points.P_m, points.P_r), strict=True):
+        if face is not None and face.grows:
+            offsets.append(Offsets(face.columns[face.height != 0], np.outer(face.height[face.height != 0], share)))
+        if face is not None and face.form is not None:
+            offsets.append(Offsets(face.form_columns, face.form.heights(P).T))
     return Offsets.joined(offsets, len(facing)) if offsets else Offsets.none(len(facing))
 
 

@@ -120,6 +120,12 @@ def _gap(gap: Gap, faces: MeasuredFaces) -> Heights:
 
 def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement:
     moving, reference = faces.pair(clearance)
+    for face in (moving, reference):
+        if face.deviation is not None and face.deviation.form is not None:
+            raise GeometryFault(
+                f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of stations with tc.Gap, "
+                "or give its tolerance of form form=None"
+            )
     if is_flat(moving.surface) and is_flat(reference.surface):
         return _clearance_of_planes(moving, reference)
     reach = float(np.ptp(np.vstack([moving.surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())

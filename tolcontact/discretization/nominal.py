@@ -12,6 +12,7 @@ from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
+from tolcontact.discretization.pair_form import PairForm
 from tolcontact.discretization.point_weights import point_weights
 from tolcontact.discretization.round_points import RoundPoints
 from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, NominalPattern
@@ -129,20 +130,32 @@ class ContactPoints:
         return -(self.moving_face.normals(triangle, nearest) * self.n_r).sum(axis=1)
 
     def heights(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the sum of the heights of both faces (row,) [mm] for deviations (row, contributor)."""
+        """Return the sum by which both faces have grown (row,) [mm] for deviations (row, contributor), without their forms."""
         heights = np.zeros(len(deviations))
         for face in self.deviating:
             if face is not None and face.grows:
                 heights += face.heights(deviations)
         return heights
 
-    def least_gap(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """Return the least gap (row,) [mm] of the points at X_RM (row, 12), above planes grown by `heights` (row,) [mm]."""
+    @property
+    def has_form(self) -> bool:
+        """Whether one of the faces has form."""
+        return any(face is not None and face.form is not None for face in self.deviating)
+
+    def form(self, deviations: np.ndarray) -> PairForm:
+        """Return the forms of both faces for deviations (row, contributor)."""
+        return PairForm(self.deviating, deviations)
+
+    def least_gap(self, X_RM: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
+        """Return the least gap (row,) [mm] of the points at X_RM (row, 12) for deviations (row, contributor) of the faces."""
         gaps, together = np.empty(len(X_RM)), max(1, GAPS_TOGETHER // max(len(self.P_m), 1))
         for k in range(0, len(X_RM), together):
-            X = X_RM[k : k + together]
-            gaps[k : k + together] = ((pose.apply(X, self.P_m) - self.P_r) * self.n_r).sum(axis=2).min(axis=1)
-        return gaps - heights
+            rows = slice(k, k + together)
+            of_points = ((pose.apply(X_RM[rows], self.P_m) - self.P_r) * self.n_r).sum(axis=2)
+            if deviations is not None and self.has_form:
+                of_points -= self.form(deviations[rows]).at_all(self.P_m, self.P_r)
+            gaps[rows] = of_points.min(axis=1)
+        return gaps if deviations is None else gaps - self.heights(deviations)
 
     @cached_property
     def weights(self) -> Float[Array, " point"]:

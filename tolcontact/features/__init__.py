@@ -92,13 +92,15 @@ member has by itself, without a common zone, are those of features: declare one 
 """
 
 from tolcontact.features.datum_order import datum_order
+from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import AxisFeature, FeatureGeometry, FeatureOfSize, PlaneFeature
 from tolcontact.features.feature_recognition import feature_geometry
-from tolcontact.features.nominal_features import FaceDeviation, Features, NominalFeature, NominalPattern, Placement
+from tolcontact.features.form_field import FormField
+from tolcontact.features.nominal_features import Features, NominalFeature, NominalPattern, Placement
 from tolcontact.features.tolerance_kinds import zone_of
 from tolcontact.features.tolerance_layers import Datum, Layer
 
 __all__ = [
-    "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "Layer", "NominalFeature",
-    "NominalPattern", "Placement", "PlaneFeature", "datum_order", "feature_geometry", "zone_of",
+    "AxisFeature", "Datum", "FaceDeviation", "FeatureGeometry", "FeatureOfSize", "Features", "FormField", "Layer",
+    "NominalFeature", "NominalPattern", "Placement", "PlaneFeature", "datum_order", "feature_geometry", "zone_of",
 ]  # fmt: skip

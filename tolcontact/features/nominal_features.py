@@ -6,10 +6,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tolcontact.declaration import DatumTargets, Face, Feature, Pattern
+from tolcontact.declaration import DatumTargets, Face, Feature, GeometricTolerance, Pattern
 from tolcontact.errors import GeometryFault
+from tolcontact.features.face_deviation import FaceDeviation
 from tolcontact.features.feature_geometry import FeatureGeometry, FeatureOfSize, TargetPoint
 from tolcontact.features.feature_recognition import feature_geometry
+from tolcontact.features.form_field import FormField, form_field
+from tolcontact.features.forms import drawn_form
 from tolcontact.features.pattern_geometry import MIXED, RELATIVE, SIZE_TOLERANCE, PatternGeometry, check_alike
 from tolcontact.features.tolerance_layers import Datum, Layer, Lean, padded, tolerance_layers
 from tolcontact.geometry.faces import FaceArea, Meshes, face_area, patch
@@ -21,46 +24,13 @@ FACE_TOLERANCE = 1e-4  # of a face's size: the largest distance of a point on it
 
 
 @dataclass(frozen=True, eq=False)
-class FaceDeviation:
-    """The deviation of a face: a small rigid displacement and a height, both linear in what varies. Nominal assembly frame.
-
-    name      "part.feature"
-    columns   (k,) of the deviations that displace the face
-    centre    (3,) [mm]: a point p of the face goes to p + tau + rho x (p - centre)
-    twist     (6, k): tau [mm] and rho [rad] for deviations of 1
-    height    (k,) [mm]: how much the face then grows out of the material, everywhere
-    """
-
-    name: str
-    columns: np.ndarray
-    centre: np.ndarray
-    twist: np.ndarray
-    height: np.ndarray
-
-    @property
-    def grows(self) -> bool:
-        """Whether the height varies."""
-        return bool(self.height.any())
-
-    def heights(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the heights (row,) [mm] for deviations (row, column), summed up in a fixed order."""
-        heights = np.zeros(len(deviations))
-        for column, factor in zip(self.columns, self.height, strict=True):
-            heights += factor * deviations[:, column]
-        return heights
-
-    def outward(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """Return how far `points` (point, 3) of the face move along `normals` (point, 3) for deviations of 1: (point, k)."""
-        turned = np.cross(points - self.centre, normals)
-        return np.hstack([normals, turned]) @ self.twist + self.height
-
-
-@dataclass(frozen=True, eq=False)
 class NominalFeature:
     """A feature in its part, by itself or as a member of a pattern.
 
     coordinates  (coordinate, column): of the feature, for deviations of 1 of the columns of its pattern and all columns before
     size_column  the column of its size; None if its size is not toleranced
+    form         of its face; None if the feature keeps its shape
+    form_columns the columns of the coefficients of the form
     surfaces     its faces, in the part's own frame
     areas        its faces on the part's mesh
     """
@@ -72,6 +42,8 @@ class NominalFeature:
     size_column: int | None
     surfaces: tuple[Surface, ...]
     areas: tuple[FaceArea, ...]
+    form: FormField | None = None
+    form_columns: range = range(0)
 
     @property
     def label(self) -> str:
@@ -80,7 +52,7 @@ class NominalFeature:
     @property
     def varies(self) -> bool:
         """Whether the feature deviates at all."""
-        return self.size_column is not None or bool(self.coordinates.any())
+        return self.size_column is not None or self.form is not None or bool(self.coordinates.any())
 
     def face_with(self, position: np.ndarray) -> int | None:
         """Return the number of the face that a point (3,) [mm] is on; None, for the middle, if it is on neither of two."""
@@ -111,10 +83,13 @@ class NominalFeature:
         if size_column is not None and number is not None and isinstance(geometry, FeatureOfSize):
             motion, height[size_column] = geometry.growth(number, _moving_faces(self.feature))
             twist[:3, size_column] += motion
-        columns = np.flatnonzero(twist.any(axis=0) | (height != 0))
+        columns, form = np.flatnonzero(twist.any(axis=0) | (height != 0)), self.form if number is not None else None
+        modes = np.arange(len(columns), len(columns) + (len(self.form_columns) if form else 0))
+        columns = np.concatenate([columns, np.array(self.form_columns if form else (), dtype=int)])
         R, t = placement
         turned = np.vstack([R @ twist[:3, columns], R @ twist[3:, columns]])
-        return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns])
+        placed = None if form is None else form.placed(R, t)
+        return FaceDeviation(self.label, columns, R @ geometry.centre + t, turned, height[columns], placed, modes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +102,7 @@ class NominalPattern:
     first_column  of its contributors
     labels        "part.feature.freedom" of its contributors; "part.pattern.freedom" for what moves several members
     leans         by their columns: planes that lean against other datums of its tolerances
+    form          the tolerance by which the form of its members is drawn; None if they keep their shape
     """
 
     declared: Feature | Pattern
@@ -136,6 +112,7 @@ class NominalPattern:
     first_column: int
     labels: tuple[str, ...]
     leans: Mapping[int, Lean]
+    form: GeometricTolerance | None = None
 
     @property
     def part(self) -> int:
@@ -203,19 +180,24 @@ class Features:
                 _check_size(member, geometries[member])
                 sizes[member] = start + len(names)
                 names.append(f"{member.name}.size")
+        form, fields = _form_fields(declared, {member: (geometries[member], surfaces[member]) for member in new})
+        forms = dict[Feature, range]()
+        for member, shape in fields.items():
+            forms[member] = range(start + len(names), start + len(names) + shape.modes)
+            names += [f"{member.name}.form {k:02d}" for k in range(1, shape.modes + 1)]
         coordinates = padded(coordinates, start + len(names))
         members = [
             present.get(member)
             or NominalFeature(
                 member, part, shapes[k], coordinates[geometry.slices[k]],
-                sizes.get(member), surfaces[member], areas[member],
+                sizes.get(member), surfaces[member], areas[member], fields.get(member), forms.get(member, range(0)),
             )
             for k, member in enumerate(declared.members)
         ]  # fmt: skip
         self.features += [member for member in members if member.feature in geometries]
         labels = tuple(f"{declared.part.name}.{name}" for name in names)
         shifts = {column: lean for column, (lean, _) in leans.items()}
-        self.patterns.append(NominalPattern(declared, tuple(members), geometry, layers, start, labels, shifts))
+        self.patterns.append(NominalPattern(declared, tuple(members), geometry, layers, start, labels, shifts, form))
 
     def add_targets(self, targets: DatumTargets, part: int) -> None:
         """Add a datum whose features have been added before. Raises GeometryFault for a target that is not on its feature."""
@@ -312,6 +294,18 @@ def _check_size(feature: Feature, geometry: FeatureGeometry) -> None:
             ("a hole", size.tolerance_class.upper()) if geometry.is_inner else ("no hole", size.tolerance_class.lower())
         )
         raise GeometryFault(f'its tolerance class is {size.tolerance_class}, and it is {own}; write "{other}"')
+
+
+def _form_fields(
+    declared: Feature | Pattern, members: Mapping[Feature, tuple[FeatureGeometry, Sequence[Surface]]]
+) -> tuple[GeometricTolerance | None, dict[Feature, FormField]]:
+    """Return the tolerance by which the form of members is drawn, and the form field of each; None, and none, without it."""
+    form, fields = None, dict[Feature, FormField]()
+    for member, (geometry, (surface, *_)) in members.items():
+        form = drawn_form(declared, geometry)
+        if form is not None and form.form is not None:
+            fields[member] = form_field(form.form, surface)
+    return form, fields
 
 
 def _freedom_names(declared: Feature | Pattern, geometry: PatternGeometry, layers: Sequence[Layer]) -> list[str]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import igl
 import numpy as np
@@ -104,6 +105,19 @@ class BodyFace:
         return np.ascontiguousarray(self.body.faces, dtype=np.int64)
 
 
+class Form(Protocol):
+    """The forms of both faces of a pair."""
+
+    def take(self, rows: slice | np.ndarray) -> "Form":
+        """Return the forms of some rows."""
+
+    def at(self, row: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:
+        """Return the sum of both heights (k,) [mm] at places P_m, P_r (k, 3) of the nominal faces, each of its own row (k,)."""
+
+    def highest(self) -> np.ndarray:
+        """Return a bound (row,) [mm] of the sums of both heights."""
+
+
 @dataclass(frozen=True, eq=False)
 class FacePair:
     """The faces of a pair, for checks at any pose."""
@@ -111,31 +125,43 @@ class FacePair:
     moving: BodyFace
     reference: BodyFace
 
-    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray) -> np.ndarray:
-        """Return whether (row,) either face lies in the other's body at X_RM (row, 12), `heights` as for `depth`."""
+    def penetrate(self, X_RM: np.ndarray, heights: np.ndarray, form: "Form | None" = None) -> np.ndarray:
+        """Return whether (row,) either face lies in the other's body at X_RM (row, 12), `heights` and `form` as for `depth`."""
         hits = np.zeros(len(X_RM), dtype=bool)
         for every in (THINNED, 1):
             rows = np.flatnonzero(~hits)
-            hits[rows] = self.depth(X_RM[rows], heights[rows], every=every) > 0
+            of_rows = None if form is None else form.take(rows)
+            hits[rows] = self.depth(X_RM[rows], heights[rows], of_rows, every=every) > 0
         return hits
 
-    def depth(self, X_RM: np.ndarray, heights: np.ndarray, *, every: int = 1) -> np.ndarray:
+    def depth(self, X_RM: np.ndarray, heights: np.ndarray, form: "Form | None" = None, *, every: int = 1) -> np.ndarray:
         """Return the largest depth (row,) [mm] of either face in the other's body at X_RM (row, 12).
 
         `heights` (row,) [mm] are the sum by which both faces lie farther out than nominally; each face counts it in full.
-        Of the points that may lie inside, one in `every` is looked at.
+        With a `form`, the heights of both faces in each place are added. Of the points that may lie inside, one in `every` is
+        looked at.
         """
         largest = np.zeros(len(X_RM))
+        highest = heights if form is None else heights + form.highest()
         for start in range(0, len(X_RM), POSES_PER_BLOCK):
             rows = slice(start, start + POSES_PER_BLOCK)
             X, outward = X_RM[rows], heights[rows]
             for body, motion, side in ((self.reference, X, self.moving), (self.moving, pose.inverse(X), self.reference)):
-                row, point = (numbers[::every] for numbers in body.behind(motion, side, outward))
+                row, point = (numbers[::every] for numbers in body.behind(motion, side, highest[rows]))
                 if row.size:
-                    places = side.points[point] + outward[row, None] * side.normals[point]
-                    places = np.einsum("kij,kj->ki", pose.rotation(motion)[row], places) + pose.translation(motion)[row]
+                    raised = outward[row]
+                    if form is not None:
+                        moved = _moved(motion, row, side.points[point])
+                        P_m, P_r = (side.points[point], moved) if side is self.moving else (moved, side.points[point])
+                        raised = raised + form.take(rows).at(row, P_m, P_r)
+                    places = _moved(motion, row, side.points[point] + raised[:, None] * side.normals[point])
                     body.raise_to_depths(largest[rows], row, places)
         return largest
+
+
+def _moved(motion: np.ndarray, row: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return points (k, 3) moved by the motion (row, 12) of the row (k,) of each."""
+    return np.asarray(np.einsum("kij,kj->ki", pose.rotation(motion)[row], points) + pose.translation(motion)[row])
 
 
 def body_face(face: Surface, body: trimesh.Trimesh, contacts: int) -> BodyFace:

@@ -45,7 +45,7 @@ class Observed:
 
     def position(self, station: Station) -> ca.SX:
         """Return the position (3, 1) [mm] of a station, which moves with the face that it is on."""
-        height = face_height(station.deviation, self.deviations)
+        height = face_height(station.deviation, self.deviations, station.position)
         return self.pose(station.part, station.deviation).apply(ca.DM(station.position) + height * ca.DM(station.outward))
 
 
@@ -83,7 +83,8 @@ def _height(station: Station, wall: Wall, observed: Observed) -> ca.SX:
     """Return the height of a station over a wall, which may have grown [mm]."""
     X = observed.pose(wall.part, wall.deviation)
     place = X.R.T @ (observed.position(station) - X.t)
-    return wall.side * distance(wall.surface, place) - face_height(wall.deviation, observed.deviations)
+    height = face_height(wall.deviation, observed.deviations, wall.foot(station.position))
+    return wall.side * distance(wall.surface, place) - height
 
 
 def distance(surface: AnalyticSurface, place: ca.SX) -> ca.SX:

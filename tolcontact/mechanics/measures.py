@@ -97,8 +97,9 @@ class SymbolicPoses:
         X, p, face = self._pose(point.part), ca.SX(ca.DM(self._nominal.position(point))), self._nominal.face_at(point)
         if face is None:
             return X.apply(p)
-        X_face, height = face_pose(face, self._deviations), face_height(face, self._deviations)
-        if face.grows:
+        X_face = face_pose(face, self._deviations)
+        if face.grows or face.form is not None:
+            height = face_height(face, self._deviations, self._nominal.position(point))
             p = p + height * ca.DM(self._nominal.outward(point))
         return X.apply(p if X_face is None else X_face.apply(p))
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+import numpy as np
 
 from tolcontact.discretization import ContactPoints, Nominal
 from tolcontact.features import FaceDeviation
@@ -25,11 +26,14 @@ def face_pose(face: FaceDeviation | None, deviations: ca.SX) -> Pose | None:
     return Pose(R, q[:3] + c - R @ c)
 
 
-def face_height(face: FaceDeviation | None, deviations: ca.SX) -> ca.SX:
-    """Return the growth of a face out of the material [mm]."""
-    if face is None or not face.grows:
-        return ca.SX(0)
-    return ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
+def face_height(face: FaceDeviation | None, deviations: ca.SX, place: np.ndarray | None = None) -> ca.SX:
+    """Return the growth of a face out of the material [mm]; at a `place` (3,) [mm] of it with the height of its form."""
+    height = ca.SX(0)
+    if face is not None and face.grows:
+        height = ca.dot(ca.DM(face.height), deviations[face.columns.tolist()])
+    if face is not None and face.form is not None and place is not None:
+        height += ca.dot(ca.DM(face.form.heights(place)), deviations[face.form_columns.tolist()])
+    return height
 
 
 def face_poses(pair: ContactPoints, deviations: ca.SX) -> tuple[Pose | None, Pose | None]:

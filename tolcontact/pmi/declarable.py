@@ -7,6 +7,7 @@ from tolcontact.declaration import feature_tolerance as declared
 from tolcontact.declaration.feature_tolerance import KINDS as DECLARED_KINDS, GeometricTolerance
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.tolerance_class import UndefinedClass, tolerance_class
+from tolcontact.features.forms import is_drawn
 from tolcontact.pmi.annotations import DatumReference, Dimension, Tolerance
 
 _KINDS = {
@@ -41,6 +42,8 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
         raise Undeclared("its zone is flat, and the file does not state across which direction")
     mark = "" if stated.refines is None else "><"  # the lower segments of a composite frame lock directions alone
     system = "|".join(_compartment(reference) + mark for reference in stated.datums)
+    if kind.is_form and not is_drawn(kind, options.get("per")):
+        options["form"] = None
     result = kind(stated.value, system, **options)
     if not system and kind.needs_datums and kind is not declared.Position:  # which members of a pattern may have
         raise Undeclared("it needs datums, and the file states none")

@@ -117,5 +117,5 @@ def _source(tolerance: Size | GeometricTolerance) -> str:
 
 
 def _text(value: Any) -> str:
-    """Return a text or a number as Python reads it, texts in double quotes."""
-    return json.dumps(value, ensure_ascii=False)
+    """Return a text, a number or None as Python reads it, texts in double quotes."""
+    return "None" if value is None else json.dumps(value, ensure_ascii=False)

@@ -49,14 +49,17 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
         if faces is None or pair.reference is None:
             continue
         X_RM, heights = relative[:, k], pair.heights(deviations)
-        surfaces.penetration[:, k] = faces.depth(X_RM, heights)
+        form = pair.form(deviations) if pair.has_form else None
+        surfaces.penetration[:, k] = faces.depth(X_RM, heights, form)
         if fixed and not pair.round and k not in program.meetings:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
-            row, point = np.nonzero(gaps < TOUCHING_GAP + heights[:, None])
-            depth = np.maximum(-pair.least_gap(raw_relative[:, k], heights), 0)
+            raised = heights[:, None] if form is None else heights[:, None] + form.at_all(pair.P_m, pair.P_r)
+            row, point = np.nonzero(gaps < TOUCHING_GAP + raised)
+            depth = np.maximum(-pair.least_gap(raw_relative[:, k], deviations), 0)
             inside = np.flatnonzero(depth)
-            are_apart = ~faces.penetrate(raw_relative[inside, k], heights[inside])
+            of_inside = None if form is None else form.take(inside)
+            are_apart = ~faces.penetrate(raw_relative[inside, k], heights[inside], of_inside)
             surfaces.false_contact[:, k] = 0
             surfaces.false_contact[inside[are_apart], k] = depth[inside[are_apart]]
             touching, face = places[row, point], faces.reference.face
@@ -64,7 +67,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
             np.maximum.at(surfaces.overhang[:, k], row, face.overhang(touching))
             surfaces.contacts[:, k] = np.bincount(row, minlength=len(poses))
             if face.curvature == 0:
-                feet = touching - heights[row, None] * pair.n_r[point]
+                feet = touching - np.broadcast_to(raised, gaps.shape)[row, point, None] * pair.n_r[point]
                 away = np.linalg.norm(face.nearest(feet)[1] - feet, axis=1) > ended
                 surfaces.contacts_ended[:, k] = np.bincount(row[away], minlength=len(poses))
     return surfaces

@@ -24,6 +24,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.archive import model_of, open_archive
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.geometry.surface import Surface
 from tolcontact.method import Method
 from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
 from tolcontact.workflow import build
@@ -52,8 +53,8 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
     A referee computes the gaps again from the archive alone: n'(x_m - x_r), with x = R p + t, p a nominal contact point of the
     moving or the reference part, n the nominal normal turned with the reference part; less the deviation of the one-sided
     locator that a point stands for. The gap of a ball or a shaft beside a wall is their distance, from their sizes and places.
-    Faces of features are displaced in their parts first, and then moved outwards by their heights. The two results may differ
-    by `within` [mm].
+    Faces of features are displaced in their parts first, and then moved outwards by their heights, and those of their forms.
+    The two results may differ by `within` [mm].
 
     Where faces end (pairs that the archive calls `bounded`), contact is found anew at the archived poses, between the archived
     bodies. This is the simulation's own search, so it tells poses and gaps that do not belong together, not a fault of the
@@ -70,7 +71,7 @@ def assert_gaps_recompute(results: Results, *, within: float = terms.ROUNDED) ->
         archived, comparable = rows[terms.GAP_MIN.name], _comparable(rows)
         largest, place, meetings = 0.0, "", _meetings(tree)
         for number, name in enumerate(archived[terms.PAIR].values):
-            pair = ArchivedPair(tree, number, meetings.get(number))
+            pair = ArchivedPair(tree, number, *meetings.get(number, (None, None)))
             count = max(1, MAX_GAPS // len(pair.normal))
             for start in range(0, len(comparable), count):
                 piece = slice(start, start + count)
@@ -152,13 +153,14 @@ def _listed(numbers: np.ndarray) -> str:
     return f"{len(numbers)} (realization {named}{', ...' if len(numbers) > NAMED_REALIZATIONS else ''})"
 
 
-def _meetings(tree: xr.DataTree) -> dict[int, Meeting]:
-    """Return where those pairs can touch whose faces end, by number of the pair, from the archived model and method."""
+def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, Surface | None]]:
+    """Return where those pairs can touch whose faces end, and their reference faces, from the archived model and method."""
     bounded = tree["contact"].to_dataset().get(terms.BOUNDED.name)
     if bounded is None or not bounded.values.any():
         return {}
     method = Method(**{choice.name: tree.attrs[choice.name] for choice in fields(Method)})
-    return build(model_of(tree), solver=tree.attrs["solver"], method=method).meetings
+    program = build(model_of(tree), solver=tree.attrs["solver"], method=method)
+    return {number: (meeting, program.nominal.pairs[number].reference_face) for number, meeting in program.meetings.items()}
 
 
 def _comparable(rows: Rows) -> np.ndarray:

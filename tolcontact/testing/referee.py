@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
 from tolcontact.geometry.meeting import Meeting
+from tolcontact.geometry.surface import Surface
 
 DIRECTIONS = 72  # that are tried at first
 NARROWINGS = 60
@@ -144,6 +145,29 @@ class ArchivedFaces:
             return np.zeros(len(deviations))
         return deviations @ self._contact[terms.FACE_HEIGHT.name][face]
 
+    def modes(self, face: int, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return contributors (mode,), and their heights (..., mode) at places (..., 3) [mm], of the form of a face."""
+        if face < 0 or terms.FORM_COVARIANCE.name not in self._contact or not self._contact[terms.FORM_COVARIANCE.name][face]:
+            return np.zeros(0, dtype=int), np.zeros((*places.shape[:-1], 0))
+        own = self._contact[terms.FACE_OF_STATION.name] == face
+        stations, weights = (self._contact[variable.name][own] for variable in (terms.STATION, terms.STATION_WEIGHT))
+        columns, removed = (self._contact[variable.name][face] for variable in (terms.FORM_CONTRIBUTOR, terms.FORM_REMOVED))
+        r = np.sqrt(((places[..., None, :] - stations) ** 2).sum(axis=-1)) / self._contact[terms.FORM_LENGTH.name][face]
+        covariance = {
+            "squared exponential": np.exp(-r * r / 2),
+            "matern 5/2": (1 + 5**0.5 * r + 5 / 3 * r * r) * np.exp(-(5**0.5) * r),
+            "matern 3/2": (1 + 3**0.5 * r) * np.exp(-(3**0.5) * r),
+        }[str(self._contact[terms.FORM_COVARIANCE.name][face])]
+        heights = covariance @ weights - places @ removed[:, 1:].T - removed[:, 0]
+        return columns[columns >= 0], heights[..., columns >= 0]
+
+    def form(self, face: int, deviations: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """Return the heights (realization, place) [mm] of the form of a face at places (place, 3), or one place each."""
+        columns, heights = self.modes(face, places)
+        if places.ndim == 2:
+            return deviations[:, columns] @ heights.T if columns.size else np.zeros((len(deviations), len(places)))
+        return np.einsum("npm,nm->np", heights, deviations[:, columns])
+
     def placed(self, face: int, deviations: np.ndarray, R: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return R and t of a face of a part at R (realization, state, 3, 3), t (realization, state, 3) [mm]."""
         if face < 0:
@@ -164,18 +188,21 @@ class ArchivedFaces:
                     tau, rho = self.displacement(face, deviations)
                     arm = self._sample[terms.LOCATOR_POINT.name][locator] - self._contact[terms.FACE_CENTRE.name][face]
                     inward = self._sample[terms.LOCATOR_DIRECTION.name][locator]
+                    point = self._sample[terms.LOCATOR_POINT.name][[locator]]
                     pushes[:, place] += self.height(face, deviations) + sign * (tau + np.cross(rho, arm)) @ inward
+                    pushes[:, place] += self.form(face, deviations, point)[:, 0]
         return pushes
 
 
 class ArchivedPair:
     """The nominal contact points of a pair, and where the archived poses put them.
 
-    With a `meeting`, the pair touches where its faces end, at places that are found again at the archived poses.
+    With a `meeting`, the pair touches where its faces end, at places that are found again at the archived poses; with form
+    also between them, over the `surface` of the reference face.
     """
 
-    def __init__(self, tree: xr.DataTree, pair: int, meeting: Meeting | None = None) -> None:
-        self.meeting = meeting
+    def __init__(self, tree: xr.DataTree, pair: int, meeting: Meeting | None = None, surface: Surface | None = None) -> None:
+        self.meeting, self.surface = meeting, surface
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
         is_own = contact[terms.PAIR_OF_POINT.name] == pair
         points = (terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL)
@@ -213,7 +240,7 @@ class ArchivedPair:
             offset = np.einsum("...ij,...j->...i", turn, t_m - t_r)
             grown = (of_moving[:, None], of_reference[:, None])
             if self.meeting:
-                return (least_gaps(self.meeting, turn @ R_m, offset) - sum(grown))[..., None]
+                return (self._gaps_at_ends(turn @ R_m, offset, deviations) - sum(grown))[..., None]
             return np.stack([point.gaps(turn @ R_m, offset, *grown) for point in self.round], axis=-1)
         # (R_m P_m + t_m - R_r P_r - t_r) . R_r n / |R_r n|, multiplied out: sums over points that matrix products form.
         back, n = R_r.swapaxes(-1, -2), self.normal
@@ -223,19 +250,47 @@ class ArchivedPair:
         gaps = (from_moving - from_reference) / np.sqrt(length)
         if self.facing is not None:
             gaps -= of_moving[:, None, None] * self.facing + of_reference[:, None, None]
+            gaps -= self._form(deviations, self.moving_point, self.reference_point)[:, None]
         supports = self.locators >= 0
         if supports.any():
             gaps[..., supports] -= self.faces.pushes(self.locators[supports], deviations)[:, None]
         return gaps
 
+    def _form(self, deviations: np.ndarray, P_m: np.ndarray, P_r: np.ndarray) -> np.ndarray:
+        """Return the heights (realization, place) [mm] of the forms of both faces at their places P_m, P_r."""
+        return self.faces.form(self.moving_face, deviations, P_m) + self.faces.form(self.reference_face, deviations, P_r)
 
-def least_gaps(meeting: Meeting, R: np.ndarray, t: np.ndarray) -> np.ndarray:
-    """Return least gaps (...) [mm] of all places, with the moving part at R (..., 3, 3), t (..., 3) [mm] in the reference."""
-    X_RM = np.concatenate([R.reshape(-1, 9), t.reshape(-1, 3)], axis=1)
-    pieces = [
-        meeting.at(X_RM[k : k + POSES_AT_ONCE]).gaps.min(axis=1, initial=np.inf) for k in range(0, len(X_RM), POSES_AT_ONCE)
-    ]
-    return np.concatenate(pieces).reshape(R.shape[:-2])
+    @property
+    def _has_form(self) -> bool:
+        return any(self.faces.modes(face, np.zeros((1, 3)))[0].size for face in (self.moving_face, self.reference_face))
+
+    def _gaps_at_ends(self, R: np.ndarray, t: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Return least gaps (realization, state) [mm] of all places, above faces that have not grown.
+
+        The moving part is at R (realization, state, 3, 3), t (realization, state, 3) [mm] in the reference part's frame.
+        """
+        assert self.meeting is not None
+        X_RM = np.concatenate([R.reshape(-1, 9), t.reshape(-1, 3)], axis=1)
+        by_pose = np.broadcast_to(deviations[:, None], (*R.shape[:2], deviations.shape[1])).reshape(len(X_RM), -1)
+        pieces = []
+        for start in range(0, len(X_RM), POSES_AT_ONCE):
+            piece = slice(start, start + POSES_AT_ONCE)
+            places = self.meeting.at(X_RM[piece])
+            gaps = places.gaps
+            if self._has_form:
+                gaps = gaps - self._form(by_pose[piece], places.P_m, places.P_r)
+                gaps = np.concatenate([gaps, self._gaps_over_face(X_RM[piece], by_pose[piece])], axis=1)
+            pieces.append(gaps.min(axis=1, initial=np.inf))
+        return np.concatenate(pieces).reshape(R.shape[:-2])
+
+    def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
+        """Return gaps (n, point) [mm] of the contact points that stand over the reference face; infinite ones of the others."""
+        assert self.surface is not None
+        moved = np.einsum("nij,pj->npi", X_RM[:, :9].reshape(-1, 3, 3), self.moving_point) + X_RM[:, None, 9:]
+        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2)
+        gaps -= self._form(deviations, self.moving_point, self.reference_point)
+        is_over = self.surface.project(moved.reshape(-1, 3))[2].reshape(gaps.shape)
+        return np.where(is_over, gaps, np.inf)
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -22,11 +22,12 @@ from tolcontact.variation.component_zones import (
     member_zones,
     uneven_shifts,
 )
+from tolcontact.variation.form_spreads import FormSpread
 from tolcontact.variation.zones import MemberZone
 
 INNER_SHARE_TOLERANCE = 1e-3  # share of features that narrower tolerances may leave outside of a wider one, beyond 0.27 %
 JOINT_RULES = ("truncated", "uniform", "polar")  # rules that draw the components of a feature together
-LOCATOR, FEATURE, DATUM, VARIABLE = "locator", "feature", "datum", "variable"  # sources
+LOCATOR, FEATURE, FORM, DATUM, VARIABLE = "locator", "feature", "form", "datum", "variable"  # sources
 MAX_SCORE, SCORES = 8.0, 4001  # normal scores that a variance is summed over
 TAIL = float(ndtr(-3))
 # Quantiles of the named distributions for a zone of width 1.
@@ -43,10 +44,10 @@ Uniforms = Callable[[int], np.ndarray]  # numbers (n, component) between 0 and 1
 class Contributor(NamedTuple):
     """A column of the deviations.
 
-    source     "locator", "feature", "variable", or "datum": a shift that follows from other deviations
+    source     "locator", "feature", "form", "variable", or "datum": a shift that follows from other deviations
     tolerance  of a locator, a size or a variable
-    layer      of a freedom of a feature: the tolerance that controls it
-    spread     [mm] standard deviation of a freedom of a feature
+    layer      of a freedom or a form of a feature: the tolerance that controls it
+    spread     [mm] standard deviation of a freedom of a feature, or of a coefficient of its form
     mean       [mm] of a freedom of a feature
     """
 
@@ -146,6 +147,7 @@ class Contributors:
         self.joint_draws: list[JointDraw] = []
         self.bonuses: list[Bonus] = []
         self.zones: list[ComponentZone] = []
+        self.mean_zones: dict[str, float] = {}  # mm, of the forms of features
         locators = zip(nominal.locators.labels, nominal.locators.tolerances, strict=True)
         self._contributors = [Contributor(label, LOCATOR, "mm", tolerance) for label, tolerance in locators]
         self._assembly = nominal.assembly
@@ -195,6 +197,18 @@ class Contributors:
         if pattern.declared.size is not None:
             for _ in pattern.members:
                 yield Contributor(next(labels), FEATURE, "mm", pattern.declared.size.tolerance)
+        yield from self._modes(pattern, labels)
+
+    def _modes(self, pattern: NominalPattern, labels: Iterator[str]) -> Iterator[Contributor]:
+        """Yield the coefficients of the forms of a pattern's members."""
+        for member in pattern.members:
+            if member.form is not None and pattern.form is not None:
+                layer = next(layer for layer in pattern.layers if layer.tolerance is pattern.form)
+                form = FormSpread(member.form)
+                spread = form.spread(pattern.form.width) / pattern.form.cp
+                self.mean_zones[member.label] = form.mean_width(spread)
+                for _ in member.form_columns:
+                    yield Contributor(next(labels), FORM, "mm", None, layer, spread)
 
     def _add_joint_draws(self, layer: Layer, group: MemberGroup, columns: np.ndarray, spread: float, width: float) -> None:
         """Add how the components of a group that a layer adds, `columns` of the deviations, are drawn together."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 CONVENTIONS = "CF-1.11"
-FORMAT = 4  # of the archive; those of earlier ones can be read; those of format 1 do not say it
+FORMAT = 5  # of the archive; those of earlier ones can be read; those of format 1 do not say it
 STATES = ("raw", "corrected")
 RAW, CORRECTED = 0, 1  # their positions
 AXES = ("x", "y", "z")

@@ -14,7 +14,7 @@ from tolcontact.archive.stored_rows import StoredBlock
 from tolcontact.arrays import Array, Float, Int
 from tolcontact.compilation import Program
 from tolcontact.contact import kernel
-from tolcontact.discretization import Nominal
+from tolcontact.discretization import Nominal, raised_places
 from tolcontact.simulation import Block
 from tolcontact.statistics import BlockSums, DisplacementFields, TouchingShares
 from tolcontact.vocabulary import CORRECTED
@@ -75,9 +75,9 @@ def _nearest_counts(
 ) -> Int[Array, " point"]:
     """Return in how many realizations pair k, whose places are found at every pose, touches nearest to each contact point."""
     pair = program.nominal.pairs[k]
-    found = program.meetings[k].at(X_RM)
-    row, place = np.nonzero(found.gaps - pair.heights(deviations)[:, None] < TOUCHING_GAP)
-    _, nearest = KDTree(pair.P_m).query(found.P_m[row, place])
+    raised = raised_places(pair, program.meetings[k], X_RM, deviations)
+    row, place = np.nonzero(raised.gaps < TOUCHING_GAP)
+    _, nearest = KDTree(pair.P_m).query(raised.places.P_m[row, place])
     realization_and_point = np.unique(np.column_stack([row, nearest]), axis=0)
     return np.bincount(realization_and_point[:, 1], minlength=len(pair.P_m))
 

@@ -1,0 +1,150 @@
+"""Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+import tolcontact as tc
+from tests.cases.seats import PRESS, seat, sliding
+from tests.helpers import SEATED, simulate
+from tolcontact.errors import ModelError
+from tolcontact.simulation.surfaces import check_surfaces
+from tolcontact.testing import assert_gaps_recompute, assert_resolved
+from tolcontact.vocabulary import CORRECTED, Status
+
+
+def modes_at(program, feature, places):
+    """Heights (place, mode) of the form of a feature, from the formulae of the archive's documentation."""
+    form = next(nominal.form for nominal in program.nominal.features if nominal.feature.name == feature)
+    r = np.linalg.norm(places[:, None] - form.stations, axis=2) / form.length
+    return np.exp(-(r**2) / 2) @ form.weights - form.removed[0] - places @ form.removed[1:]
+
+
+def coefficients(program, run, feature):
+    columns = [k for k, label in enumerate(program.nominal.contributors) if f".{feature}.form " in label]
+    return run["deviations"][:, columns]
+
+
+def seated(heights, places):
+    """The lowest plane (constant, slopes) above all heights at places (place, 2) where the force presses: an LP."""
+    rows = -np.column_stack([np.ones(len(places)), places])
+    return linprog([1, *PRESS], A_ub=rows, b_ub=-heights, bounds=[(None, None)] * 3, method="highs").x
+
+
+@pytest.mark.parametrize(("width", "error"), [(0.05, 5e-5), (0.005, 1e-7)])
+def test_a_seat_is_the_one_of_a_linear_programme_on_the_same_heights(width, error):
+    program, run = simulate(seat(width=width), samples=60, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all()
+    assert (run["carrying"][:, 0] == 3).all()
+    places = program.nominal.pairs[0].P_m
+    heights = coefficients(program, run, "under") @ modes_at(program, "under", places).T
+    probes = np.array([(1, 0, 0), (1, 100, 0), (1, 50, 50), (1, *PRESS)])
+    expected = np.array([probes @ seated(of_one, places[:, :2]) for of_one in heights])
+    assert np.abs(run["measured"][:, CORRECTED, :4] - expected).max() < error
+    assert np.ptp(expected[:, 3]) > 0.2 * width
+    # The measured point of the face moves with it, and stands out of it by its form.
+    foot = np.array([[30.0, 20.0, 0.0]])
+    form = coefficients(program, run, "under") @ modes_at(program, "under", foot).T
+    planes = np.array([seated(of_one, places[:, :2]) for of_one in heights])
+    np.testing.assert_allclose(run["measured"][:, CORRECTED, 4], planes @ [1, 30, 20] - form[:, 0], atol=error)
+
+
+def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points():
+    program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
+    surfaces = check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
+    assert 0 < surfaces.penetration[:, 0].max() < 1e-3
+
+
+def test_without_coefficients_a_face_is_flat():
+    """The least form that is drawn makes no difference; nor do names of contributors, which draws depend on."""
+    flat = seat(width=1e-9)
+    for feature in flat.features:
+        object.__setattr__(feature, "tolerances", (tc.Flatness(1e-9, form=None),))
+    (_, plane), (program, run) = (
+        simulate(model, samples=40, solver="daqp", method=SEATED) for model in (flat, seat(width=1e-9))
+    )
+    assert len(program.nominal.contributors) == plane["deviations"].shape[1] + 20
+    np.testing.assert_allclose(run["measured"], plane["measured"], atol=2e-8)
+
+
+def test_all_uses_of_a_face_share_one_field():
+    """A face that two pairs, locators and a measure use: heights of contact points and pushes of locators agree."""
+    a = tc.Assembly("shared")
+    table = a.part("table", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+    shelf = a.part("shelf", tc.Box(100, 50, 10), at=(100, 0, -10), fixed=True)
+    block = a.part("block", tc.Box(180, 50, 10), at=(10, 0, 0))
+    under = block.feature("under", block.face("-z"), tc.Flatness(0.05))
+    a.contact("table", moving=under, reference=table.face("+z"))
+    a.contact("shelf", moving=under, reference=shelf.face("+z"))
+    location = a.locate(block, tc.three_two_one(under, block.face("-y"), block.face("-x"), inset=5), tolerance=0.01)
+    assert location
+    a.measure("foot", under.point(5, 5, 0), along="z")
+    program = tc.build(a)
+    nominal, count = program.nominal, len(program.nominal.contributors)
+    assert count == 6 + 20
+    assert nominal.pairs[0].deviating[0] is nominal.pairs[1].deviating[0] is nominal.locators.faces[0]
+    for pair in nominal.pairs:
+        assert pair.offsets.columns.tolist() == list(range(6, 26))
+        np.testing.assert_allclose(pair.offsets.matrix.T, modes_at(program, "under", pair.P_m - [10, 0, 0]), atol=1e-12)
+    columns, factors = nominal.locators.pushes(0)
+    assert columns.tolist() == list(range(6, 26))
+    np.testing.assert_allclose(factors, modes_at(program, "under", nominal.locators.points[:1] - [10, 0, 0])[0], atol=1e-12)
+    # The locator holds the face itself: at its point the material stands where the locator says, without contact.
+    deviations = np.zeros((1, count))
+    deviations[0, 6:] = np.random.default_rng(0).normal(size=20) * 0.01
+    raw = program.place(deviations=deviations)["poses"]
+    foot = program.observe(poses=raw, deviations=deviations)["measured"][0, 0]
+    assert foot == pytest.approx(0, abs=1e-6)
+
+
+@pytest.mark.parametrize("covariance", ["squared exponential", "matern 3/2"])
+def test_gaps_of_faces_with_form_follow_from_the_archive_alone(tmp_path, covariance):
+    path = tmp_path / "seat.nc"
+    tc.run(seat(tc.Form(covariance, modes=8)), samples=40, solver="daqp", method=SEATED, out=path).close()
+    assert_resolved(path)
+    assert_gaps_recompute(path)
+    with tc.open_archive(path) as archive:
+        assert archive["gap_min"].sel(state="corrected").min() > -1e-9
+        form = archive["contact"].to_dataset()
+        assert form["form_covariance"].values.tolist() == [covariance]
+        assert form["form_length"].values == pytest.approx([100 / 3])
+        assert tc.model_of(archive).features[0].tolerances[0].form == tc.Form(covariance, modes=8)
+        archive["contact"]["station_weight"].values[:] *= 1.5
+        with pytest.raises(AssertionError, match="is not the smallest gap"):
+            assert_gaps_recompute(archive)
+
+
+def test_faces_with_form_that_end_do_not_penetrate_each_other(tmp_path):
+    path = tmp_path / "sliding.nc"
+    tc.run(sliding(), samples=60, solver="daqp", out=path).close()
+    assert_resolved(path)
+    assert_gaps_recompute(path)
+    with tc.open_archive(path) as archive:
+        assert archive["contact"]["bounded"].values.all()
+        assert archive["gap_min"].sel(state="corrected").min() > -1e-9
+        assert archive["surface"]["surface_penetration"].max() < 2e-3
+
+
+def refused(make):
+    a = tc.Assembly("refused")
+    block, base = a.part("block", tc.Box(100, 50, 10)), a.part("base", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+    make(a, block, base)
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0.1)
+    a.measure("end", block.point(0, 0, 10), along="z")
+    with pytest.raises(ModelError) as error:
+        tc.build(a)
+    return str(error.value)
+
+
+def test_what_cannot_be_drawn_is_refused_in_one_message():
+    fault = refused(lambda a, block, base: block.feature("f", block.face("-z"), tc.Straightness(0.1)))
+    assert "form of straightness of a plane cannot be drawn" in fault and "form=None" in fault
+    fault = refused(lambda a, block, base: block.feature("f", block.face("-z"), tc.Flatness(0.1, form=tc.Form("white"))))
+    assert "covariance is 'white'; expected one of" in fault
+
+
+def test_contact_points_too_far_apart_for_a_form_are_refused():
+    def sparse(a, block, base):
+        a.contact("c", moving=block.feature("f", block.face("-z"), tc.Flatness(0.1)), reference=base.face("+z"), points=8)
+
+    assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)

@@ -1,0 +1,52 @@
+"""Contact points of faces with form: how close they must be, and which faces they can be between."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from scipy.spatial import KDTree
+
+from tolcontact.errors import GeometryFault
+from tolcontact.features import FaceDeviation
+from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.surface import Surface
+
+FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
+SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
+MAX_SPACING_SHARE = 1 / 2
+COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
+EDGES = 8  # of the triangles whose corners are compared with contact points, in a correlation length
+
+
+def form_lengths(deviating: Sequence[FaceDeviation | None]) -> list[float]:
+    """Return the correlation lengths [mm] of the faces that have form."""
+    return [face.form.length for face in deviating if face is not None and face.form is not None]
+
+
+def form_spacing(lengths: Sequence[float]) -> float:
+    """Return the usual distance [mm] within which every place of a face has a contact point, for correlation lengths."""
+    return COVER_SHARE * SPACING_SHARE * min(lengths)
+
+
+def check_flat(moving: Surface, reference: Surface, deviating: Sequence[FaceDeviation | None]) -> None:
+    """Raise GeometryFault for a face with form that does not touch a plane which faces it."""
+    normals = [face.corner_normals[0, 0] for face in (moving, reference)]
+    if not (is_flat(moving) and is_flat(reference) and normals[0] @ normals[1] < FACING):
+        name = next(face.name for face in deviating if face is not None and face.form is not None)
+        raise GeometryFault(
+            f"the face of feature {name} has form, and can touch parallel planes alone; give its tolerance form=None, "
+            "so that it keeps its shape"
+        )
+
+
+def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[float]) -> None:
+    """Raise GeometryFault if points (point, 3) of a face are too far apart for the form of a pair."""
+    length = min(lengths)
+    places = trimesh.remesh.subdivide_to_size(face.vertices, face.faces, max_edge=length / EDGES, max_iter=30)[0]
+    spacing = float(KDTree(points).query(places)[0].max()) / COVER_SHARE
+    if spacing > MAX_SPACING_SHARE * length:
+        raise GeometryFault(
+            f"its contact points are {spacing:.3g} mm apart, and the form of its faces has a correlation length of "
+            f"{length:.3g} mm; expected at most half of that; leave points and spacing out, or give spacing="
+            f"{form_spacing(lengths):.2g}"
+        )

@@ -1,0 +1,89 @@
+"""The narrowest zone between two parallel planes that contains a face with form.
+
+Its width is the least, over displacements of the zone, of the largest distance of heights from its middle, doubled. That is a
+linear programme. Its dual has one more point than the zone has freedoms: points are exchanged until none is farther out.
+"""
+
+import numpy as np
+import scipy
+
+MAX_EXCHANGES = 200
+FARTHER = 1e-9  # of the width: points that are no farther out are in the zone
+SHIFT = 1e-8  # of the extent: shifts of points, since exchanges among points in line may cycle
+AT_ONCE = 512  # fields
+MIN_STEP = 1e-12
+
+
+def least_widths(places: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the widths (n,) [mm] of the least zones of heights (n, place) [mm] of a plane face at places (place, 3) [mm]."""
+    rigid = rigid_rows(places)
+    widths = np.concatenate([_exchanged(rigid, heights[k : k + AT_ONCE]) for k in range(0, len(heights), AT_ONCE)])
+    for row in np.flatnonzero(np.isnan(widths)):
+        widths[row] = _by_programme(rigid, heights[row])
+    return widths
+
+
+def rigid_rows(places: np.ndarray) -> np.ndarray:
+    """Return the heights (place, 3) of displacements of a plane as a whole, each at most 1."""
+    middle = places.mean(axis=0)
+    _, _, directions = np.linalg.svd(places - middle, full_matrices=False)
+    tilts = (places - middle) @ directions[:2].T
+    return np.column_stack([np.ones(len(places)), tilts / np.abs(tilts).max(axis=0)])
+
+
+def _exchanged(rigid: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return the widths (n,) by exchange; NaN where exchanges do not end."""
+    shifted = rigid + SHIFT * np.random.default_rng(0).uniform(-1, 1, rigid.shape) * [0, 1, 1]
+    count = rigid.shape[1] + 1
+    own = np.tile(_spread_points(shifted), (len(heights), 1))
+    signs = np.ones(own.shape)
+    widths, left = np.full(len(heights), np.nan), np.arange(len(heights))
+    weights = np.linalg.svd(shifted[own[0]].T)[2][-1]
+    signs[:] = np.where(weights < 0, -1.0, 1.0)
+    for _ in range(MAX_EXCHANGES):
+        columns = np.concatenate([signs[..., None] * shifted[own], np.ones((*own.shape, 1))], axis=2)  # (n, own, freedom + 1)
+        values = signs * np.take_along_axis(heights[left], own, axis=1)
+        solution = np.linalg.solve(columns, values[..., None])[..., 0]
+        residuals = heights[left] - solution[:, :-1] @ shifted.T
+        entering = np.abs(residuals).argmax(axis=1)
+        rows = np.arange(len(left))
+        largest = residuals[rows, entering]
+        done = np.abs(largest) <= solution[:, -1] * (1 + FARTHER) + 1e-300
+        widths[left[done]] = 2 * np.abs(largest[done])
+        left, own, signs, columns = left[~done], own[~done], signs[~done], columns[~done]
+        if not len(left):
+            break
+        entering, sense = entering[~done], np.sign(largest[~done])
+        target = np.concatenate([sense[:, None] * shifted[entering], np.ones((len(left), 1))], axis=1)
+        weights = np.linalg.solve(columns.swapaxes(1, 2), np.eye(count)[-1][:, None])[..., 0]
+        steps = np.linalg.solve(columns.swapaxes(1, 2), target[..., None])[..., 0]
+        ratios = np.where(steps > MIN_STEP, np.maximum(weights, 0.0) / np.maximum(steps, MIN_STEP), np.inf)
+        leaving, rows = ratios.argmin(axis=1), np.arange(len(left))
+        own[rows, leaving], signs[rows, leaving] = entering, sense
+    return widths
+
+
+def _spread_points(rigid: np.ndarray) -> np.ndarray:
+    """Return the numbers of as many points as there are freedoms, and one more, that are far from dependent."""
+    left, numbers = rigid.copy(), list[int]()
+    for _ in range(rigid.shape[1]):
+        numbers.append(int((left**2).sum(axis=1).argmax()))
+        direction = left[numbers[-1]] / np.linalg.norm(left[numbers[-1]])
+        left = left - np.outer(left @ direction, direction)
+    shares = np.linalg.solve(rigid[numbers].T, rigid.T)  # of the points before in each other point
+    smallest = np.abs(shares).min(axis=0)
+    smallest[numbers] = -1.0
+    return np.array([*numbers, int(smallest.argmax())])
+
+
+def _by_programme(rigid: np.ndarray, heights: np.ndarray) -> float:
+    """Return the width by a solver of linear programmes."""
+    scale, ones = max(float(np.ptp(heights)), 1e-300), np.ones((len(heights), 1))
+    solution = scipy.optimize.linprog(
+        np.append(np.zeros(rigid.shape[1]), 1.0),
+        A_ub=np.block([[rigid, -ones], [-rigid, -ones]]),
+        b_ub=np.concatenate([heights, -heights]) / scale,
+        bounds=[(None, None)] * rigid.shape[1] + [(0, None)],
+        method="highs-ds",
+    )
+    return float(2 * scale * solution.fun)

@@ -1,0 +1,13 @@
+"""Places all over a face, and the areas that they stand for."""
+
+import numpy as np
+import trimesh
+
+
+def quadrature(mesh: trimesh.Trimesh, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return places (place, 3) [mm] of a face about `step` [mm] apart, and the areas (place,) [mm^2] that they stand for."""
+    vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, max_edge=2 * step, max_iter=30)[:2]
+    places, numbers = np.unique(np.round(vertices, 9), axis=0, return_inverse=True)
+    faces = numbers.reshape(-1)[faces]
+    areas = trimesh.triangles.area(places[faces])
+    return places, np.bincount(faces.ravel(), np.repeat(areas / 3, 3), minlength=len(places))

@@ -1,0 +1,46 @@
+"""Variables of an archive that describe the form of faces: random fields of heights, as few functions of place."""
+
+from tolcontact.vocabulary.labels import AXIS, FEATURE_FACE, ArchiveVariable
+
+FORM_STATION, FORM_MODE, FORM_TERM = "form_station", "form_mode", "form_term"
+
+FORM_COVARIANCE = ArchiveVariable(
+    "form_covariance",
+    (FEATURE_FACE,),
+    str,
+    "covariance of the form of a feature's face, by distance; empty: it keeps its shape",
+)
+FORM_LENGTH = ArchiveVariable("form_length", (FEATURE_FACE,), "f8", "correlation length of the form; NaN: none", "mm")
+FORM_SPREAD = ArchiveVariable(
+    "form_spread", (FEATURE_FACE,), "f8", "standard deviation of the coefficients of the form's modes; NaN: none", "mm"
+)
+FORM_LEFT_OUT = ArchiveVariable(
+    "form_left_out", (FEATURE_FACE,), "f8", "share of the variance of the field that the modes leave out; NaN: none", "1"
+)
+FORM_MEAN_ZONE = ArchiveVariable(
+    "form_mean_zone", (FEATURE_FACE,), "f8", "mean width of the least zones of faces with this form; NaN: none", "mm"
+)
+FORM_CONTRIBUTOR = ArchiveVariable(
+    "form_contributor",
+    (FEATURE_FACE, FORM_MODE),
+    "i4",
+    "number of the contributor that is the coefficient of a mode, counted from 0; -1: none",
+)
+FACE_OF_STATION = ArchiveVariable(
+    "face_of_station", (FORM_STATION,), "i4", "number of the feature's face whose form a station is of, counted from 0"
+)
+STATION = ArchiveVariable("station", (FORM_STATION, AXIS), "f8", "place from which the covariance counts, nominal", "mm")
+STATION_WEIGHT = ArchiveVariable(
+    "station_weight", (FORM_STATION, FORM_MODE), "f8", "factor of the covariance with a station in the height of a mode", "1"
+)
+FORM_REMOVED = ArchiveVariable(
+    "form_removed",
+    (FEATURE_FACE, FORM_MODE, FORM_TERM),
+    "f8",
+    "constant and gradient [mm-1] of the displacement of the face as a whole, which is subtracted from a mode",
+    "1",
+)
+FORMS = (
+    FORM_COVARIANCE, FORM_LENGTH, FORM_SPREAD, FORM_LEFT_OUT, FORM_MEAN_ZONE, FORM_CONTRIBUTOR, FACE_OF_STATION, STATION,
+    STATION_WEIGHT, FORM_REMOVED,
+)  # fmt: skip
