@@ -3,7 +3,7 @@
 import numpy as np
 
 from tolcontact.compilation import ACCURACY
-from tolcontact.contact.least_penetration import PATIENCE, LeastPenetration
+from tolcontact.contact.progress import PATIENCE, PATIENCE_IN_CONFLICT, Progress
 from tolcontact.contact.record import initial_numbers
 from tolcontact.contact.resolver import is_better
 from tolcontact.contact.slots import Slots
@@ -47,23 +47,27 @@ def test_the_better_of_two_states_is_kept():
     best, here = (State.start(poses + number, relative, 2, []) for number in (1.0, 2.0))
     best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
     here.astray[:] = [0, 0, 1e-3, 0]
-    least = LeastPenetration.unknown(best)
-    assert not least.is_known.any()
-    least.look(best, best.slack.copy(), is_held=False)
-    least.look(here, inside, is_held=False)
-    assert least.is_known.all()
-    assert least.state.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
-    assert least.state.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
+    progress, still = Progress.unknown(best), np.zeros(4)
+    assert not progress.is_known.any()
+    progress.look(best, best.slack.copy(), still, is_held=False)
+    progress.look(here, inside, still, is_held=False)
+    assert progress.is_known.all()
+    assert progress.best.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
+    assert progress.best.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
 
 
-def test_steps_are_no_longer_expected_to_gain_after_some_that_did_not():
+def test_steps_are_over_after_some_that_gained_nothing():
+    """In a conflict gains are of penetration, else of the size of steps; steps that are held back do not count."""
     state = State.start(np.zeros((3, 1, 12)), np.zeros((3, 1, 12)), 2, [])
-    least = LeastPenetration.unknown(state)
-    falls = 0.9 ** np.arange(2 * PATIENCE + 1)  # the second goes on to fall, the third does so half way
+    progress, falls = Progress.unknown(state), 0.85 ** np.arange(50)
+    conflicts, others = np.full(3, True), np.full(3, False)
     for number, fall in enumerate(falls):
-        least.look(state, np.array([[0.1], [0.1 * fall], [0.1 * falls[min(number, PATIENCE)]]]), is_held=number == 0)
-        assert least.is_final.tolist() == [number >= PATIENCE, False, number >= 2 * PATIENCE]
-    assert least.take(np.array([True, False, False])).is_final.tolist() == [True]
+        until = falls[min(number, 10)]  # the second goes on to fall, the third does so in the first ten steps
+        values = np.array([1.0, fall, until])
+        progress.look(state, 0.1 * values[:, None], values, is_held=number == 0)
+        for is_in, patience in ((conflicts, PATIENCE_IN_CONFLICT), (others, PATIENCE)):
+            assert progress.is_over(is_in).tolist() == [number >= patience, False, number >= 10 + patience]
+    assert progress.take(np.array([True, False, False])).is_over(conflicts[:1]).tolist() == [True]
 
 
 def test_another_answer_is_preferred_by_its_rank_then_its_energy_or_its_depth():

@@ -13,8 +13,8 @@ import numpy as np
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.contact.acceptance import Limits
 from tolcontact.contact.candidates import Candidates
-from tolcontact.contact.least_penetration import LeastPenetration
 from tolcontact.contact.linear_step import PENETRATION, LinearStep, Step
+from tolcontact.contact.progress import Progress
 from tolcontact.contact.scan import min_gaps
 from tolcontact.contact.state import State, Task, Unsettled
 
@@ -48,7 +48,7 @@ STEPS_WHERE_FACES_END = (
 
 def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
-    unsettled, least = Unsettled(task, state), LeastPenetration.unknown(state)
+    unsettled, progress = Unsettled(task, state), Progress.unknown(state)
     trail: list[np.ndarray] = []
     if not len(task):
         return
@@ -77,7 +77,7 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         unsettled.settle(~moves)
         # What rests while it is held back need not be held back longer.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
-        unrest, least, trail = unrest[moves], least.take(moves), [poses[moves] for poses in trail]
+        unrest, progress, trail = unrest[moves], progress.take(moves), [poses[moves] for poses in trail]
         if not len(unsettled):
             return
         if candidates.bounded:
@@ -86,18 +86,20 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
             )
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
-            least.look(unsettled.state, _true_penetration(unsettled.task, unsettled.state), is_held=kind.firmness > 1)
-            ends = least.is_final & (unsettled.state.slack > PENETRATION).any(axis=1)
-            _end(unsettled, least, unrest, ends)
-            asleep, unrest, least, trail = asleep[~ends], unrest[~ends], least.take(~ends), [poses[~ends] for poses in trail]
-    _end(unsettled, least, unrest, np.ones(len(unsettled), dtype=bool))
+            penetration = _true_penetration(unsettled.task, unsettled.state)
+            progress.look(unsettled.state, penetration, unrest, is_held=kind.firmness > 1)
+            ends = progress.is_over(_is_stuck(unsettled.state))
+            _end(unsettled, progress, unrest, ends)
+            asleep, unrest, progress = asleep[~ends], unrest[~ends], progress.take(~ends)
+            trail = [poses[~ends] for poses in trail]
+    _end(unsettled, progress, unrest, np.ones(len(unsettled), dtype=bool))
 
 
-def _end(unsettled: Unsettled, least: LeastPenetration, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
+def _end(unsettled: Unsettled, progress: Progress, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
     """End realizations without rest (n,): parts that contradict each other where their penetration was least."""
     state = unsettled.state
-    stuck = np.flatnonzero(ends & (state.slack > PENETRATION).any(axis=1) & least.is_known)
-    state.put_answer(stuck, least.state.take(stuck))
+    stuck = np.flatnonzero(ends & _is_stuck(state) & progress.is_known)
+    state.put_answer(stuck, progress.best.take(stuck))
     residual = np.maximum(state.kkt_residual, np.where(state.in_conflict, 0, unrest))
     state.kkt_residual[ends] = residual[ends]
     unsettled.settle(ends)
@@ -119,7 +121,12 @@ def _goes_round(trail: Sequence[np.ndarray], state: State) -> Bool[Array, " n"]:
     if len(trail) < 2:
         return np.zeros(len(state), dtype=bool)
     two, one = (np.abs(state.poses - poses).reshape(len(state), -1).max(axis=1) for poses in trail)
-    return (two < CLOSED) & (one > 10 * CLOSED) & ~(state.slack > PENETRATION).any(axis=1)
+    return (two < CLOSED) & (one > 10 * CLOSED) & ~_is_stuck(state)
+
+
+def _is_stuck(state: State) -> Bool[Array, " n"]:
+    """Return whether parts contradict each other (n,)."""
+    return np.any(state.slack > PENETRATION, axis=1)
 
 
 def _true_penetration(task: Task, state: State) -> Float[Array, "n pair"]:

@@ -1,0 +1,68 @@
+"""The progress of repeated steps: the least true penetration and the smallest step so far, and when they fell last."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tolcontact.arrays import Array, Bool, Float, Int
+from tolcontact.contact.state import State
+
+ASTRAY_WEIGHT = 1e3  # of a locator that does not hold, beside penetration
+PATIENCE_IN_CONFLICT, MIN_GAIN = 10, 1e-3  # steps without less penetration, and the share of it that counts as less
+PATIENCE, MIN_CALMING = 20, 0.1  # steps that are not smaller than all before, and the share that counts as smaller
+
+
+@dataclass(eq=False)
+class Progress:
+    """What was reached, and for how many steps, not held back, nothing better was.
+
+    best       State (n) of least true penetration; its `slack` is the penetration of each pair
+    violation  (n,) [mm] of these poses: infinite as long as none is known
+    stale      (n,) number of steps since the violation fell
+    unrest     (n,) [mm]: the smallest step
+    restless   (n,) number of steps since then
+    """
+
+    best: State
+    violation: Float[Array, " n"]
+    stale: Int[Array, " n"]
+    unrest: Float[Array, " n"]
+    restless: Int[Array, " n"]
+
+    @classmethod
+    def unknown(cls, state: State) -> "Progress":
+        """Return the progress before the first step."""
+        count = len(state)
+        violation, unrest = np.full((2, count), np.inf)
+        stale, restless = np.zeros((2, count), dtype=int)
+        return cls(state.take(np.arange(count)), violation, stale, unrest, restless)
+
+    @property
+    def is_known(self) -> Bool[Array, " n"]:
+        """(n,): whether there were poses to compare."""
+        return np.isfinite(self.violation)
+
+    def is_over(self, in_conflict: Bool[Array, " n"]) -> Bool[Array, " n"]:
+        """Return whether further steps are not expected to gain (n,): drift, cycles and chaos gain nothing at all."""
+        return np.where(in_conflict, self.stale >= PATIENCE_IN_CONFLICT, self.restless >= PATIENCE)
+
+    def look(self, state: State, penetration: Float[Array, "n pair"], unrest: Float[Array, " n"], *, is_held: bool) -> None:
+        """Keep the poses of a state (n), with their true penetration [mm], where they are better than all before.
+
+        unrest    (n,) [mm]: the size of the step
+        is_held   whether the step was held back
+        """
+        candidate = state.take(np.arange(len(state)))
+        candidate.slack[:] = penetration
+        violation = candidate.slack.max(axis=1, initial=0) + ASTRAY_WEIGHT * candidate.astray
+        falls, calms = violation < (1 - MIN_GAIN) * self.violation, unrest < (1 - MIN_CALMING) * self.unrest
+        self.stale = np.where(falls | is_held, 0, self.stale + 1)
+        self.restless = np.where(calms | is_held, 0, self.restless + 1)
+        better = np.flatnonzero(violation < self.violation)
+        self.best.put(better, candidate.take(better))
+        self.violation[better] = violation[better]
+        self.unrest = np.minimum(self.unrest, unrest)
+
+    def take(self, rows: np.ndarray) -> "Progress":
+        """Return the progress of some realizations."""
+        return Progress(self.best.take(rows), self.violation[rows], self.stale[rows], self.unrest[rows], self.restless[rows])
