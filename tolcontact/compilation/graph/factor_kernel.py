@@ -113,15 +113,15 @@ def remove(layout, work, position):  # type: ignore[no-untyped-def]
 
 
 @inlined_inner
-def _eliminated(layout, work, j, position, value):  # type: ignore[no-untyped-def]
-    """Return an entry of the factor's next row, in a column of joint j, for its Gram entry."""
-    factor, column = work.factor, work.positions[COLUMN]
+def _eliminated(layout, work, j, position, value, solution):  # type: ignore[no-untyped-def]
+    """Return a right side's value at a position of joint j, less what the solution (position,) before it contributes."""
+    factor = work.factor
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         start = layout.joints[layout.prior[q, 0], POSITION]
         for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
-            value -= factor[position, t] * column[t]
+            value -= factor[position, t] * solution[t]
     for t in range(layout.joints[j, POSITION], position):
-        value -= factor[position, t] * column[t]
+        value -= factor[position, t] * solution[t]
     return value
 
 
@@ -138,13 +138,13 @@ def _factor_row(layout, work, j, position, threshold):  # type: ignore[no-untype
         k, adjacent = layout.prior[q, 0], layout.prior[q, 1]
         for t in range(layout.joints[k, POSITION], layout.joints[k, POSITION] + work.joints[k, COUNT]):
             value = product(layout.blocks, work.slopes, carrying[t], scatter) if adjacent else 0.0
-            column[t] = _eliminated(layout, work, k, t, value) / factor[t, t]
+            column[t] = _eliminated(layout, work, k, t, value, column) / factor[t, t]
             rest -= column[t] * column[t]
     for t in range(start, position):
         value = product(layout.blocks, work.slopes, carrying[t], scatter)
         if work.joints[j, OPEN]:
             value += opening * work.rows[carrying[t], OPENING]
-        column[t] = _eliminated(layout, work, j, t, value) / factor[t, t]
+        column[t] = _eliminated(layout, work, j, t, value, column) / factor[t, t]
         rest -= column[t] * column[t]
     for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
         k = layout.prior[q, 0]
@@ -200,14 +200,7 @@ def solve(layout, work, values):  # type: ignore[no-untyped-def]
     factor = work.factor
     for j in range(work.joints.shape[0]):
         for position in range(layout.joints[j, POSITION], layout.joints[j, POSITION] + work.joints[j, COUNT]):
-            value = values[position]
-            for q in range(layout.joints[j, PRIOR], layout.joints[j + 1, PRIOR]):
-                start = layout.joints[layout.prior[q, 0], POSITION]
-                for t in range(start, start + work.joints[layout.prior[q, 0], COUNT]):
-                    value -= factor[position, t] * values[t]
-            for t in range(layout.joints[j, POSITION], position):
-                value -= factor[position, t] * values[t]
-            values[position] = value / factor[position, position]
+            values[position] = _eliminated(layout, work, j, position, values[position], values) / factor[position, position]
     for j in range(work.joints.shape[0] - 1, -1, -1):
         for position in range(layout.joints[j, POSITION] + work.joints[j, COUNT] - 1, layout.joints[j, POSITION] - 1, -1):
             value = values[position] / factor[position, position]
