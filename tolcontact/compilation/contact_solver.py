@@ -12,6 +12,7 @@ from tolcontact.compilation.functions import InterpretedFunction, flat
 from tolcontact.compilation.graph import GraphSolver
 from tolcontact.compilation.outcome import SOLUTION
 from tolcontact.compilation.plugins import ACCURACY, PLUGINS, Plugin, solver
+from tolcontact.compilation.polish_kernel import solve_conditions
 from tolcontact.mechanics.quiet import CONSTRUCTION_LOCK, quiet
 
 COMPLIANCE = 1e-9  # of the rows, so that dependent rows have a solution; refinement removes its effect
@@ -40,34 +41,12 @@ def polished(
     all_rows = np.concatenate([A, slack_rows], axis=1)
     is_equation = np.concatenate([carries, at_zero], axis=1)
     all_bounds = np.concatenate([lower, np.zeros((count, slacks))], axis=1)
-    C = np.where(is_equation[..., None], all_rows, 0.0)
-    idle = np.eye(rows + slacks) * ~is_equation[:, None, :]
-    K = np.concatenate(
-        [np.concatenate([H, -C.swapaxes(1, 2)], axis=2), np.concatenate([C, idle], axis=2)],
-        axis=1,
-    )
-    right_side = np.concatenate([-g, np.where(is_equation, all_bounds, 0.0)], axis=1)
-    regularized = K.copy()
-    regularized[:, size:, size:] += COMPLIANCE * np.eye(rows + slacks) * is_equation[:, None, :]
-    solution = np.zeros_like(right_side)
-    inverse = _inverse(regularized)
-    for _ in range(REFINEMENTS):
-        remainder = right_side - np.einsum("kij,kj->ki", K, solution)
-        solution += np.einsum("kij,kj->ki", inverse, remainder)
+    solution = np.empty((count, size + rows + slacks))
+    solve_conditions(H, g, all_rows, all_bounds, is_equation, COMPLIANCE, REFINEMENTS, solution)
     x, multipliers = solution[:, :size], solution[:, size:]
     lam_x = np.zeros_like(x)
     lam_x[:, size - slacks :] = -multipliers[:, rows:]
     return {"x": x, "lam_a": -multipliers[:, :rows], "lam_x": lam_x}
-
-
-def _inverse(matrices: np.ndarray) -> np.ndarray:
-    """Return the inverses (QP, n, n), NaN for a singular matrix, which must not spoil the others."""
-    try:
-        return np.linalg.inv(matrices)
-    except np.linalg.LinAlgError:
-        if len(matrices) == 1:
-            return np.full_like(matrices, np.nan)
-        return np.concatenate([_inverse(matrix[None]) for matrix in matrices])
 
 
 QP = ("h", "g", "a", "lba", "uba")  # outputs of `assemble` that a solver needs
