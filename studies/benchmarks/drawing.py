@@ -45,7 +45,12 @@ class Shape:
 
     @property
     def anchor(self) -> tuple[float, float]:
-        """The place of its label: the middle."""
+        """The place of its label: the middle; in a circle near the top, and at the tail of a force."""
+        if self.kind == "circle":
+            x, y, radius = self.numbers
+            return x, y + 0.7 * radius
+        if self.kind == "force":
+            return self.points[0]
         xs, ys = zip(*self.points, strict=True)
         return (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
 
