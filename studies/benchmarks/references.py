@@ -19,9 +19,9 @@ def recomputed(problem: Problem) -> Iterator[tuple[Quantity, float, float]]:
     yield from ((quantity, float(first), float(second)) for quantity, first, second in rows)
 
 
-def is_confirmed(quantity: Quantity, *found: float) -> bool:
-    """Return whether all values found are the stated one."""
-    return bool(np.allclose(found, quantity.expected, rtol=0, atol=quantity.tolerance))
+def is_confirmed(quantity: Quantity, *recomputed_values: float) -> bool:
+    """Return whether all recomputed values are the stated one."""
+    return bool(np.allclose(recomputed_values, quantity.expected, rtol=0, atol=quantity.tolerance))
 
 
 def main() -> int:
@@ -29,9 +29,9 @@ def main() -> int:
     sys.modules["tolcontact"] = ModuleType("tolcontact")
     are_confirmed = []
     for problem in problems(sys.argv[1:]):
-        for quantity, *found in recomputed(problem):
-            are_confirmed.append(is_confirmed(quantity, *found))
-            numbers = "  ".join(f"{value:.10g}" for value in (quantity.expected, *found))
+        for quantity, *values in recomputed(problem):
+            are_confirmed.append(is_confirmed(quantity, *values))
+            numbers = "  ".join(f"{value:.10g}" for value in (quantity.expected, *values))
             print(f"{'ok   ' if are_confirmed[-1] else 'WRONG'} {problem.name}: {quantity.label}  {numbers}", flush=True)
     print(f"{sum(are_confirmed)} of {len(are_confirmed)} expected values are confirmed in two ways")
     return int(not all(are_confirmed))
