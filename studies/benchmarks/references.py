@@ -1,7 +1,7 @@
 """Compute every expected value in two ways, with NumPy and SciPy alone: python -m studies.benchmarks.references [NAMES].
 
-The exit code is 1 if one of them is not the stated value, within its tolerance. It runs where only NumPy and SciPy are installed:
-empty modules stand for what the models need, so that no expected value can come from it.
+The exit code is 1 if one of them is not the stated value, within its tolerance. NumPy and SciPy suffice: empty modules
+stand for what the models need, so that no expected value can come from it.
 """
 
 import sys
