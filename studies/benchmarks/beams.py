@@ -16,6 +16,6 @@ def beam_stiffness(length: float, elements: int, bending: float) -> np.ndarray:
 
 def condensed(stiffness: np.ndarray, kept: list[int]) -> np.ndarray:
     """Return the stiffness of the `kept` freedoms, the others free of forces."""
-    own, rest = np.array(kept), np.setdiff1d(np.arange(len(stiffness)), kept)
-    coupling = stiffness[np.ix_(own, rest)]
-    return stiffness[np.ix_(own, own)] - coupling @ np.linalg.solve(stiffness[np.ix_(rest, rest)], coupling.T)
+    outer, inner = np.array(kept), np.setdiff1d(np.arange(len(stiffness)), kept)
+    coupling = stiffness[np.ix_(outer, inner)]
+    return stiffness[np.ix_(outer, outer)] - coupling @ np.linalg.solve(stiffness[np.ix_(inner, inner)], coupling.T)

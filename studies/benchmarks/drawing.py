@@ -1,6 +1,6 @@
 """Drawings of problems: SVG made from shapes, each a line of text in a statement. Lengths in mm, y up; not to scale.
 
-box X Y WIDTH HEIGHT [label]      with its lower left corner at X Y
+box X Y WIDTH HEIGHT [label]      with its lower x_min corner at X Y
 circle X Y RADIUS [label]
 polygon X Y X Y X Y ... [label]
 line X Y X Y [label]
@@ -36,16 +36,21 @@ class Shape:
     @property
     def points(self) -> Points:
         """The points that it reaches to; of a circle and a box, opposite corners."""
-        x, y, *rest = self.numbers
+        x, y, *lengths = self.numbers
         if self.kind == "box":
-            return [(x, y), (x + rest[0], y + rest[1])]
+            return [(x, y), (x + lengths[0], y + lengths[1])]
         if self.kind == "circle":
-            return [(x - rest[0], y - rest[0]), (x + rest[0], y + rest[0])]
+            return [(x - lengths[0], y - lengths[0]), (x + lengths[0], y + lengths[0])]
         return list(zip(self.numbers[::2], self.numbers[1::2], strict=True))
 
     @property
     def anchor(self) -> tuple[float, float]:
-        """The place of its label: the middle."""
+        """The place of its label: the middle; in a circle near the y_max, and at the tail of a force."""
+        if self.kind == "circle":
+            x, y, radius = self.numbers
+            return x, y + 0.7 * radius
+        if self.kind == "force":
+            return self.points[0]
         xs, ys = zip(*self.points, strict=True)
         return (min(xs) + max(xs)) / 2, (min(ys) + max(ys)) / 2
 
@@ -91,19 +96,19 @@ HEAD = (
 
 def svg(shapes: tuple[str, ...]) -> str:
     """Return the picture of these shapes. Raises ValueError for a line that is none."""
-    drawn = [Shape(text) for text in shapes]
-    xs, ys = zip(*(point for shape in drawn for point in shape.points), strict=True)
+    elements = [Shape(text) for text in shapes]
+    xs, ys = zip(*(point for shape in elements for point in shape.points), strict=True)
     margin = MARGIN * max(max(xs) - min(xs), max(ys) - min(ys))
-    left, top = min(xs) - margin, max(ys) + margin
-    scale = WIDTH / (max(xs) + margin - left)
-    height = (top - min(ys) + margin) * scale
+    x_min, y_max = min(xs) - margin, max(ys) + margin
+    scale = WIDTH / (max(xs) + margin - x_min)
+    height = (y_max - min(ys) + margin) * scale
 
     def placed(points: Points) -> Points:
-        return [((x - left) * scale, (top - y) * scale) for x, y in points]
+        return [((x - x_min) * scale, (y_max - y) * scale) for x, y in points]
 
-    bodies = [ELEMENTS[shape.kind](placed(shape.points)) for shape in drawn]
+    bodies = [ELEMENTS[shape.kind](placed(shape.points)) for shape in elements]
     labels = []
-    for shape in drawn:
+    for shape in elements:
         ((x, y),) = placed([shape.anchor])
         labels.append(f'<text x="{x:.1f}" y="{y - 4:.1f}">{escape(shape.label)}</text>' if shape.label else "")
     inside = "".join([f"<defs><style>{STYLE}</style>{HEAD}</defs>", *bodies, *labels])

@@ -132,10 +132,10 @@ def rare(problem: Problem, model: Model) -> Iterator[tuple]:
         form = ot.FORM(optimizer, event)
         form.run()
         value = form.getResult().getEventProbability()
-        found = value, 0.99 * value, 1.01 * value
+        bounded_value = value, 0.99 * value, 1.01 * value
     except (RuntimeError, TypeError):  # it does not converge where the measure does not change
-        found = NO_VALUE
-    yield quantity, "OpenTURNS, FORM", found, calls
+        bounded_value = NO_VALUE
+    yield quantity, "OpenTURNS, FORM", bounded_value, calls
     calls = 0
     subset = ot.SubsetSampling(event)
     subset.setMaximumOuterSampling(10_000)
@@ -155,12 +155,12 @@ def indices(problem: Problem, model: Model) -> Iterator[tuple]:
     x = np.column_stack(
         [[d.computeQuantile(p)[0] for p in column] for d, column in zip(model.deviations, clipped.T, strict=True)]
     )
-    found = sobol_analysis.analyze(setting, model.measure(x), calc_second_order=False, conf_level=0.999, seed=1)
+    sobol_indices = sobol_analysis.analyze(setting, model.measure(x), calc_second_order=False, conf_level=0.999, seed=1)
     for quantity in problem.quantities:
         kind = "S1" if quantity.name.startswith("first") else "ST" if quantity.name.startswith("total") else None
         if kind:
             place = int(quantity.name[-1]) - 1 if quantity.name[-1].isdigit() else 0
-            value, half = found[kind][place], found[f"{kind}_conf"][place]
+            value, half = sobol_indices[kind][place], sobol_indices[f"{kind}_conf"][place]
             yield quantity, "SALib, Sobol'", (value, value - half, value + half), len(x)
 
 

@@ -30,22 +30,22 @@ def shown(problem: Problem) -> dict[str, Any]:
     }
 
 
-def write(folder: Path, chosen: Sequence[Problem]) -> None:
+def write(folder: Path, selection: Sequence[Problem]) -> None:
     """Write the pages of problems into a folder, which is created if it is missing."""
     folder.mkdir(parents=True, exist_ok=True)
     environment = jinja2.Environment(loader=jinja2.FileSystemLoader(HERE), autoescape=True, trim_blocks=True)
     template = environment.get_template("page.html.j2")
-    for problem in chosen:
+    for problem in selection:
         page = template.render(title=problem.title, **shown(problem))
         (folder / f"{problem.name}.html").write_text(page, encoding="utf-8")
-    sections = {section: [problem for problem in chosen if problem.section == section] for section in SECTIONS}
+    sections = {section: [problem for problem in selection if problem.section == section] for section in SECTIONS}
     page = template.render(title="A benchmark of tolerance analysis", sections=sections)
     (folder / "index.html").write_text(page, encoding="utf-8")
 
 
 def main() -> None:
-    folder, *chosen = sys.argv[1:] or sys.exit(str(__doc__).splitlines()[0])
-    write(Path(folder), problems(chosen))
+    folder, *selection = sys.argv[1:] or sys.exit(str(__doc__).splitlines()[0])
+    write(Path(folder), problems(selection))
 
 
 if __name__ == "__main__":

@@ -49,9 +49,9 @@ def leaning_wall(
     `off` [mm] is the distribution of its displacement, and `tilt` [rad] that of its angle; None for what does not vary.
     """
     part = model.part(name, tc.Box(1, 2 * arm, 2 * arm), at=(x, -arm, 0), fixed=True)
-    rest = {"Z1": ((0, 0, 0), "z"), "Z2": ((1, 0, 0), "z"), "Z3": ((0, 2 * arm, 0), "z"), "Y": ((0, 0, 0), "y")}
+    guides = {"Z1": ((0, 0, 0), "z"), "Z2": ((1, 0, 0), "z"), "Z3": ((0, 2 * arm, 0), "z"), "Y": ((0, 0, 0), "y")}
     ends = [tc.Locator(f"X{k}", (0, y, 0), "x", 0.0) for k, y in enumerate((0, 2 * arm))]
-    model.locate(part, [*(tc.Locator(key, point, axis, 0.0) for key, (point, axis) in rest.items()), *ends], on=on)
+    model.locate(part, [*(tc.Locator(key, point, axis, 0.0) for key, (point, axis) in guides.items()), *ends], on=on)
     for cause, tolerance, arms, units in (("off", off, (1.0, 1.0), "mm"), ("tilt", tilt, (-arm, arm), "rad")):
         if tolerance is not None:
             drives = {f"{name}.X{k}": arms[k] for k in (0, 1)}
@@ -66,19 +66,19 @@ def pins_and_slots(*, off: Any, tilt: Any, pin: float, slot: float, places: Any)
     """
     model = tc.Assembly("pins and slots", method=tc.Method(search="fixed", resolution="exact", objective="seating"))
     plate = model.part("plate", tc.Box(130, 40, 5), at=(0, -20, pin), fixed=False)
-    rest = {"A1": ((10, 5, 0), "z"), "A2": ((120, 5, 0), "z"), "A3": ((65, 35, 0), "z")}
-    rest |= {"B1": ((10, 0, 2), "y"), "B2": ((120, 0, 2), "y")}
+    guides = {"A1": ((10, 5, 0), "z"), "A2": ((120, 5, 0), "z"), "A3": ((65, 35, 0), "z")}
+    guides |= {"B1": ((10, 0, 2), "y"), "B2": ((120, 0, 2), "y")}
     stop = tc.Locator("stop", (0, 20, 2), "x", stats.uniform(-1, 1e-9), one_sided=True)
-    model.locate(plate, [*(tc.Locator(name, point, axis, 0.0) for name, (point, axis) in rest.items()), stop])
+    model.locate(plate, [*(tc.Locator(name, point, axis, 0.0) for name, (point, axis) in guides.items()), stop])
     model.force("push", at=plate.point(0, 20, 2), vector=(1, 0, 0))
     spread = {"off": off, "tilt": tilt, "arm": pin / 2}
     for k, x in enumerate(places):
-        left = leaning_wall(model, f"pin {k} left", x - pin / 2, on=plate, **spread)
-        right = leaning_wall(model, f"pin {k} right", x + pin / 2 - 1, on=plate, **spread)
+        pin_left = leaning_wall(model, f"pin {k} left", x - pin / 2, on=plate, **spread)
+        pin_right = leaning_wall(model, f"pin {k} right", x + pin / 2 - 1, on=plate, **spread)
         slot_left = leaning_wall(model, f"slot {k} left", x - slot / 2 - 1, **spread)
         slot_right = leaning_wall(model, f"slot {k} right", x + slot / 2, **spread)
-        model.contact(f"left {k}", moving=left.face("-x"), reference=slot_left.face("+x"), points="vertices")
-        model.contact(f"right {k}", moving=right.face("+x"), reference=slot_right.face("-x"), points="vertices")
+        model.contact(f"left {k}", moving=pin_left.face("-x"), reference=slot_left.face("+x"), points="vertices")
+        model.contact(f"right {k}", moving=pin_right.face("+x"), reference=slot_right.face("-x"), points="vertices")
     model.measure("slide", plate.point(0, 0, 0), along="x")
     return model
 
@@ -89,9 +89,9 @@ def ring(model: tc.Assembly, radius: float, height: float, feature: str, *tolera
     part = model.part("ring", tc.Mesh(shape), fixed=True)
     part.feature("bottom", part.face("-z"), datum="A")
     bore, rim = part.face(tc.Cylinder(inner=True)), part.face(tc.Cylinder(inner=False))
-    own, other = (bore, rim) if feature == "bore" else (rim, bore)
-    part.feature("other", other, datum="B")
-    return part.feature(feature, own, *tolerances)
+    face, other_face = (bore, rim) if feature == "bore" else (rim, bore)
+    part.feature("other", other_face, datum="B")
+    return part.feature(feature, face, *tolerances)
 
 
 def block(model: tc.Assembly, size: tuple[float, float, float], *tolerances: Any) -> tc.Feature:

@@ -83,16 +83,16 @@ def read(name: str) -> Problem:
 
 def names() -> list[str]:
     """Return the names of all problems, section by section."""
-    found = [path.stem for path in sorted(FOLDER.glob("*.json"))]
-    return sorted(found, key=lambda name: SECTIONS.index(read(name).section))
+    stems = [path.stem for path in sorted(FOLDER.glob("*.json"))]
+    return sorted(stems, key=lambda name: SECTIONS.index(read(name).section))
 
 
-def problems(chosen: Iterable[str] = ()) -> list[Problem]:
+def problems(selection: Iterable[str] = ()) -> list[Problem]:
     """Return the problems with these names, or all. Raises ValueError for a name that is none."""
-    every, chosen = names(), list(chosen)
-    if unknown := [name for name in chosen if name not in every]:
-        raise ValueError(f"no problem is named {', '.join(unknown)}; the problems are: {', '.join(every)}")
-    return [read(name) for name in chosen or every]
+    known_names, selection = names(), list(selection)
+    if unknown := [name for name in selection if name not in known_names]:
+        raise ValueError(f"no problem is named {', '.join(unknown)}; the problems are: {', '.join(known_names)}")
+    return [read(name) for name in selection or known_names]
 
 
 def numbers(script: str) -> SimpleNamespace:

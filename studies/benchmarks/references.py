@@ -1,7 +1,7 @@
 """Compute every expected value in two ways, with NumPy and SciPy alone: python -m studies.benchmarks.references [NAMES].
 
-The exit code is 1 if one of them is not the stated value, within its tolerance. It runs where tolcontact is not installed: an
-empty module stands for it, so that no expected value can come from it.
+The exit code is 1 if one of them is not the stated value, within its tolerance. NumPy and SciPy suffice: empty modules
+stand for what the models need, so that no expected value can come from it.
 """
 
 import sys
@@ -12,6 +12,8 @@ import numpy as np
 
 from studies.benchmarks.problem import Problem, Quantity, problems
 
+OF_MODELS = ("tolcontact", "casadi", "trimesh")
+
 
 def recomputed(problem: Problem) -> Iterator[tuple[Quantity, float, float]]:
     """Yield each quantity with its values by `solution` and by `check`."""
@@ -19,19 +21,19 @@ def recomputed(problem: Problem) -> Iterator[tuple[Quantity, float, float]]:
     yield from ((quantity, float(first), float(second)) for quantity, first, second in rows)
 
 
-def is_confirmed(quantity: Quantity, *found: float) -> bool:
-    """Return whether all values found are the stated one."""
-    return bool(np.allclose(found, quantity.expected, rtol=0, atol=quantity.tolerance))
+def is_confirmed(quantity: Quantity, *recomputed_values: float) -> bool:
+    """Return whether all recomputed values are the stated one."""
+    return bool(np.allclose(recomputed_values, quantity.expected, rtol=0, atol=quantity.tolerance))
 
 
 def main() -> int:
     """Print stated and recomputed values, and return the exit code."""
-    sys.modules["tolcontact"] = ModuleType("tolcontact")
+    sys.modules |= {name: ModuleType(name) for name in OF_MODELS}
     are_confirmed = []
     for problem in problems(sys.argv[1:]):
-        for quantity, *found in recomputed(problem):
-            are_confirmed.append(is_confirmed(quantity, *found))
-            numbers = "  ".join(f"{value:.10g}" for value in (quantity.expected, *found))
+        for quantity, *values in recomputed(problem):
+            are_confirmed.append(is_confirmed(quantity, *values))
+            numbers = "  ".join(f"{value:.10g}" for value in (quantity.expected, *values))
             print(f"{'ok   ' if are_confirmed[-1] else 'WRONG'} {problem.name}: {quantity.label}  {numbers}", flush=True)
     print(f"{sum(are_confirmed)} of {len(are_confirmed)} expected values are confirmed in two ways")
     return int(not all(are_confirmed))

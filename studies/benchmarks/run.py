@@ -73,11 +73,11 @@ def solved(problem: Problem) -> Solved:
     return Solved(problem, [*map(Figure, problem.quantities, estimates)], seconds, realizations)
 
 
-def report(chosen: list[Problem], console: Console) -> int:
+def report(selection: list[Problem], console: Console) -> int:
     """Print a table of all figures, and return the exit code."""
     table = Table("problem", *COLUMNS, "CPU s", "realizations / s")
     verdicts: list[str] = []
-    for problem in chosen:
+    for problem in selection:
         solution = solved(problem)
         for k, figure in enumerate(solution.figures):
             table.add_row(*([problem.name] if k == 0 else [""]), *figure.cells, *(solution.cost if k == 0 else ["", ""]))

@@ -26,10 +26,10 @@ def check():
     weight = stats.norm.pdf(x) * step
     c = np.sqrt(lift @ lift) * x
     slope = ENDS @ lift / (lift @ lift)  # regression of the line on c
-    rest = ENDS @ ENDS - slope**2 * (lift @ lift)
+    residual_variance = ENDS @ ENDS - slope**2 * (lift @ lift)
     height = slope * c + (1 - 2 * N.e) * np.maximum(c, 0)
     mean = weight @ height
-    return N.s * mean, N.s * np.sqrt(weight @ height**2 - mean**2 + rest)
+    return N.s * mean, N.s * np.sqrt(weight @ height**2 - mean**2 + residual_variance)
 
 
 def assembly():

@@ -65,7 +65,7 @@ def answers():
     estimates, count = [], 0
     for is_fixed in (True, False):
         for end, pull in ((0, -3.0), (1, 3.0)):
-            found = tc.worst_case(assembly(is_fixed, pull), solver="daqp")
-            estimates.append(an.within(found.worst.sel(measure="distance", state="corrected").values[end], 1e-6))
-            count += int(found.by_status.sum())
+            extremes = tc.worst_case(assembly(is_fixed, pull), solver="daqp")
+            estimates.append(an.within(extremes.worst.sel(measure="distance", state="corrected").values[end], 1e-6))
+            count += int(extremes.by_status.sum())
     return an.Answers(estimates, count)

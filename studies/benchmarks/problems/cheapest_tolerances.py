@@ -40,8 +40,8 @@ def assembly():
 def answers():
     names = [f"part{k}.S" for k in (1, 2, 3)]
     costs = dict(zip(names, N.costs, strict=True))
-    found = tc.allocate(assembly(), f"height: ppm {PPM}", costs=costs, samples=32_768, seed=an.SEED, solver="daqp")
-    cost = float(found.cost.sel(stage="after").sum())
-    ranges = found.range.sel(stage="after", group=names).values
+    allocation = tc.allocate(assembly(), f"height: ppm {PPM}", costs=costs, samples=32_768, seed=an.SEED, solver="daqp")
+    cost = float(allocation.cost.sel(stage="after").sum())
+    ranges = allocation.range.sel(stage="after", group=names).values
     # It simulates a search of unknown length, so no number of realizations is stated.
     return an.Answers([an.within(cost, 0.03 * cost), *(an.within(width, 0.12 * width) for width in ranges)], 0)

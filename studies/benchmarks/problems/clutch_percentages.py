@@ -49,5 +49,5 @@ def answers():
     labels = ["a.S", "c.S", "e.S"]
     slopes = tc.sensitivities(assembly(), samples=100, solver="daqp").sel(measure="angle")
     linear = tc.contributions(assembly(), samples=256, solver="daqp").sel(measure="angle")
-    found = [*slopes.nominal.sel(contributor=labels).values, *linear.linear.sel(group=labels).values]
-    return an.Answers([an.within(value, 1e-5) for value in found], int(slopes.by_status.sum() + linear.by_status.sum()))
+    values = [*slopes.nominal.sel(contributor=labels).values, *linear.linear.sel(group=labels).values]
+    return an.Answers([an.within(value, 1e-5) for value in values], int(slopes.by_status.sum() + linear.by_status.sum()))

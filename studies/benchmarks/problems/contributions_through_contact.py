@@ -24,12 +24,12 @@ def solution():
 def check():
     whole = np.hypot(N.sa, N.sb)
 
-    def share(own, other):
+    def share(sigma, other_sigma):
         def mean(x):
-            return other * stats.norm.pdf(x / other) + x * stats.norm.cdf(x / other)
+            return other_sigma * stats.norm.pdf(x / other_sigma) + x * stats.norm.cdf(x / other_sigma)
 
         moments = [
-            integrate.quad(lambda z, k=k: stats.norm.pdf(z) * mean(own * z) ** k, -10, 10, epsabs=1e-14)[0] for k in (1, 2)
+            integrate.quad(lambda z, k=k: stats.norm.pdf(z) * mean(sigma * z) ** k, -10, 10, epsabs=1e-14)[0] for k in (1, 2)
         ]
         second = integrate.quad(lambda h: h**2 * stats.norm.pdf(h, 0, whole), 0, 12 * whole, epsabs=1e-14)[0]
         return (moments[1] - moments[0] ** 2) / (second - moments[0] ** 2)
@@ -48,6 +48,8 @@ def assembly():
 
 
 def answers():
-    found = tc.contributions(assembly(), samples=8192, seed=an.SEED, solver="daqp").sel(measure="height", group="carrier.S")
-    indices = [an.of_analysis(found[kind].sel(state="corrected")) for kind in ("first", "total")]
-    return an.Answers([*indices, an.within(found.linear, 1e-6)], int(found.by_status.sum()))
+    contributions = tc.contributions(assembly(), samples=8192, seed=an.SEED, solver="daqp").sel(
+        measure="height", group="carrier.S"
+    )
+    indices = [an.of_analysis(contributions[kind].sel(state="corrected")) for kind in ("first", "total")]
+    return an.Answers([*indices, an.within(contributions.linear, 1e-6)], int(contributions.by_status.sum()))

@@ -19,16 +19,16 @@ def solution():
 
 
 def check():
-    # Independent causes: the mould by which both parts move together, the temperature, and a rest.
+    # Independent causes: the mould by which both parts move together, the temperature, and a remainder.
     together = N.s * np.sqrt(2 + 2 * N.rho)
-    rest = stats.norm(0, np.sqrt(2) * N.s)
+    remainder = stats.norm(0, np.sqrt(2) * N.s)
     heat = 2 * N.alpha * N.kelvin
     x = np.linspace(-9, 9, 1201)
     weight = stats.norm.pdf(x) * (x[1] - x[0])
     moved = together * x[:, None] + heat * x
     plane = weight[:, None] * weight
-    beyond = (plane * (rest.cdf(-N.limit - moved) + rest.sf(N.limit - moved))).sum()
-    return np.sqrt((plane * moved**2).sum() + integrate.quad(lambda y: y**2 * rest.pdf(y), -1, 1)[0]), beyond
+    beyond = (plane * (remainder.cdf(-N.limit - moved) + remainder.sf(N.limit - moved))).sum()
+    return np.sqrt((plane * moved**2).sum() + integrate.quad(lambda y: y**2 * remainder.pdf(y), -1, 1)[0]), beyond
 
 
 def assembly():

@@ -22,11 +22,15 @@ def check():
         points = np.column_stack([np.ones(12), rng.uniform([0, 0], [N.length, N.width], (12, 2)) / N.length])
         gaps = points @ rng.normal([-1, 0, 0], 0.3)
         active = gaps < 0
-        own = points[active]
+        penetrating = points[active]
         outside = {"type": "ineq", "fun": lambda q, g=gaps, p=points: g + p @ q}
         start = np.array([2.0, 0, 0])
         step = optimize.minimize(
-            lambda q, own=own: np.sum((own @ q) ** 2), start, method="SLSQP", constraints=outside, options={"ftol": 1e-14}
+            lambda q, penetrating=penetrating: np.sum((penetrating @ q) ** 2),
+            start,
+            method="SLSQP",
+            constraints=outside,
+            options={"ftol": 1e-14},
         ).x
         if active.sum() >= 3:
             worst = max(worst, np.abs(gaps + points @ step).max())

@@ -9,13 +9,16 @@ N = numbers(__file__)
 
 
 def solution():
-    angle = np.radians(N.angle)
-    return (N.clamp * np.sin(angle) / (N.weight + N.clamp * np.cos(angle)),)
+    angles = np.radians(N.angles)
+    return tuple(N.clamp * np.sin(angles) / (N.weight + N.clamp * np.cos(angles)))
 
 
 def check():
-    angle = np.radians(N.angle)
-    aside = np.sin(angle) * np.sqrt(0.5)
-    clamp = -N.clamp * np.array([aside, aside, np.cos(angle)])
     supports = [((x, y, 0), (0, 0, 1)) for x, y in ((10, 10), (90, 10), (50, 50))]
-    return (least_coefficient(supports, [((50, 30, 10), (0, 0, -N.weight)), ((50, 30, 20), clamp)]),)
+
+    def coefficient(angle):
+        aside = np.sin(angle) * np.sqrt(0.5)
+        clamp = -N.clamp * np.array([aside, aside, np.cos(angle)])
+        return least_coefficient(supports, [((50, 30, 10), (0, 0, -N.weight)), ((50, 30, 20), clamp)])
+
+    return tuple(map(coefficient, np.radians(N.angles)))

@@ -23,5 +23,5 @@ def check():
 
     x = np.linspace(0, 1, 50)
     start = np.vstack([N.H * x**3, 3 * N.H * x**2 / 150, 6 * N.H * x / 150**2, np.full_like(x, 6 * N.H / 150**3)])
-    found = integrate.solve_bvp(slopes, ends, x, start, p=[150.0], tol=1e-10)
-    return found.p[0], -BENDING * found.y[3, -1]
+    solution_on_length = integrate.solve_bvp(slopes, ends, x, start, p=[150.0], tol=1e-10)
+    return solution_on_length.p[0], -BENDING * solution_on_length.y[3, -1]

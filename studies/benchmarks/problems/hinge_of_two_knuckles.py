@@ -41,9 +41,9 @@ def check():
     def below(shift, weight):
         return stats.norm.cdf((x[:, None] - shift) / (np.sqrt(2) * N.T / 6)) @ weight
 
-    rest = 1 - below(*two) * below(shifts, weights)  # P(larger one > x)
+    survival = 1 - below(*two) * below(shifts, weights)  # P(larger one > x)
     # E h^k = (-r)^k + integral of k x^(k-1) P(h > x) from -r on.
-    first, second, third = ((-reach) ** k + w @ (k * x ** (k - 1) * rest) for k in (1, 2, 3))
+    first, second, third = ((-reach) ** k + w @ (k * x ** (k - 1) * survival) for k in (1, 2, 3))
     variance = second - first**2
     return first, np.sqrt(variance), (third - 3 * first * second + 2 * first**3) / variance**1.5
 

@@ -52,5 +52,5 @@ def answers():
     results = an.simulated(assembly(), 200_000, keep="all")
     x, y = (an.values(results, axis) for axis in "xy")
     size = results["sample"].deviation.sel(contributor="ring.bore.size").values
-    off = 2 * np.hypot(x, y)
-    return an.Answers([an.deviation(x), an.share(off > N.t), an.share(off > zone(size))], len(x))
+    deviation_width = 2 * np.hypot(x, y)
+    return an.Answers([an.deviation(x), an.share(deviation_width > N.t), an.share(deviation_width > zone(size))], len(x))

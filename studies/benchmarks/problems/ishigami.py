@@ -33,11 +33,11 @@ def check():
         return float(square - mean**2)
 
     total = variance(f, 0, 1, 2)
-    alone = [
+    main_effects = [
         variance(np.tensordot(np.tensordot(f, w, axes=(max(o), 0)), w, axes=(min(o), 0)), 0) for o in ((1, 2), (0, 2), (0, 1))
     ]
-    rest = [variance(np.tensordot(f, w, axes=(k, 0)), 0, 1) for k in range(3)]
-    return *(v / total for v in alone), *(1 - v / total for v in rest)
+    complements = [variance(np.tensordot(f, w, axes=(k, 0)), 0, 1) for k in range(3)]
+    return *(v / total for v in main_effects), *(1 - v / total for v in complements)
 
 
 def assembly():
@@ -54,7 +54,11 @@ def assembly():
 
 
 def answers():
-    found = tc.contributions(assembly(), samples=16_384, seed=an.SEED, solver="daqp").sel(measure="f", state="corrected")
+    contributions = tc.contributions(assembly(), samples=16_384, seed=an.SEED, solver="daqp").sel(
+        measure="f", state="corrected"
+    )
     groups = [f"{name}.S" for name in ("x1", "x2", "x3")]
-    indices = [an.of_analysis(kind.sel(group=group)) for kind in (found["first"], found["total"]) for group in groups]
-    return an.Answers(indices, int(found.by_status.sum()))
+    indices = [
+        an.of_analysis(kind.sel(group=group)) for kind in (contributions["first"], contributions["total"]) for group in groups
+    ]
+    return an.Answers(indices, int(contributions.by_status.sum()))

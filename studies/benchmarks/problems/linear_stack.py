@@ -19,10 +19,10 @@ def solution():
 
 def check():
     x, step = np.linspace(-0.8, 0.8, 16_001, retstep=True)
-    first, *rest = (stats.norm.pdf(x, 0, width / 6) for width in WIDTHS)
-    density = first
-    for other in rest:
-        density = signal.fftconvolve(density, other, mode="same") * step
+    first_density, *further_densities = (stats.norm.pdf(x, 0, width / 6) for width in WIDTHS)
+    density = first_density
+    for next_density in further_densities:
+        density = signal.fftconvolve(density, next_density, mode="same") * step
     mean = integrate.simpson(density * x, x=x)
     below = x <= N.limit - NOMINAL + step / 2
     spread = np.sqrt(integrate.simpson(density * (x - mean) ** 2, x=x))

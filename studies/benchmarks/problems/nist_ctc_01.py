@@ -32,8 +32,8 @@ def check():
     widths = [length(match.group(1)) for record in records.values() if (match := tolerance.search(record))]
     pairs = re.findall(r"TOLERANCE_VALUE\(#(\d+),#(\d+)\)", text)
     limits = [(length(lower), length(upper)) for lower, upper in pairs]
-    (own,) = [pair for pair in limits if abs(pair[0] + 0.1) < 1e-9]
-    return len(widths), sum(widths), N.nominal + sum(own) / 2, (own[1] - own[0]) / 6
+    (limits_of_bore,) = [pair for pair in limits if abs(pair[0] + 0.1) < 1e-9]
+    return len(widths), sum(widths), N.nominal + sum(limits_of_bore) / 2, (limits_of_bore[1] - limits_of_bore[0]) / 6
 
 
 def step_file():
@@ -55,9 +55,9 @@ def assembly():
 def answers():
     tolerances = tc.read_pmi(step_file()).tolerances
     results = an.simulated(assembly(), 20_000, keep="all")
-    drawn = results["sample"].deviation
-    (label,) = [name for name in drawn.contributor.values if "cylinder 53" in name and name.endswith("size")]
-    size = N.nominal + drawn.sel(contributor=label).values
+    deviations = results["sample"].deviation
+    (label,) = [name for name in deviations.contributor.values if "cylinder 53" in name and name.endswith("size")]
+    size = N.nominal + deviations.sel(contributor=label).values
     widths = [tolerance.value or 0.0 for tolerance in tolerances]
     stated = an.within(len(tolerances), 0), an.within(sum(widths), 1e-9)
     return an.Answers([*stated, an.mean(size), an.deviation(size)], len(size))

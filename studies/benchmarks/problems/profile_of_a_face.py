@@ -17,8 +17,8 @@ def solution():
         x = (nodes + 1) / 2
 
         def given(a):
-            rest = (reach - a) * x
-            return (reach - a) / 2 * weights @ (stats.halfnorm.pdf(rest) * stats.halfnorm.cdf(reach - a - rest))
+            remainder = (reach - a) * x
+            return (reach - a) / 2 * weights @ (stats.halfnorm.pdf(remainder) * stats.halfnorm.cdf(reach - a - remainder))
 
         return integrate.quad(lambda a: stats.halfnorm.pdf(a) * given(a), 0, reach, epsabs=1e-13)[0]
 

@@ -40,11 +40,11 @@ def assembly():
 
 def answers():
     results = an.simulated(assembly(), 10_000, keep="all")
-    phi, drawn = an.values(results, "angle"), results["sample"].deviation
-    a = N.a + drawn.sel(contributor="hub.flat.offset").values
+    phi, deviations = an.values(results, "angle"), results["sample"].deviation
+    a = N.a + deviations.sel(contributor="hub.flat.offset").values
     c, e = (
-        nominal + drawn.sel(contributor=label).values / 2
+        nominal + deviations.sel(contributor=label).values / 2
         for nominal, label in ((N.c, "roller.barrel.size"), (N.e, "ring.bore.size"))
     )
-    off = np.abs(phi - np.degrees(np.arccos((a + c) / (e - c)))).max()
-    return an.Answers([an.mean(phi), an.deviation(phi), an.within(off, 1e-5)], len(phi))
+    difference = np.abs(phi - np.degrees(np.arccos((a + c) / (e - c)))).max()
+    return an.Answers([an.mean(phi), an.deviation(phi), an.within(difference, 1e-5)], len(phi))
