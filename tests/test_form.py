@@ -1,5 +1,8 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
@@ -8,6 +11,8 @@ import tolcontact as tc
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, simulate
 from tolcontact.errors import ModelError
+from tolcontact.features import FormField, nominal_features
+from tolcontact.features.form_field import form_field
 from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
@@ -47,6 +52,55 @@ def test_a_seat_is_the_one_of_a_linear_programme_on_the_same_heights(width, erro
     form = coefficients(program, run, "under") @ modes_at(program, "under", foot).T
     planes = np.array([seated(of_one, places[:, :2]) for of_one in heights])
     np.testing.assert_allclose(run["measured"][:, CORRECTED, 4], planes @ [1, 30, 20] - form[:, 0], atol=error)
+
+
+@dataclass(frozen=True, eq=False)
+class OneMode(FormField):
+    """A form of one mode, given by hand as a function of coordinates from -1 to 1 on the underside of the block."""
+
+    shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+    def heights(self, points):
+        return self.shape((points[..., 0] - 50) / 50, (points[..., 1] - 25) / 25)[..., None]
+
+    def placed(self, R, t):
+        assert (R == np.eye(3)).all() and not t.any()
+        return self
+
+
+def seat_of_one_mode(monkeypatch, shape):
+    """Measures (realization, measure) of a seat whose form is one mode, and its coefficients (realization,)."""
+
+    def by_hand(form, surface):
+        field = form_field(form, surface)
+        assert field.modes == 1
+        return OneMode(**vars(field), shape=shape)
+
+    monkeypatch.setattr(nominal_features, "form_field", by_hand)
+    program, run = simulate(seat(tc.Form(modes=1)), samples=60, solver="daqp", method=SEATED)
+    assert (run["status"] == Status.RESOLVED).all() and run["gap_min"][:, CORRECTED].min() > -1e-9
+    return run["measured"][:, CORRECTED], coefficients(program, run, "under")[:, 0]
+
+
+def test_a_bowl_rests_on_its_rim(monkeypatch):
+    measured, c = seat_of_one_mode(monkeypatch, lambda x, y: x**2 + y**2 - 2 / 3)
+    bowls = c > 0
+    np.testing.assert_allclose(measured[bowls, :4], 4 / 3 * np.outer(c[bowls], np.ones(4)), atol=1e-6)
+    # A dome touches where it is pressed. Contact points lie at most 5 mm from there.
+    x, y = (PRESS - [50, 25]) / [50, 25]
+    pressed = c[~bowls] * (x**2 + y**2 - 2 / 3)
+    assert (measured[~bowls, 3] <= pressed + 1e-6).all()
+    assert (measured[~bowls, 3] >= pressed - np.abs(c[~bowls]) * (5 / 25) ** 2).all()
+
+
+def test_a_saddle_rocks_onto_three_corners(monkeypatch):
+    """Above the saddle c x y the lowest plane that holds the force is c (1 - x + y), or -c (1 + x + y) if c is negative."""
+    measured, c = seat_of_one_mode(monkeypatch, lambda x, y: x * y)
+    corners = np.array([(-1, -1), (1, -1), (0, 1), (PRESS - [50, 25]) / [50, 25]])
+    x, y = corners.T
+    expected = np.where(c[:, None] > 0, c[:, None] * (1 - x + y), -c[:, None] * (1 + x + y))
+    np.testing.assert_allclose(measured[:, :4], expected, atol=1e-5)
+    assert np.abs(c).max() > 0.01
 
 
 def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points():
@@ -148,3 +202,8 @@ def test_contact_points_too_far_apart_for_a_form_are_refused():
         a.contact("c", moving=block.feature("f", block.face("-z"), tc.Flatness(0.1)), reference=base.face("+z"), points=8)
 
     assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)
+
+
+def test_feet_that_are_projected_again_have_no_form():
+    with pytest.raises(ModelError, match=r'contact pair "seat": the search is "iterated".*top has form'):
+        tc.build(sliding(), method=tc.Method(search="iterated"))
