@@ -1,7 +1,7 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,10 +9,12 @@ from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases.seats import PRESS, seat, sliding
-from tests.helpers import SEATED, simulate
+from tests.helpers import SEATED, joined, simulate
+from tolcontact.compilation import compile_program
+from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
-from tolcontact.features import FormField, nominal_features
-from tolcontact.features.form_field import form_field
+from tolcontact.features import FormField
+from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
@@ -63,27 +65,23 @@ class OneMode(FormField):
     def heights(self, points):
         return self.shape((points[..., 0] - 50) / 50, (points[..., 1] - 25) / 25)[..., None]
 
-    def placed(self, R, t):
-        assert (R == np.eye(3)).all() and not t.any()
-        return self
 
-
-def seat_of_one_mode(monkeypatch, shape):
+def seat_of_one_mode(shape):
     """Measures (realization, measure) of a seat whose form is one mode, and its coefficients (realization,)."""
-
-    def by_hand(form, surface):
-        field = form_field(form, surface)
-        assert field.modes == 1
-        return OneMode(**vars(field), shape=shape)
-
-    monkeypatch.setattr(nominal_features, "form_field", by_hand)
-    program, run = simulate(seat(tc.Form(modes=1)), samples=60, solver="daqp", method=SEATED)
+    nominal = discretize(seat(tc.Form(modes=1)))
+    pair, *supports = nominal.pairs
+    face = pair.deviating[0]
+    by_hand = OneMode(**vars(face.form), shape=shape)
+    offsets = Offsets(face.form_columns, by_hand.heights(pair.P_m).T)
+    pair = replace(pair, offsets=offsets, deviating=(replace(face, form=by_hand), None))
+    program = compile_program(replace(nominal, pairs=(pair, *supports)), "daqp", SEATED)
+    run = joined(simulate_blocks(program, samples=60, seed=1))
     assert (run["status"] == Status.RESOLVED).all() and run["gap_min"][:, CORRECTED].min() > -1e-9
     return run["measured"][:, CORRECTED], coefficients(program, run, "under")[:, 0]
 
 
-def test_a_bowl_rests_on_its_rim(monkeypatch):
-    measured, c = seat_of_one_mode(monkeypatch, lambda x, y: x**2 + y**2 - 2 / 3)
+def test_a_bowl_rests_on_its_rim():
+    measured, c = seat_of_one_mode(lambda x, y: x**2 + y**2 - 2 / 3)
     bowls = c > 0
     np.testing.assert_allclose(measured[bowls, :4], 4 / 3 * np.outer(c[bowls], np.ones(4)), atol=1e-6)
     # A dome touches where it is pressed. Contact points lie at most 5 mm from there.
@@ -93,9 +91,9 @@ def test_a_bowl_rests_on_its_rim(monkeypatch):
     assert (measured[~bowls, 3] >= pressed - np.abs(c[~bowls]) * (5 / 25) ** 2).all()
 
 
-def test_a_saddle_rocks_onto_three_corners(monkeypatch):
+def test_a_saddle_rocks_onto_three_corners():
     """Above the saddle c x y the lowest plane that holds the force is c (1 - x + y), or -c (1 + x + y) if c is negative."""
-    measured, c = seat_of_one_mode(monkeypatch, lambda x, y: x * y)
+    measured, c = seat_of_one_mode(lambda x, y: x * y)
     corners = np.array([(-1, -1), (1, -1), (0, 1), (PRESS - [50, 25]) / [50, 25]])
     x, y = corners.T
     expected = np.where(c[:, None] > 0, c[:, None] * (1 - x + y), -c[:, None] * (1 + x + y))

@@ -96,3 +96,10 @@ def test_a_form_that_fills_the_zone_around_it_is_refused():
         tc.build(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(0.15)))
     with pytest.raises(tc.ModelError, match='the rule "uniform" is for features that keep their shape'):
         tc.build(toleranced.block_with("top", tc.Parallelism(0.2, "A", rule="uniform"), tc.Flatness(0.1)))
+
+
+def test_a_population_is_measured_with_its_form():
+    population = tc.check_population(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(0.1)), samples=3000)
+    assert population.zone_tolerance.values.tolist() == ["flatness 0.1; 99.73 % inside", "profile 0.2 A B C; 99.73 % inside"]
+    assert (population.stated_share.values == 0.9973).all()
+    assert (np.abs(population.share_inside.sel(interval="estimate").values - 0.9973) < 0.004).all()

@@ -28,6 +28,10 @@ follows the curvature. There are at most 5000 points, close enough that between 
 more than a two-thousandth of the smallest tolerance range. This is the smallest range of any locator or measure in mm; a range
 narrower than a thousandth of the widest one is treated as a constant and ignored.
 
+If a face has form, its points are a fifth of the correlation length apart, unless you choose otherwise; more than half is
+refused. Such a face can touch planes alone. Heights are those at the nominal points; where faces end, those at the places
+found at each pose, and contact points between these count as long as they stand over the reference face.
+
 ## Warnings
 
 A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, allow more penetration than
