@@ -89,12 +89,12 @@ its wall, is detected only afterwards (see the checks of surfaces in `tolcontact
 """
 
 from tolcontact.discretization.discretizing import discretize
-from tolcontact.discretization.form_places import FIRST_POINT, raised_places
+from tolcontact.discretization.form_places import FIRST_POINT, are_over, face_points, raised_places
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "discretize",
-    "raised_places",
+    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "are_over",
+    "discretize", "face_points", "raised_places",
 ]  # fmt: skip
