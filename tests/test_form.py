@@ -10,6 +10,7 @@ from scipy.optimize import linprog
 import tolcontact as tc
 from tests.cases.seats import PRESS, seat, sliding
 from tests.helpers import SEATED, joined, simulate
+from tolcontact.analyses.grouping import owners
 from tolcontact.compilation import compile_program
 from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
@@ -205,3 +206,34 @@ def test_contact_points_too_far_apart_for_a_form_are_refused():
 def test_feet_that_are_projected_again_have_no_form():
     with pytest.raises(ModelError, match=r'contact pair "seat": the search is "iterated".*top has form'):
         tc.build(sliding(), method=tc.Method(search="iterated"))
+
+
+def test_the_modes_of_a_form_contribute_as_one():
+    program = tc.build(seat())
+    assert list(dict.fromkeys(owners(program, "contributor"))) == [
+        *(f"block.{name}" for name in ("Z0", "Z1", "Z2", "X", "Y1", "Y2")),
+        "block.under.form",
+    ]
+    assert set(owners(program, "feature")[6:]) == {"block.under"}
+
+
+def test_no_worst_case_of_faces_with_form_is_searched():
+    with pytest.raises(tc.OptionError, match="has faces with form, in whose zone no worst case is searched"):
+        tc.worst_case(seat(), samples=256, method=SEATED, solver="daqp")
+
+
+def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():
+    a = tc.Assembly("over")
+    base = a.part("base", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+    block = a.part("block", tc.Box(100, 50, 10), at=(0, 0, 5))
+    top = base.feature("top", base.face("+z"), tc.Flatness(0.05))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0)
+    a.measure("gap", tc.Gap(block.point(30, 20, 0), base.face("+z")))
+    assert top
+    program, run = simulate(a, samples=20)
+    place = np.array([[30.0, 20.0, 10.0]])
+    heights = coefficients(program, run, "top") @ modes_at(program, "top", place).T
+    np.testing.assert_allclose(run["measured"][:, CORRECTED, 0], 5 - heights[:, 0], atol=1e-12)
+    a.measure("clearance", tc.Clearance(block.face("-z"), base.face("+z")))
+    with pytest.raises(ModelError, match="which has form, cannot be measured"):
+        tc.build(a)
