@@ -1,13 +1,21 @@
 """Faces that are not flat: seats against a linear programme on the same heights, archives, and one field for all uses."""
 
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
 import numpy as np
 import pytest
 from scipy.optimize import linprog
 
 import tolcontact as tc
 from tests.cases.seats import PRESS, seat, sliding
-from tests.helpers import SEATED, simulate
+from tests.helpers import SEATED, joined, simulate
+from tolcontact.analyses.grouping import owners
+from tolcontact.compilation import compile_program
+from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
+from tolcontact.features import FormField
+from tolcontact.simulation import simulate_blocks
 from tolcontact.simulation.surfaces import check_surfaces
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
@@ -47,6 +55,51 @@ def test_a_seat_is_the_one_of_a_linear_programme_on_the_same_heights(width, erro
     form = coefficients(program, run, "under") @ modes_at(program, "under", foot).T
     planes = np.array([seated(of_one, places[:, :2]) for of_one in heights])
     np.testing.assert_allclose(run["measured"][:, CORRECTED, 4], planes @ [1, 30, 20] - form[:, 0], atol=error)
+
+
+@dataclass(frozen=True, eq=False)
+class OneMode(FormField):
+    """A form of one mode, given by hand as a function of coordinates from -1 to 1 on the underside of the block."""
+
+    shape: Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+    def heights(self, points):
+        return self.shape((points[..., 0] - 50) / 50, (points[..., 1] - 25) / 25)[..., None]
+
+
+def seat_of_one_mode(shape):
+    """Measures (realization, measure) of a seat whose form is one mode, and its coefficients (realization,)."""
+    nominal = discretize(seat(tc.Form(modes=1)))
+    pair, *supports = nominal.pairs
+    face = pair.deviating[0]
+    by_hand = OneMode(**vars(face.form), shape=shape)
+    offsets = Offsets(face.form_columns, by_hand.heights(pair.P_m).T)
+    pair = replace(pair, offsets=offsets, deviating=(replace(face, form=by_hand), None))
+    program = compile_program(replace(nominal, pairs=(pair, *supports)), "daqp", SEATED)
+    run = joined(simulate_blocks(program, samples=60, seed=1))
+    assert (run["status"] == Status.RESOLVED).all() and run["gap_min"][:, CORRECTED].min() > -1e-9
+    return run["measured"][:, CORRECTED], coefficients(program, run, "under")[:, 0]
+
+
+def test_a_bowl_rests_on_its_rim():
+    measured, c = seat_of_one_mode(lambda x, y: x**2 + y**2 - 2 / 3)
+    bowls = c > 0
+    np.testing.assert_allclose(measured[bowls, :4], 4 / 3 * np.outer(c[bowls], np.ones(4)), atol=1e-6)
+    # A dome touches where it is pressed. Contact points lie at most 5 mm from there.
+    x, y = (PRESS - [50, 25]) / [50, 25]
+    pressed = c[~bowls] * (x**2 + y**2 - 2 / 3)
+    assert (measured[~bowls, 3] <= pressed + 1e-6).all()
+    assert (measured[~bowls, 3] >= pressed - np.abs(c[~bowls]) * (5 / 25) ** 2).all()
+
+
+def test_a_saddle_rocks_onto_three_corners():
+    """Above the saddle c x y the lowest plane that holds the force is c (1 - x + y), or -c (1 + x + y) if c is negative."""
+    measured, c = seat_of_one_mode(lambda x, y: x * y)
+    corners = np.array([(-1, -1), (1, -1), (0, 1), (PRESS - [50, 25]) / [50, 25]])
+    x, y = corners.T
+    expected = np.where(c[:, None] > 0, c[:, None] * (1 - x + y), -c[:, None] * (1 + x + y))
+    np.testing.assert_allclose(measured[:, :4], expected, atol=1e-5)
+    assert np.abs(c).max() > 0.01
 
 
 def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points():
@@ -148,3 +201,39 @@ def test_contact_points_too_far_apart_for_a_form_are_refused():
         a.contact("c", moving=block.feature("f", block.face("-z"), tc.Flatness(0.1)), reference=base.face("+z"), points=8)
 
     assert "correlation length of 33.3 mm; expected at most half of that" in refused(sparse)
+
+
+def test_feet_that_are_projected_again_have_no_form():
+    with pytest.raises(ModelError, match=r'contact pair "seat": the search is "iterated".*top has form'):
+        tc.build(sliding(), method=tc.Method(search="iterated"))
+
+
+def test_the_modes_of_a_form_contribute_as_one():
+    program = tc.build(seat())
+    assert list(dict.fromkeys(owners(program, "contributor"))) == [
+        *(f"block.{name}" for name in ("Z0", "Z1", "Z2", "X", "Y1", "Y2")),
+        "block.under.form",
+    ]
+    assert set(owners(program, "feature")[6:]) == {"block.under"}
+
+
+def test_no_worst_case_of_faces_with_form_is_searched():
+    with pytest.raises(tc.OptionError, match="has faces with form, in whose zone no worst case is searched"):
+        tc.worst_case(seat(), samples=256, method=SEATED, solver="daqp")
+
+
+def test_the_gap_of_a_station_over_a_face_with_form_counts_its_height_there():
+    a = tc.Assembly("over")
+    base = a.part("base", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+    block = a.part("block", tc.Box(100, 50, 10), at=(0, 0, 5))
+    top = base.feature("top", base.face("+z"), tc.Flatness(0.05))
+    a.locate(block, tc.three_two_one(block.face("-z"), block.face("-y"), block.face("-x"), inset=5), tolerance=0)
+    a.measure("gap", tc.Gap(block.point(30, 20, 0), base.face("+z")))
+    assert top
+    program, run = simulate(a, samples=20)
+    place = np.array([[30.0, 20.0, 10.0]])
+    heights = coefficients(program, run, "top") @ modes_at(program, "top", place).T
+    np.testing.assert_allclose(run["measured"][:, CORRECTED, 0], 5 - heights[:, 0], atol=1e-12)
+    a.measure("clearance", tc.Clearance(block.face("-z"), base.face("+z")))
+    with pytest.raises(ModelError, match="which has form, cannot be measured"):
+        tc.build(a)

@@ -6,6 +6,7 @@ from scipy.optimize import linprog
 from scipy.stats import beta
 
 import tolcontact as tc
+from tests.cases import toleranced
 from tests.cases.seats import seat
 from tolcontact.features.least_zone import least_widths
 from tolcontact.variation.form_spreads import FormSpread
@@ -49,7 +50,7 @@ def test_a_stated_share_of_faces_lies_inside(form):
     rng, inside, modes = np.random.default_rng(7), 0, field.heights(field.places).T
     for _ in range(count // 2000):
         inside += int((least_widths(field.places, spread * rng.normal(size=(2000, field.modes)) @ modes) <= width).sum())
-    lower, upper = beta.ppf([0.0005, 0.9995], [inside, inside + 1], [count - inside + 1, count - inside])
+    lower, upper = count_inside(inside, count)
     assert lower < SHARE < upper
 
 
@@ -64,3 +65,41 @@ def test_modes_displace_no_face_as_a_whole_and_leave_little_out():
         norms = heights.T @ heights / len(x)
         np.testing.assert_allclose(norms - np.diag(np.diag(norms)), 0, atol=5e-3 * norms.max())
         assert (np.diff(np.diag(norms)) < 1e-3).all()
+
+
+def count_inside(needed, count):
+    """Bounds of the share of faces, a number of which lie inside, in an interval of 99.9 %."""
+    return beta.ppf([0.0005, 0.9995], [needed, needed + 1], [count - needed + 1, count - needed])
+
+
+@pytest.mark.parametrize(("flatness", "spread"), [(0.05, 12.84), (0.1, 19.52)])
+def test_form_and_displacements_share_the_zone_around_them(flatness, spread):
+    program = tc.build(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(flatness)))
+    own = {contributor.label: contributor.spread for contributor in program.draws.contributors}
+    assert own["block.top.offset"] == own["block.top.tilt x"] == pytest.approx(0.2 / spread, rel=0.015)
+    (top,) = (feature for feature in program.nominal.features if feature.feature.name == "top")
+    count, inside, modes = 200_000, 0, top.form.heights(top.form.places)
+    x, y = (top.form.places - top.geometry.centre)[:, :2].T
+    labels = program.nominal.contributors
+    places = [labels.index(f"block.top.{name}") for name in ("offset", "tilt x", "tilt y")]
+    for start in range(0, count, 4000):
+        drawn = program.draws(seed=5, start=start, stop=start + 4000)
+        offset, tilt_x, tilt_y = drawn[:, places].T[..., None]
+        heights = drawn[:, top.form_columns] @ modes.T + offset + tilt_x * y / 25 - tilt_y * x / 50
+        inside += int((2 * np.abs(heights).max(axis=1) <= 0.2).sum())
+    lower, upper = count_inside(inside, count)
+    assert lower < SHARE < upper
+
+
+def test_a_form_that_fills_the_zone_around_it_is_refused():
+    with pytest.raises(tc.ModelError, match="the narrower tolerances within it leave 2 % of the"):
+        tc.build(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(0.15)))
+    with pytest.raises(tc.ModelError, match='the rule "uniform" is for features that keep their shape'):
+        tc.build(toleranced.block_with("top", tc.Parallelism(0.2, "A", rule="uniform"), tc.Flatness(0.1)))
+
+
+def test_a_population_is_measured_with_its_form():
+    population = tc.check_population(toleranced.block_with("top", tc.Profile(0.2, "A|B|C"), tc.Flatness(0.1)), samples=3000)
+    assert population.zone_tolerance.values.tolist() == ["flatness 0.1; 99.73 % inside", "profile 0.2 A B C; 99.73 % inside"]
+    assert (population.stated_share.values == 0.9973).all()
+    assert (np.abs(population.share_inside.sel(interval="estimate").values - 0.9973) < 0.004).all()

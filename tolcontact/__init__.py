@@ -51,7 +51,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | declare | `Assembly`, `Box`, `Mesh`, `Pin`, `Locator`, `three_two_one`, `Tolerance`, `TitleBlock`, `degrees` |
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
-| | `Feature`, `Pattern`, `DatumTargets`, `Variable` |
+| | `Form`, `Feature`, `Pattern`, `DatumTargets`, `Variable` |
 | measure faces | `Gap`, `Flush`, `Clearance`, `AxisDistance`, `Angle`, `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
 | | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |

@@ -6,6 +6,7 @@ import numpy as np
 
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
+from tolcontact.variation.contributors import FORM
 from tolcontact.variation.draws import Draws
 from tolcontact.vocabulary import GROUPED_BY
 
@@ -17,10 +18,11 @@ def check_grouping(by: str) -> None:
 
 
 def owners(program: Program, by: str) -> list[str]:
-    """Return the owner of each column of the deviations: its contributor, feature or part."""
+    """Return the owner of each column of the deviations: its contributor, feature or part; the modes of a form are one."""
     nominal, labels = program.nominal, list(program.nominal.contributors)
     if by == "contributor":
-        return labels
+        contributors = zip(labels, program.draws.contributors, strict=True)
+        return [label.rpartition(" ")[0] if contributor.source == FORM else label for label, contributor in contributors]
     # Locators belong to the part that they locate, even if `by` is "feature".
     owner_of = {label: part.name for part in nominal.parts for label in part.locators.labels}
     for pattern in nominal.patterns:

@@ -18,6 +18,7 @@ from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
 from tolcontact.simulation import simulate_blocks
 from tolcontact.variation import GivenDraws
+from tolcontact.variation.contributors import FORM
 from tolcontact.workflow.models import Choice, Model
 
 PER_LEVEL, PER_CONTRIBUTOR = 20.0, 6.0  # combinations that a search needs at each length of its steps
@@ -72,6 +73,11 @@ def worst_case(
 def search_worst_case(analysis: Analysis, effort: Effort) -> xr.Dataset:
     """Return the dataset of `worst_case`, by searches of some effort."""
     program, engine = analysis.program, analysis.engine(analysis.samples)
+    if any(contributor.source == FORM for contributor in program.draws.contributors):
+        raise OptionError(
+            f'"{analysis.assembly}" has faces with form, in whose zone no worst case is searched; give their tolerances '
+            "of form form=None"
+        )
     region = Region(program.draws, seed=analysis.seed)
     analysis.check_varies(region.varies.size)
     linear, evaluation, rng = linear_model(program), Evaluation(engine, region), np.random.default_rng(analysis.seed)

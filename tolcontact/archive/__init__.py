@@ -77,7 +77,13 @@ Where a side of a pair is a feature (`face_of_moving`, `face_of_reference` not -
 turn by exp([rho]x). Then subtract `face_height` @ `deviation` of the reference side, and that of the moving side times
 `facing`. For a locator that stands against a feature (`face_of_locator`), add to its deviation the height there, less its
 direction times the displacement; for one on a feature of another part (`ground_of_locator`), add its direction times the
-displacement there. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
+displacement there.
+
+A face with form (`form_covariance` not empty) stands higher at a point p by the sum over modes of the `deviation` with number
+`form_contributor` times (covariance(|p - `station`| / `form_length`) @ `station_weight` - `form_removed` @ [1, p]), with the
+stations of that face (`face_of_station`). The covariances of a distance r are exp(-r^2 / 2); with s = sqrt(5) r, (1 + s + s^2 /
+3) exp(-s); and with s = sqrt(3) r, (1 + s) exp(-s). Subtract the heights of both sides from gaps, at their nominal points; add
+that of the face of a locator to its deviation. `tolcontact.testing.assert_gaps_recompute` does all of this from the file alone.
 
 `tc.open_archive(path)` checks everything but the rows and opens the file; `tc.model_of` rebuilds its model.
 

@@ -110,6 +110,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     Raises OptionError for a solver that cannot be used, ModelError for a user's measure that fails, or, if the objective
     is seating, for forces that are missing or move nothing.
     """
+    _check_forms(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
@@ -208,6 +209,18 @@ def _contact_group(
     build = ElementQP if has_elements(group, method) else contact_qp
     qp = build(nominal, group, gaps, method, plugin, standing)
     return ContactGroup(group, qp, ContactSolver(qp))
+
+
+def _check_forms(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for a search that would not know the form of a reference face where it projects points again."""
+    faults = [
+        f'contact pair "{pair.name}": the search is "iterated", and the reference face of feature {pair.deviating[1].name} has '
+        'form; choose the search "bounded" or "fixed"'
+        for pair in nominal.pairs
+        if method.is_iterated and pair.deviating[1] is not None and pair.deviating[1].form is not None
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
 
 
 def _check_forces(nominal: Nominal, groups: list[Group]) -> None:

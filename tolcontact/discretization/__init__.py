@@ -28,6 +28,10 @@ follows the curvature. There are at most 5000 points, close enough that between 
 more than a two-thousandth of the smallest tolerance range. This is the smallest range of any locator or measure in mm; a range
 narrower than a thousandth of the widest one is treated as a constant and ignored.
 
+If a face has form, its points are a fifth of the correlation length apart, unless you choose otherwise; more than half is
+refused. Such a face can touch planes alone. Heights are those at the nominal points; where faces end, those at the places
+found at each pose, and contact points between these count as long as they stand over the reference face.
+
 ## Warnings
 
 A `tc.ContactWarning` states the error in mm if your points, or the triangles of a round face, allow more penetration than
@@ -85,12 +89,12 @@ its wall, is detected only afterwards (see the checks of surfaces in `tolcontact
 """
 
 from tolcontact.discretization.discretizing import discretize
-from tolcontact.discretization.form_places import FIRST_POINT, raised_places
+from tolcontact.discretization.form_places import FIRST_POINT, are_over, face_points, raised_places
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.nominal import ContactPoints, Nominal, NominalPart, Offsets
 from tolcontact.discretization.round_points import RoundPoint, RoundPoints
 
 __all__ = [
-    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "discretize",
-    "raised_places",
+    "FIRST_POINT", "ContactPoints", "Locators", "Nominal", "NominalPart", "Offsets", "RoundPoint", "RoundPoints", "are_over",
+    "discretize", "face_points", "raised_places",
 ]  # fmt: skip

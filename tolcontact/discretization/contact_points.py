@@ -10,7 +10,7 @@ import trimesh
 
 from tolcontact.declaration import Assembly, ContactPair, Face, Part
 from tolcontact.declaration.contact_pair import MAX_POINTS
-from tolcontact.discretization.form_points import check_flat, check_resolved, form_lengths, form_spacing
+from tolcontact.discretization.form_points import check_flat, check_resolved, form_lengths, form_spacing, with_rims
 from tolcontact.discretization.nominal import ContactPoints, NominalPart, Offsets
 from tolcontact.discretization.round_contact import round_points
 from tolcontact.discretization.round_points import RoundPoints
@@ -102,6 +102,8 @@ def _candidates(
     if is_flat(moving_face) and is_flat(reference_face):
         if _is_open(pair):
             P_m = np.concatenate([P_m, overlap_corners(moving_face, reference_face)])
+            if lengths:
+                P_m = with_rims(P_m, moving_face, reference_face, form_spacing(lengths), reach)
     elif math.isfinite(finest):
         P_m = _with_curvature(pair, moving_face, reference_face, P_m, finest, reach)
     P_m = distinct(P_m, POINT_TOLERANCE * moving.mesh.scale)

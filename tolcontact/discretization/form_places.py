@@ -53,30 +53,73 @@ def raised_places(
     return RaisedPlaces(Places(*joined), grown + np.concatenate([heights, of_points], axis=1))
 
 
+class FacePoints(NamedTuple):
+    """Points between the ends of two planes: contact points, and then points of the rim of the reference face.
+
+    P_m, P_r   (n, point, 3) [mm] on both nominal faces
+    gaps       (n, point) [mm] of nominal faces, along the normal of the reference face
+    """
+
+    P_m: Float[Array, "n point 3"]
+    P_r: Float[Array, "n point 3"]
+    gaps: Float[Array, "n point"]
+
+
+def face_points(pair: ContactPoints, X_RM: Float[Array, "n 12"]) -> FacePoints:
+    """Return contact points, which move with the moving face, and rim points of the reference face, at X_RM (n, 12)."""
+    gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)
+    P_m, P_r = (np.broadcast_to(points, (*gaps.shape, 3)) for points in (pair.P_m, pair.P_r))
+    rim, n, (m, corner) = pair.reference_rim, pair.n_r[0], pair.moving_plane
+    back, along = pose.apply(pose.inverse(X_RM), rim), n @ pose.rotation(X_RM)  # (n, rim point, 3), (n, 3)
+    heights = ((corner - back) @ m) / (along @ m)[:, None]
+    return FacePoints(
+        np.concatenate([P_m, back + heights[..., None] * along[:, None]], axis=1),
+        np.concatenate([P_r, np.broadcast_to(rim, back.shape)], axis=1),
+        np.concatenate([gaps, heights], axis=1),
+    )
+
+
+def are_over(pair: ContactPoints, X_RM: Float[Array, "n 12"], points: FacePoints, numbers: Int[Array, "n k"]) -> np.ndarray:
+    """Return whether points with numbers (n, k), -1 for none, stand over the other face at X_RM (n, 12)."""
+    over, count = numbers >= 0, len(pair.P_m)
+    for face, selected in ((pair.reference_face, over & (numbers < count)), (pair.moving_face, numbers >= count)):
+        row, place = np.nonzero(selected)
+        if row.size and face is not None:
+            places = points.P_m[row, numbers[row, place]]
+            if face is pair.reference_face:
+                places = np.einsum("kij,kj->ki", pose.rotation(X_RM)[row], places) + pose.translation(X_RM)[row]
+            over[row, place] = face.project(places)[2]
+    return over
+
+
 def _points(
     pair: ContactPoints, X_RM: np.ndarray, deviations: np.ndarray, retained: np.ndarray | None
 ) -> tuple[Places, np.ndarray]:
-    """Return contact points over the reference face as places, and the heights (n, place) [mm] of the forms there.
+    """Return points between the ends of the faces as places, and the heights (n, place) [mm] of the forms there.
 
     These are the `retained` ones, and the lowest of each group.
     """
-    gaps = ((pose.apply(X_RM, pair.P_m) - pair.P_r) * pair.n_r).sum(axis=2)
-    heights = pair.form(deviations).at_all(pair.P_m, pair.P_r)
-    numbers = _lowest_over(pair, X_RM, gaps - heights)
+    points, form, count = face_points(pair, X_RM), pair.form(deviations), len(pair.P_m)
+    rim = points.P_m[:, count:]
+    row = np.repeat(np.arange(len(X_RM)), rim.shape[1])
+    at_rim = form.at(row, rim.reshape(-1, 3), points.P_r[:, count:].reshape(-1, 3)).reshape(rim.shape[:2])
+    heights = np.concatenate([form.at_all(pair.P_m, pair.P_r), at_rim], axis=1)
+    numbers = _lowest_over(pair, X_RM, points, points.gaps - heights)
     if retained is not None:
         kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)
-        numbers = np.concatenate([np.where(_is_over(pair, X_RM, kept), kept, -1), numbers], axis=1)
+        numbers = np.concatenate([np.where(are_over(pair, X_RM, points, kept), kept, -1), numbers], axis=1)
     for column in range(1, numbers.shape[1]):
         numbers[(numbers[:, :column] == numbers[:, column, None]).any(axis=1), column] = -1
-    row, is_point = np.arange(len(X_RM))[:, None], numbers >= 0
-    P_m, P_r, n_r = (values[numbers] for values in (pair.P_m, pair.P_r, pair.n_r))
-    labels = np.where(is_point, numbers + FIRST_POINT, -1)
-    return Places(labels, np.where(is_point, gaps[row, numbers], np.inf), P_m, P_r, n_r), heights[row, numbers] * is_point
+    rows, is_point = np.arange(len(X_RM))[:, None], numbers >= 0
+    labels, gaps = np.where(is_point, numbers + FIRST_POINT, -1), np.where(is_point, points.gaps[rows, numbers], np.inf)
+    n_r = np.broadcast_to(pair.n_r[0], (*numbers.shape, 3))
+    places = Places(labels, gaps, points.P_m[rows, numbers], points.P_r[rows, numbers], n_r)
+    return places, heights[rows, numbers] * is_point
 
 
-def _lowest_over(pair: ContactPoints, X_RM: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """Return the point of each group (n, group) with the least of the gaps (n, point) over the reference face; -1 for none."""
-    groups = np.array_split(np.arange(len(pair.P_m)), min(POINT_GROUPS, len(pair.P_m)))
+def _lowest_over(pair: ContactPoints, X_RM: np.ndarray, points: FacePoints, gaps: np.ndarray) -> np.ndarray:
+    """Return the point of each group (n, group) with the least of the gaps (n, point) over the other face; -1 for none."""
+    groups = np.array_split(np.arange(gaps.shape[1]), min(POINT_GROUPS, gaps.shape[1]))
     numbers = np.full((len(X_RM), len(groups)), -1)
     for place, group in enumerate(groups):
         remaining, left = np.arange(len(X_RM)), gaps[:, group].copy()
@@ -84,18 +127,9 @@ def _lowest_over(pair: ContactPoints, X_RM: np.ndarray, gaps: np.ndarray) -> np.
             lowest = left[remaining].argmin(axis=1)
             remaining = remaining[left[remaining, lowest] < np.inf]
             lowest = left[remaining].argmin(axis=1)
-            is_over = _is_over(pair, X_RM[remaining], group[lowest][:, None])[:, 0]
-            numbers[remaining[is_over], place] = group[lowest[is_over]]
-            left[remaining[~is_over], lowest[~is_over]] = np.inf
-            remaining = remaining[~is_over]
+            of_remaining = FacePoints(*(values[remaining] for values in points))
+            over = are_over(pair, X_RM[remaining], of_remaining, group[lowest][:, None])[:, 0]
+            numbers[remaining[over], place] = group[lowest[over]]
+            left[remaining[~over], lowest[~over]] = np.inf
+            remaining = remaining[~over]
     return numbers
-
-
-def _is_over(pair: ContactPoints, X_RM: np.ndarray, numbers: np.ndarray) -> np.ndarray:
-    """Return whether points with numbers (n, place), -1 for none, stand over the reference face at X_RM (n, 12)."""
-    is_over = numbers >= 0
-    row, place = np.nonzero(is_over)
-    if row.size and pair.reference_face is not None:
-        points = np.einsum("kij,kj->ki", pose.rotation(X_RM)[row], pair.P_m[numbers[row, place]])
-        is_over[row, place] = pair.reference_face.project(points + pose.translation(X_RM)[row])[2]
-    return is_over

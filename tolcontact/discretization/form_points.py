@@ -9,12 +9,14 @@ from scipy.spatial import KDTree
 from tolcontact.errors import GeometryFault
 from tolcontact.features import FaceDeviation
 from tolcontact.geometry.curvature import is_flat
+from tolcontact.geometry.overlap import rim_points
 from tolcontact.geometry.surface import Surface
 
 FACING = -0.99999  # cosine of the angle between the normals of planes that face each other
 SPACING_SHARE = 1 / 5  # of the correlation length: the usual spacing
 MAX_SPACING_SHARE = 1 / 2
 COVER_SHARE = 0.71  # of the spacing of a square grid: the distance of the middle of a square from the nearest point
+MIN_DISTANCE_SHARE = 1 / 4  # of the spacing: points of a rim that are nearer to others are left out
 EDGES = 8  # of the triangles whose corners are compared with contact points, in a correlation length
 
 
@@ -50,3 +52,16 @@ def check_resolved(points: np.ndarray, face: trimesh.Trimesh, lengths: Sequence[
             f"{length:.3g} mm; expected at most half of that; leave points and spacing out, or give spacing="
             f"{form_spacing(lengths):.2g}"
         )
+
+
+def with_rims(P_m: np.ndarray, moving: Surface, reference: Surface, spacing: float, reach: float) -> np.ndarray:
+    """Return points P_m (point, 3) of the moving plane, with others over the rim of the reference plane and along its own.
+
+    Tilted faces touch along rims. Corners alone would do for flat ones.
+    """
+    over_reference, over_moving = rim_points(moving, reference, spacing, reach), rim_points(reference, moving, spacing, reach)
+    along_own = moving.project(over_moving)[0] if len(over_moving) else over_moving
+    for points in (over_reference, along_own):
+        if len(points):
+            P_m = np.concatenate([P_m, points[KDTree(P_m).query(points)[0] > MIN_DISTANCE_SHARE * spacing]])
+    return P_m

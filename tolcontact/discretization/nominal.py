@@ -10,6 +10,7 @@ import trimesh
 from tolcontact import poses as pose
 from tolcontact.arrays import Array, Float
 from tolcontact.declaration import Assembly, Face, Locator, Measure, Part, Point, ThreeTwoOne
+from tolcontact.discretization.form_points import form_lengths, form_spacing
 from tolcontact.discretization.locators import Locators
 from tolcontact.discretization.measured_geometry import NominalMeasurement
 from tolcontact.discretization.pair_form import PairForm
@@ -19,8 +20,10 @@ from tolcontact.features import Datum, FaceDeviation, Features, NominalFeature, 
 from tolcontact.geometry.curvature import chord_height
 from tolcontact.geometry.face_pair import FacePair, body_face
 from tolcontact.geometry.faces import Meshes, triangles
+from tolcontact.geometry.overlap import points_on_rim
 from tolcontact.geometry.surface import Surface
 
+RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
 GAPS_TOGETHER = 1 << 20  # that are computed at once
 
 
@@ -141,6 +144,20 @@ class ContactPoints:
     def has_form(self) -> bool:
         """Whether one of the faces has form."""
         return any(face is not None and face.form is not None for face in self.deviating)
+
+    @cached_property
+    def reference_rim(self) -> np.ndarray:
+        """Points (point, 3) [mm] along the rim of a reference face where faces with form may touch."""
+        assert self.moving_face is not None and self.reference_face is not None
+        points = points_on_rim(self.reference_face, form_spacing(form_lengths(self.deviating)))
+        distance = np.linalg.norm(self.moving_face.nearest(points)[1] - points, axis=1)
+        return points[distance < RIM_REACH * self.moving_face.mesh.scale]
+
+    @cached_property
+    def moving_plane(self) -> tuple[np.ndarray, np.ndarray]:
+        """The normal (3,) of a flat moving face, and a point (3,) [mm] of it."""
+        assert self.moving_face is not None
+        return self.moving_face.corner_normals[0, 0], np.asarray(self.moving_face.mesh.vertices)[0]
 
     def form(self, deviations: np.ndarray) -> PairForm:
         """Return the forms of both faces for deviations (row, contributor)."""

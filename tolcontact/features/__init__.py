@@ -31,18 +31,42 @@ It deviates as a whole by small displacements in mm, each of them a contributor:
 | `tc.Profile(0.2, "A", outside=0.15)`, `tc.LineProfile` | any surface | place and tilt; without datums form alone |
 | `tc.Parallelism`, `tc.Perpendicularity`, `tc.Angularity` | plane, axis | tilt |
 | `tc.CircularRunout`, `tc.TotalRunout` | cylinder, plane | radial: place and tilt; axial: tilt |
-| `tc.Straightness` | plane, axis | form, which does not move a feature |
+| `tc.Straightness` | plane, axis | form, which does not displace a feature |
 | `tc.Flatness` | plane | form |
 | `tc.Roundness` | cylinder, cone, sphere | form |
 | `tc.Cylindricity` | cylinder | form |
 
-`tc.Flatness(0.1, per=(25, 25))`, or `per=25` for lines, limits the form of any part of this size; like all form it moves no
-feature. `tangent=True` states the orientation or place of the plane that touches a plane from outside; without form the two
-are equal. `zone="flat", along="x"` puts an axis between planes; with `projected=20` the zone stands 20 mm out of the primary
-datum. `material="M"` (or "L") enlarges the zone as the size departs from its maximum (least) material limit: `bonus="fills"`
-(the process uses the bonus), "accepts" (only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in
-`tolcontact.variation`. All this follows ISO 1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), unlike
-under ASME's Rule #1.
+`tc.Flatness(0.1, per=(25, 25))`, or `per=25` for lines, limits the form of any part of this size. `tangent=True` states the
+orientation or place of the plane that touches a plane from outside, and does not limit its form. `zone="flat", along="x"` puts
+an axis between planes; with `projected=20` the zone stands 20 mm out of the primary datum. `material="M"` (or "L") enlarges
+the zone as the size departs from its maximum (least) material limit: `bonus="fills"` (the process uses the bonus), "accepts"
+(only the inspection does) or "none". `rule=`, `cp=` and `cpk=` are explained in `tolcontact.variation`. All this follows ISO
+1101, 5459 and 2692. Sizes do not limit form (independency, ISO 8015), unlike under ASME's Rule #1.
+
+## Form
+
+A plane with a flatness is not flat: each drawn face has bumps and hollows of its own, and contact, locators, measured points
+and datum targets all see the same ones. Heights are a random field, the sum of modes with normal coefficients. Each
+coefficient is a contributor, "part.feature.form 01". Their common spread is such that 99.73 % of the faces need no wider zone
+than the flatness:
+
+>>> rough = tc.Assembly("rough")
+>>> part = rough.part("part", tc.Box(100, 50, 10), fixed=True)
+>>> seat = part.feature("seat", part.face("+z"), tc.Flatness(0.05))
+>>> height = rough.measure("height", seat.point(30, 20, 10), along="z")
+>>> program = tc.build(rough)
+>>> len(program.nominal.contributors), program.nominal.contributors[-1]
+(20, 'part.seat.form 20')
+
+`tc.Flatness(0.05, form=tc.Form("matern 5/2", length=20, modes=40))` names the covariance of two heights by their distance
+("squared exponential", "matern 5/2" or "matern 3/2", from smooth to rough), its correlation length, by default a third of the
+longest extent of the face, and the number of modes. Archives state which share of the variance the modes leave out, and the
+mean width of the zones. The field is orthogonal to displacements of the face as a whole: it moves no datum that is fitted by
+least squares, and datums do not touch high spots. The tolerances around a form limit form and displacement together, so that
+displacements have what the form leaves of their zones; a form that leaves nothing is refused.
+
+The form of other kinds, of part of a surface and of pairs of planes cannot be drawn yet. Such a tolerance needs `form=None`:
+it is stated, and the feature keeps its shape.
 
 ## Datums
 

@@ -74,7 +74,7 @@ def _mean_normal(face: Surface) -> np.ndarray:
 
 
 def rim_points(face: Surface, target: Surface, step: float, within: float) -> np.ndarray:
-    """Return points (point, 3) [mm] of a curved face over the rim of the flat face `target`, about `step` [mm] apart.
+    """Return points (point, 3) [mm] of a face over the rim of the flat face `target`, about `step` [mm] apart.
 
     Only points within `within` [mm] of the rim are returned.
     """
@@ -99,3 +99,10 @@ def rim_points(face: Surface, target: Surface, step: float, within: float) -> np
     has_arrived = np.linalg.norm(points - feet, axis=1) < 0.1 * INWARD * target.mesh.scale
     is_near = np.linalg.norm(points - start, axis=1) <= within
     return feet[has_arrived & is_near]
+
+
+def points_on_rim(face: Surface, step: float) -> np.ndarray:
+    """Return points (point, 3) [mm] along the rim of a face, corners of its triangles among them, at most `step` [mm] apart."""
+    starts, ends = np.asarray(face.mesh.vertices)[rim(np.asarray(face.mesh.faces))].swapaxes(0, 1)
+    pieces = np.maximum(np.ceil(np.linalg.norm(ends - starts, axis=1) / step), 1).astype(int)
+    return np.concatenate([np.linspace(a, b, count, endpoint=False) for a, b, count in zip(starts, ends, pieces, strict=True)])

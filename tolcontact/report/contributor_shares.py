@@ -76,8 +76,10 @@ def _groups(results: xr.DataTree, sample: xr.Dataset, columns: np.ndarray) -> di
     labels = [str(label) for label in sample[sample[terms.DEVIATION.name].dims[-1]].values]
     is_stated = terms.CONTRIBUTOR_SOURCE.name in sample  # archives before format 4 have locators alone
     sources = sample[terms.CONTRIBUTOR_SOURCE.name].values if is_stated else np.full(len(labels), "locator")
-    of_features = np.isin(sources, ("feature", "datum"))
-    owners = [label.rpartition(".")[0] if is_of else label for label, is_of in zip(labels, of_features, strict=True)]
+    ends = {"feature": ".", "datum": ".", "form": " "}  # before the freedom of a feature, and the number of a mode of its form
+    owners = [
+        label.rpartition(ends[source])[0] if source in ends else label for label, source in zip(labels, sources, strict=True)
+    ]
     leader = {owner: owner for owner in owners}
 
     def find(owner: str) -> str:

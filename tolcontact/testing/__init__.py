@@ -22,9 +22,9 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.archive import model_of, open_archive
+from tolcontact.discretization import ContactPoints
 from tolcontact.errors import OptionError
 from tolcontact.geometry.meeting import Meeting
-from tolcontact.geometry.surface import Surface
 from tolcontact.method import Method
 from tolcontact.testing.referee import ArchivedPair, NotKeptError, Rows
 from tolcontact.workflow import build
@@ -153,14 +153,14 @@ def _listed(numbers: np.ndarray) -> str:
     return f"{len(numbers)} (realization {named}{', ...' if len(numbers) > NAMED_REALIZATIONS else ''})"
 
 
-def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, Surface | None]]:
-    """Return where those pairs can touch whose faces end, and their reference faces, from the archived model and method."""
+def _meetings(tree: xr.DataTree) -> dict[int, tuple[Meeting, ContactPoints]]:
+    """Return where those pairs can touch whose faces end, and their contact points, from the archived model and method."""
     bounded = tree["contact"].to_dataset().get(terms.BOUNDED.name)
     if bounded is None or not bounded.values.any():
         return {}
     method = Method(**{choice.name: tree.attrs[choice.name] for choice in fields(Method)})
     program = build(model_of(tree), solver=tree.attrs["solver"], method=method)
-    return {number: (meeting, program.nominal.pairs[number].reference_face) for number, meeting in program.meetings.items()}
+    return {number: (meeting, program.nominal.pairs[number]) for number, meeting in program.meetings.items()}
 
 
 def _comparable(rows: Rows) -> np.ndarray:

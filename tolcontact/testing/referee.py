@@ -13,8 +13,8 @@ import xarray as xr
 from scipy.spatial.transform import Rotation
 
 from tolcontact import vocabulary as terms
+from tolcontact.discretization import ContactPoints, are_over, face_points
 from tolcontact.geometry.meeting import Meeting
-from tolcontact.geometry.surface import Surface
 
 DIRECTIONS = 72  # that are tried at first
 NARROWINGS = 60
@@ -198,11 +198,13 @@ class ArchivedPair:
     """The nominal contact points of a pair, and where the archived poses put them.
 
     With a `meeting`, the pair touches where its faces end, at places that are found again at the archived poses; with form
-    also between them, over the `surface` of the reference face.
+    also between them, at points of the `nominal` pair.
     """
 
-    def __init__(self, tree: xr.DataTree, pair: int, meeting: Meeting | None = None, surface: Surface | None = None) -> None:
-        self.meeting, self.surface = meeting, surface
+    def __init__(
+        self, tree: xr.DataTree, pair: int, meeting: Meeting | None = None, nominal: ContactPoints | None = None
+    ) -> None:
+        self.meeting, self.nominal = meeting, nominal
         contact = {str(name): values.values for name, values in tree.children["contact"].to_dataset().data_vars.items()}
         is_own = contact[terms.PAIR_OF_POINT.name] == pair
         points = (terms.MOVING_POINT, terms.REFERENCE_POINT, terms.REFERENCE_NORMAL)
@@ -284,13 +286,14 @@ class ArchivedPair:
         return np.concatenate(pieces).reshape(R.shape[:-2])
 
     def _gaps_over_face(self, X_RM: np.ndarray, deviations: np.ndarray) -> np.ndarray:
-        """Return gaps (n, point) [mm] of the contact points that stand over the reference face; infinite ones of the others."""
-        assert self.surface is not None
-        moved = np.einsum("nij,pj->npi", X_RM[:, :9].reshape(-1, 3, 3), self.moving_point) + X_RM[:, None, 9:]
-        gaps = ((moved - self.reference_point) * self.normal).sum(axis=2)
-        gaps -= self._form(deviations, self.moving_point, self.reference_point)
-        is_over = self.surface.project(moved.reshape(-1, 3))[2].reshape(gaps.shape)
-        return np.where(is_over, gaps, np.inf)
+        """Return gaps (n, point) [mm] of points between the ends of the faces; infinite ones of points beside them."""
+        assert self.nominal is not None
+        points = face_points(self.nominal, X_RM)
+        rim = slice(len(self.moving_point), None)
+        at_rim = self._form(deviations, points.P_m[:, rim], points.P_r[0, rim])
+        forms = np.concatenate([self._form(deviations, self.moving_point, self.reference_point), at_rim], axis=1)
+        numbers = np.broadcast_to(np.arange(points.gaps.shape[1]), points.gaps.shape)
+        return np.where(are_over(self.nominal, X_RM, points, numbers), points.gaps - forms, np.inf)
 
 
 def _products(matrix: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tolcontact.declaration import GeometricTolerance
-from tolcontact.features import FeatureOfSize, Layer, NominalFeature, NominalPattern
+from tolcontact.features import FeatureOfSize, Layer, NominalFeature, NominalPattern, PlaneFeature
+from tolcontact.variation.form_spreads import FormedZone
 from tolcontact.variation.zones import MemberZone
 
 MIN_PART = 1e-12  # of a component of 1: smaller parts of it in a coordinate are rounding
@@ -53,13 +54,31 @@ class MemberGroup:
         return np.array([member.size_column for member in self.members if member.size_column is not None], dtype=int)
 
 
-def member_zones(pattern: NominalPattern, layer: Layer, basis: np.ndarray) -> list[MemberZone]:
-    """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls."""
+def member_zones(pattern: NominalPattern, layer: Layer, basis: np.ndarray, form_spreads: Sequence[float]) -> list[MemberZone]:
+    """Return the zones of a layer for the members, as their components (coordinate, component) move what it controls.
+
+    `form_spreads` (member,) [mm] are standard deviations of the coefficients of their forms; empty without form.
+    """
     coordinates = layer.controlled @ layer.controlled.T @ basis
     if len(pattern.members) > 1:
         coordinates = np.where(np.abs(coordinates) < MIN_PART, 0.0, coordinates)
     places = pattern.geometry.slices
-    return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
+    if not len(form_spreads) or layer.tolerance.tangent:
+        return [MemberZone(rows, coordinates[place]) for rows, place in zip(layer.rows, places, strict=True)]
+    return [
+        _formed_zone(member, rows, coordinates[place], spread)
+        for member, rows, place, spread in zip(pattern.members, layer.rows, places, form_spreads, strict=True)
+    ]
+
+
+def _formed_zone(member: NominalFeature, rows: np.ndarray, coordinates: np.ndarray, spread: float) -> FormedZone:
+    """Return the zone of a plane with form."""
+    field, plane = member.form, member.geometry
+    assert field is not None and isinstance(plane, PlaneFeature)
+    along = np.broadcast_to(plane.normal, (len(field.places), 1, 3))
+    offsets = plane.rows((field.places, along))[:, 0]
+    # A zone that limits tilts alone does not measure the offset, the first coordinate of a plane.
+    return FormedZone(rows, coordinates, spread * field.heights(field.places), offsets, not rows[..., 0].any())
 
 
 def member_groups(pattern: NominalPattern, layer: Layer, zones: Sequence[MemberZone]) -> Iterator[MemberGroup]:

@@ -168,14 +168,14 @@ class Contributors:
     def _pattern_contributors(self, pattern: NominalPattern) -> Iterator[Contributor]:
         """Yield the freedoms of a pattern's layers, from the innermost on, then its leans and the sizes of its members."""
         labels, column = iter(pattern.labels), pattern.first_column
-        basis, spreads = np.zeros((pattern.geometry.count, 0)), np.zeros(0)
+        basis, spreads, form_spreads = np.zeros((pattern.geometry.count, 0)), np.zeros(0), self._form_spreads(pattern)
         for layer in pattern.layers:
             count = layer.added.shape[1]
             if not count:
                 continue
             tolerance = layer.tolerance
             basis = np.hstack([basis, layer.added])
-            members = member_zones(pattern, layer, basis)
+            members = member_zones(pattern, layer, basis, form_spreads)
             width = float(tolerance.width) or self._unit_width(pattern, tolerance, is_innermost=not len(spreads))
             spread_rule = zones.extreme_spread if tolerance.rule in (EXTREMES, "truncated", "polar") else zones.equal_spread
             spread = spread_rule(members, spreads, count, width)
@@ -197,18 +197,20 @@ class Contributors:
         if pattern.declared.size is not None:
             for _ in pattern.members:
                 yield Contributor(next(labels), FEATURE, "mm", pattern.declared.size.tolerance)
-        yield from self._modes(pattern, labels)
+        form = next((layer for layer in pattern.layers if layer.tolerance is pattern.form), None)
+        for member, spread in zip(pattern.members, form_spreads, strict=False):  # none without form
+            for _ in member.form_columns:
+                yield Contributor(next(labels), FORM, "mm", None, form, spread)
 
-    def _modes(self, pattern: NominalPattern, labels: Iterator[str]) -> Iterator[Contributor]:
-        """Yield the coefficients of the forms of a pattern's members."""
+    def _form_spreads(self, pattern: NominalPattern) -> list[float]:
+        """Return the standard deviation [mm] of the coefficients of each member's form; nothing without form."""
+        spreads = list[float]()
         for member in pattern.members:
             if member.form is not None and pattern.form is not None:
-                layer = next(layer for layer in pattern.layers if layer.tolerance is pattern.form)
                 form = FormSpread(member.form)
-                spread = form.spread(pattern.form.width) / pattern.form.cp
-                self.mean_zones[member.label] = form.mean_width(spread)
-                for _ in member.form_columns:
-                    yield Contributor(next(labels), FORM, "mm", None, layer, spread)
+                spreads.append(form.spread(pattern.form.width) / pattern.form.cp)
+                self.mean_zones[member.label] = form.mean_width(spreads[-1])
+        return spreads
 
     def _add_joint_draws(self, layer: Layer, group: MemberGroup, columns: np.ndarray, spread: float, width: float) -> None:
         """Add how the components of a group that a layer adds, `columns` of the deviations, are drawn together."""
@@ -236,6 +238,12 @@ class Contributors:
                 pattern,
                 f'{layer.tolerance.kind}: the rule "{rule}" is for members that deviate by themselves, and the datums leave '
                 f'members to deviate together; choose "{INSIDE}" or "{EXTREMES}", or add the datum that locks them',
+            )
+        if pattern.form is not None and rule != INSIDE and not layer.tolerance.tangent:
+            raise self._error(
+                pattern,
+                f'{layer.tolerance.kind}: the rule "{rule}" is for features that keep their shape, and the form of this one is '
+                f'drawn; choose "{INSIDE}", or give its {pattern.form.kind} form=None',
             )
         is_axis = isinstance(group.members[0].geometry, AxisFeature)
         if rule == "polar" and not (is_axis and group.rows[0].shape[1] == len(group.added) == 2):

@@ -1,22 +1,32 @@
 """From the zone of a form to the spread of its modes: the share of faces that lie inside, as for displacements (see zones).
 
+Tolerances around that of a form limit form and displacements together: what the form leaves of their zones is left to these.
+
 The width of the least zone is a seminorm of the coefficients. In each direction of these the zone ends at a distance; the share
 of faces nearer than that is the chi distribution's.
 """
 
+import functools
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy
-from scipy.special import ndtri
 
 from tolcontact.features import FormField
 from tolcontact.features.least_zone import least_widths
-from tolcontact.variation.zones import SHARE
+from tolcontact.variation.zones import SHARE, MemberZone, directions
 
-LOG2_DIRECTIONS = 12
+DIRECTIONS = 1 << 12
+NESTED_DIRECTIONS = 1 << 13  # displacements have larger spreads than modes, so that fewer directions tell more
 MIN_SPREAD, MAX_SPREAD = 1e-6, 1e3  # of the width
+
+
+@functools.lru_cache(64)
+def _unit_widths(places: bytes, heights: bytes) -> np.ndarray:
+    """Return the widths (direction,) [mm] of least zones of modes with heights (place, mode) at places (place, 3)."""
+    points = np.frombuffer(places).reshape(-1, 3)
+    modes = np.frombuffer(heights).reshape(len(points), -1)
+    return least_widths(points, directions(modes.shape[1])[:DIRECTIONS] @ modes.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +35,11 @@ class FormSpread:
 
     field: FormField
 
-    @cached_property
+    @property
     def widths(self) -> np.ndarray:
         """The widths (direction,) of the zones for unit vectors of coefficients in all directions evenly."""
-        heights = self.field.heights(self.field.places)
-        normal = ndtri(scipy.stats.qmc.Sobol(self.field.modes, scramble=True, seed=0).random_base2(LOG2_DIRECTIONS))
-        directions = normal / np.linalg.norm(normal, axis=1, keepdims=True)
-        return least_widths(self.field.places, directions @ heights.T)
+        places = self.field.places
+        return _unit_widths(places.tobytes(), self.field.heights(places).tobytes())
 
     def share_inside(self, spread: float, width: float) -> float:
         """Return the share of faces, with coefficients of a standard deviation [mm], inside a zone of a width [mm]."""
@@ -48,3 +56,33 @@ class FormSpread:
     def mean_width(self, spread: float) -> float:
         """Return the mean width [mm] of the least zones of faces, with coefficients of a standard deviation [mm]."""
         return float(spread * scipy.stats.chi.mean(self.field.modes) * self.widths.mean())
+
+
+@dataclass(frozen=True, eq=False)
+class FormedZone(MemberZone):
+    """The zone of a plane that has form and displacements.
+
+    heights  (place, mode) [mm] of the form for coefficients of one standard deviation
+    offsets  (place, coordinate): heights of the plane for coordinates of 1
+    floats   whether the zone may lie anywhere along the normal of the plane
+    """
+
+    heights: np.ndarray
+    offsets: np.ndarray
+    floats: bool
+
+    @property
+    def identity(self) -> bytes:
+        return super().identity + self.heights.tobytes()
+
+    def take(self, count: int) -> "FormedZone":
+        return FormedZone(self.rows, self.coordinates[:, :count], self.heights, self.offsets, self.floats)
+
+    def share_inside(self, spreads: np.ndarray, width: float, count: int = NESTED_DIRECTIONS) -> float:
+        varying = np.flatnonzero((spreads > 0) & self.coordinates.any(axis=0))
+        modes = self.heights.shape[1]
+        unit = directions(modes + len(varying))[: min(count, NESTED_DIRECTIONS)]
+        displacements = self.offsets @ (self.coordinates[:, varying] * spreads[varying])
+        heights = unit[:, :modes] @ self.heights.T + unit[:, modes:] @ displacements.T
+        needed = np.ptp(heights, axis=1) if self.floats else 2 * np.abs(heights).max(axis=1)
+        return float(scipy.stats.chi.cdf(width / np.maximum(needed, 1e-300), unit.shape[1]).mean())

@@ -14,6 +14,8 @@ from tolcontact.declaration import OUTSIDE
 from tolcontact.declaration.feature_tolerance import INSIDE
 from tolcontact.discretization import Nominal
 from tolcontact.features import Datum, Layer, NominalFeature, NominalPattern, PlaneFeature, zone_of
+from tolcontact.features.feature_geometry import Probes
+from tolcontact.features.least_zone import least_widths
 from tolcontact.variation.component_zones import bonus
 from tolcontact.variation.draws import Draws
 
@@ -67,6 +69,8 @@ def measured_population(nominal: Nominal, draws: Draws, *, seed: int, count: int
                     [datum for letter in compartment for datum in datums[letter]] for compartment in layer.tolerance.system
                 ]
                 yield _measured_tolerance(pattern, layer, system, deviations)
+            elif layer.tolerance is pattern.form:
+                yield _measured_form(pattern, layer, deviations)
 
 
 def _in_turn(values: Sequence[np.ndarray]) -> np.ndarray:
@@ -90,9 +94,16 @@ def _measured_tolerance(
     tolerance, centre = layer.tolerance, pattern.geometry.centre
     primary = system[0][0].geometry if system else None
     zones = [zone_of(tolerance, member.geometry, primary) for member in pattern.members]
+    has_form = pattern.form is not None and not tolerance.tangent
+    probes = [_form_probes(member) if has_form else zone.probes for member, zone in zip(pattern.members, zones, strict=True)]
     measurements = [
-        _measurement(member, *zone.probes, deviations, centre) for member, zone in zip(pattern.members, zones, strict=True)
+        _measurement(member, *places, deviations, centre) for member, places in zip(pattern.members, probes, strict=True)
     ]
+    if has_form:
+        measurements = [
+            measurement._replace(values=measurement.values + _form_heights(member, deviations))
+            for member, measurement in zip(pattern.members, measurements, strict=True)
+        ]
     rows = np.vstack([measurement.rows for measurement in measurements])
     motion, free = _fitted_frame(pattern, system, deviations, tolerance.orientation_only)
     residuals = np.hstack([measurement.values for measurement in measurements]) - motion @ rows.T
@@ -101,9 +112,9 @@ def _measured_tolerance(
     following = U[:, MIN_NOTICED < S]
     residuals = residuals - residuals @ following @ following.T
     needed, allowed, start = [], [], 0
-    for member, zone, measurement in zip(pattern.members, zones, measurements, strict=True):
+    for member, zone, measurement, (_, directions) in zip(pattern.members, zones, measurements, probes, strict=True):
         end = start + len(measurement.rows)
-        of_member = residuals[:, start:end].reshape(len(residuals), *zone.probes[1].shape[:2])
+        of_member = residuals[:, start:end].reshape(len(residuals), *directions.shape[:2])
         needed.append(zone.needed_width(of_member))
         allowed.append(np.full(len(residuals), float(tolerance.width)))
         if tolerance.bonus != "none" and member.size_column is not None:
@@ -111,6 +122,31 @@ def _measured_tolerance(
         start = end
     stated = _stated_share(pattern, layer)
     return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(needed), _in_turn(allowed))
+
+
+def _measured_form(pattern: NominalPattern, layer: Layer, deviations: np.ndarray) -> MeasuredZone:
+    """Measure the tolerance by which the form of a feature or pattern is drawn: the least zones of its faces."""
+    widths = [
+        least_widths(member.form.places, _form_heights(member, deviations))
+        for member in pattern.members
+        if member.form is not None
+    ]
+    tolerance = layer.tolerance
+    stated = STATED_SHARE if tolerance.cp == 1 else np.nan
+    return _measured_zone(pattern, f"{tolerance}; {tolerance.rule}", stated, _in_turn(widths), tolerance.width)
+
+
+def _form_probes(feature: NominalFeature) -> Probes:
+    """Return places all over a plane with form, and its normal at each."""
+    assert feature.form is not None and isinstance(feature.geometry, PlaneFeature)
+    places = feature.form.places
+    return places, np.broadcast_to(feature.geometry.normal, (len(places), 1, 3))
+
+
+def _form_heights(feature: NominalFeature, deviations: np.ndarray) -> np.ndarray:
+    """Return the heights (n, place) [mm] of the form of drawn features at these places."""
+    assert feature.form is not None
+    return np.asarray(deviations[:, feature.form_columns] @ feature.form.heights(feature.form.places).T)
 
 
 def _stated_share(pattern: NominalPattern, layer: Layer) -> float:

@@ -40,11 +40,17 @@ class MemberZone:
         """The rows (point, entry, component) of the components."""
         return np.asarray(self.rows @ self.coordinates)
 
+    @property
+    def identity(self) -> bytes:
+        """The bytes on which shares depend, beside spreads."""
+        rows = self.component_rows
+        return rows[..., (rows != 0).any(axis=(0, 1))].tobytes()
+
     def take(self, count: int) -> "MemberZone":
         """Return the same zone of the first components alone."""
         return MemberZone(self.rows, self.coordinates[:, :count])
 
-    def share_inside(self, spreads: np.ndarray, width: float, directions: int = 1 << LOG2_DIRECTIONS) -> float:
+    def share_inside(self, spreads: np.ndarray, width: float, count: int = 1 << LOG2_DIRECTIONS) -> float:
         """Return the share of members, with standard deviations (component,), inside a zone of a width."""
         rows = self.component_rows
         if not rows.size:
@@ -57,7 +63,7 @@ class MemberZone:
             rows, varied = self.rows @ _root(scaled @ scaled.T), np.ones(self.rows.shape[2])
         if not len(varied):
             return 1.0
-        longest = _longest(rows, _directions(len(varied))[:directions] * varied)
+        longest = _longest(rows, directions(len(varied))[:count] * varied)
         return float(scipy.stats.chi.cdf(width / 2 / np.maximum(longest, 1e-300), len(varied)).mean())
 
 
@@ -65,12 +71,11 @@ def share_inside(members: Sequence[MemberZone], spreads: np.ndarray, width: floa
     """Return the mean share of members, with standard deviations (component,), inside their zones of a width."""
     counts, zones = Counter[tuple[bytes, bytes]](), dict[tuple[bytes, bytes], MemberZone]()
     for member in members:
-        rows = member.component_rows
-        key = rows[..., (rows != 0).any(axis=(0, 1))].tobytes(), spreads[(rows != 0).any(axis=(0, 1))].tobytes()
+        key = member.identity, spreads[(member.component_rows != 0).any(axis=(0, 1))].tobytes()
         counts[key] += 1
         zones[key] = member
-    directions = max(MIN_DIRECTIONS, MEMBER_DIRECTIONS >> len(counts).bit_length())
-    shares = [zones[key].share_inside(spreads, width, directions) for key in counts]
+    count = max(MIN_DIRECTIONS, MEMBER_DIRECTIONS >> len(counts).bit_length())
+    shares = [zones[key].share_inside(spreads, width, count) for key in counts]
     return shares[0] if len(shares) == 1 else float(np.average(shares, weights=list(counts.values())))
 
 
@@ -124,13 +129,13 @@ def _longest(rows: np.ndarray, components: np.ndarray) -> np.ndarray:
 
 def component_bounds(rows: np.ndarray, width: float) -> np.ndarray:
     """Return bounds (component,) of the absolute components of features inside, with a margin of 5 %."""
-    u = _directions(rows.shape[-1])
+    u = directions(rows.shape[-1])
     longest = _longest(rows, u)
     return 1.05 * np.abs(u / longest[:, None] * width / 2).max(axis=0)
 
 
 @functools.lru_cache
-def _directions(components: int) -> np.ndarray:
+def directions(components: int) -> np.ndarray:
     """Return unit vectors (direction, component) in all directions evenly."""
     if components == 1:
         return np.ones((1, 1))
