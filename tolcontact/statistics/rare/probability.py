@@ -1,7 +1,7 @@
 """The probability of a rare event, from two searches and importance sampling about what they found."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,7 +9,15 @@ import numpy as np
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
-from tolcontact.statistics.rare.searches import INFLATIONS, Found, Score, by_inflation, by_levels, first_inflation
+from tolcontact.statistics.rare.searches import (
+    Found,
+    Score,
+    Scores,
+    answered,
+    by_inflation,
+    by_levels,
+    first_inflation,
+)  # fmt: skip
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
 FIRST_LOOK, MIN_LOOK, SUFFICIENT = 0.25, 4000, 1.5  # share and number of realizations; upper over lower bound that suffices
@@ -111,23 +119,18 @@ def _replicates(score: Score, dimensions: int, budget: int, rng: np.random.Gener
         used += len(u)
         return score(u)
 
-    search: Callable[[int], Found]
+    def search(count: int, rng: np.random.Generator) -> Scores[Found]:
+        return by_inflation(dimensions, count, rng, inflation) if inflates else by_levels(dimensions, count, rng)
+
+    inflation = 1.0
     if inflates:
         looks = max(int(SCOUTING * budget), MIN_LEVEL_SAMPLES)
-        inflation = first_inflation(counting, dimensions, looks // len(INFLATIONS) * len(INFLATIONS) or looks, rng)
-
-        def search(count: int) -> Found:
-            return by_inflation(counting, dimensions, count, rng, inflation)
-    else:
-
-        def search(count: int) -> Found:
-            return by_levels(counting, dimensions, count, rng)
-
+        [inflation] = answered([first_inflation(dimensions, looks, rng)], counting)
     trial, used_before = max(budget // 100, MIN_LEVEL_SAMPLES), used
-    search(trial)
+    answered([search(trial, rng)], counting)
     cost = max((used - used_before) / trial, 1.0)  # the number of levels
     count = max(int((budget - used) / REPLICATES / cost), MIN_LEVEL_SAMPLES)
-    return [search(count) for _ in range(REPLICATES)]
+    return answered([search(count, generator) for generator in rng.spawn(REPLICATES)], counting)
 
 
 def _importance(
