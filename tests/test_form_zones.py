@@ -103,3 +103,14 @@ def test_a_population_is_measured_with_its_form():
     assert population.zone_tolerance.values.tolist() == ["flatness 0.1; 99.73 % inside", "profile 0.2 A B C; 99.73 % inside"]
     assert (population.stated_share.values == 0.9973).all()
     assert (np.abs(population.share_inside.sel(interval="estimate").values - 0.9973) < 0.004).all()
+
+
+def test_a_profile_without_datums_is_the_form_of_a_plane():
+    spreads = [
+        [contributor.spread for contributor in tc.build(toleranced.block_with("top", tolerance)).draws.contributors]
+        for tolerance in (tc.Flatness(0.1), tc.Profile(0.1), tc.LineProfile(0.1))
+    ]
+    assert len(spreads[0]) == 20 and spreads[0] == spreads[1] == spreads[2]
+    assert not len(tc.build(toleranced.block_with("top", tc.Profile(0.1, form=None))).draws.contributors)
+    with pytest.raises(tc.ModelError, match="the form of profile of a cylinder cannot be drawn"):
+        tc.build(toleranced.ring_with("bore", tc.Profile(0.1)))
