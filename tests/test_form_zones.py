@@ -8,6 +8,7 @@ from scipy.stats import beta
 import tolcontact as tc
 from tests.cases import toleranced
 from tests.cases.seats import seat
+from tests.helpers import nightly
 from tolcontact.features.least_zone import least_widths
 from tolcontact.variation.form_spreads import FormSpread
 
@@ -43,7 +44,7 @@ def test_the_least_zone_by_closed_form():
     np.testing.assert_allclose(least_widths(places, heights), [2, 2, 0], rtol=1e-6, atol=1e-6)
 
 
-@pytest.mark.parametrize("form", FORMS, ids=str)
+@pytest.mark.parametrize("form", [FORMS[0], *nightly(*FORMS[1:])], ids=str)
 def test_a_stated_share_of_faces_lies_inside(form):
     field, count, width = field_of(form), 200_000, 0.05
     spread = FormSpread(field).spread(width)
@@ -103,3 +104,14 @@ def test_a_population_is_measured_with_its_form():
     assert population.zone_tolerance.values.tolist() == ["flatness 0.1; 99.73 % inside", "profile 0.2 A B C; 99.73 % inside"]
     assert (population.stated_share.values == 0.9973).all()
     assert (np.abs(population.share_inside.sel(interval="estimate").values - 0.9973) < 0.004).all()
+
+
+def test_a_profile_without_datums_is_the_form_of_a_plane():
+    spreads = [
+        [contributor.spread for contributor in tc.build(toleranced.block_with("top", tolerance)).draws.contributors]
+        for tolerance in (tc.Flatness(0.1), tc.Profile(0.1), tc.LineProfile(0.1))
+    ]
+    assert len(spreads[0]) == 20 and spreads[0] == spreads[1] == spreads[2]
+    assert not len(tc.build(toleranced.block_with("top", tc.Profile(0.1, form=None))).draws.contributors)
+    with pytest.raises(tc.ModelError, match="the form of profile of a cylinder cannot be drawn"):
+        tc.build(toleranced.ring_with("bore", tc.Profile(0.1)))

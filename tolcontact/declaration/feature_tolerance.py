@@ -35,7 +35,8 @@ class GeometricTolerance(Readable):
     outside     [mm] of a profile: the part of the zone that lies outside the material; by default half
     per         [mm] of flatness or straightness: it applies to any part of the surface of this length, or of two such lengths
     tangent     True for a zone of the plane that touches a plane from outside the material; its form may then be outside
-    form        of a tolerance of form: how the form deviates; None if it is stated alone, and the feature keeps its shape
+    form        of a tolerance of form, or a profile without datums: how the form deviates; None if it is stated alone, and the
+                feature keeps its shape
     rule        from the zone to the spread of all freedoms together. "99.73 % inside" (default): this share of features lies
                 inside, where components are equal, independent and normal. "6 sigma at the extremes": six standard deviations
                 at the worst extreme of the feature equal the width. "truncated": the same, without the features outside.
@@ -98,6 +99,11 @@ class GeometricTolerance(Readable):
         """The lengths [mm] of the parts of a surface that it applies to; none for the surface as a whole."""
         return () if self.per is None else tuple(self.per) if isinstance(self.per, list | tuple) else (self.per,)
 
+    @property
+    def limits_form_alone(self) -> bool:
+        """Whether it limits no displacement of a feature by itself: a tolerance of form, or a profile without datums."""
+        return self.is_form or not (self.needs_datums or self.datums)
+
     def faults(self) -> Iterator[str]:
         if not (is_length(self.width) and (self.width > 0 or (self.width == 0 and self.material))):
             bound = "0 or above" if self.material else "above 0"
@@ -144,7 +150,7 @@ class GeometricTolerance(Readable):
             yield f"tangent is {self.tangent!r}; expected True or False"
 
     def _form_faults(self) -> Iterator[str]:
-        if not self.is_form and self.form != USUAL_FORM:
+        if not self.limits_form_alone and self.form != USUAL_FORM:
             yield f"form is given, which {self.kind} does not have; leave it out"
         elif isinstance(self.form, Form):
             yield from (f"form: {fault}" for fault in self.form.faults())

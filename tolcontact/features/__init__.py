@@ -45,10 +45,10 @@ the zone as the size departs from its maximum (least) material limit: `bonus="fi
 
 ## Form
 
-A plane with a flatness is not flat: each drawn face has bumps and hollows of its own, and contact, locators, measured points
-and datum targets all see the same ones. Heights are a random field, the sum of modes with normal coefficients. Each
-coefficient is a contributor, "part.feature.form 01". Their common spread is such that 99.73 % of the faces need no wider zone
-than the flatness:
+A plane with a flatness, or with a profile without datums, is not flat: each drawn face has bumps and hollows of its own, and
+contact, locators, measured points and datum targets all see the same ones. Heights are a random field, the sum of modes with
+normal coefficients. Each coefficient is a contributor, "part.feature.form 01". Their common spread is such that 99.73 % of the
+faces need no wider zone than the flatness:
 
 >>> rough = tc.Assembly("rough")
 >>> part = rough.part("part", tc.Box(100, 50, 10), fixed=True)

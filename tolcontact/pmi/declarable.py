@@ -42,8 +42,8 @@ def tolerance(stated: Tolerance, *, is_axis: bool) -> GeometricTolerance:
         raise Undeclared("its zone is flat, and the file does not state across which direction")
     mark = "" if stated.refines is None else "><"  # the lower segments of a composite frame lock directions alone
     system = "|".join(_compartment(reference) + mark for reference in stated.datums)
-    if kind.is_form and not is_drawn(kind, options.get("per")):
-        options["form"] = None
+    if (kind.is_form and not is_drawn(kind, options.get("per"))) or not (kind.is_form or kind.needs_datums or system):
+        options["form"] = None  # a profile without datums may be of any surface
     result = kind(stated.value, system, **options)
     if not system and kind.needs_datums and kind is not declared.Position:  # which members of a pattern may have
         raise Undeclared("it needs datums, and the file states none")
