@@ -150,7 +150,7 @@ class ElementQP:
             "astray": np.zeros((count, 1)),
         }
 
-    def energy(self, **inputs: Float[Array, "realization _"]) -> Arrays:
+    def energy(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
         """Return the objective of contact_qp."""
         inputs = {name: flat(values) for name, values in inputs.items()}
         arrays = inputs | self._shared_arrays(inputs) | {"energy": np.empty((len(inputs["poses"]), self.slacks))}
@@ -158,7 +158,7 @@ class ElementQP:
             batch.energy(len(inputs["poses"]), arrays | batch.own)
         return {"energy": arrays["energy"].sum(axis=1, keepdims=True)}
 
-    def relate(self, **inputs: Float[Array, "realization _"]) -> Arrays:
+    def relate(self, **inputs: Float[Array, "realization ..."]) -> Arrays:
         """Return X_RM of all pairs at `poses`."""
         poses, deviations = flat(inputs["poses"]), flat(inputs["deviations"])
         count = len(poses)

@@ -72,10 +72,18 @@ class NativeFunction:
     def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
         """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
-        Arrays of numbers lie row by row in memory. Inputs of one row are the same for all realizations.
+        Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are.
         """
-        steps = [array.shape[1] if len(array) > 1 else 0 for array in arrays]
+        steps = [_row_step(array) for array in arrays]
         self._evaluate(count, places.elements, pointers(arrays), (ctypes.c_int64 * len(steps))(*steps), places.addresses)
+
+
+def _row_step(array: np.ndarray) -> int:
+    """Return by how many numbers the rows of an array are apart, 0 if it has one. Raises ValueError if a row has gaps."""
+    row, entry = array.strides
+    if array.dtype != np.float64 or (entry != array.itemsize and array.shape[1] > 1):
+        raise ValueError(f"rows of {array.dtype} with strides {array.strides}; expected rows of float64 without gaps")
+    return row // array.itemsize if len(array) > 1 else 0
 
 
 def _module(function: ca.Function) -> ir.Module:
