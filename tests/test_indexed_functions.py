@@ -4,45 +4,38 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from tolcontact.compilation.functions import NamedFunction, named
+from tolcontact.compilation.functions.named import AdaptiveFunction
+from tolcontact.compilation.functions.native import NativeFunction
+from tolcontact.compilation.functions.places import Places
 
 COUNT, ELEMENTS = 7, 3
+WAYS = pytest.mark.parametrize("way", [NativeFunction, AdaptiveFunction], ids=["compiled", "interpreted"])
 
 
-def sum_and_product() -> NamedFunction:
+def sum_and_product():
     x, y = ca.SX.sym("x", 2), ca.SX.sym("y", 2)
-    return NamedFunction(ca.Function("f", [x, y], [x + y, ca.dot(x, y)], ["x", "y"], ["sum", "product"]))
+    return ca.Function("sum_and_product", [x, y], [x + y, ca.dot(x, y)])
 
 
-@pytest.mark.parametrize("calls", [0, 10**9], ids=["compiled", "interpreted"])
+@WAYS
 @pytest.mark.parametrize("rows", [1, COUNT])
-def test_elements_have_places_in_shared_arrays(monkeypatch, calls, rows):
-    monkeypatch.setattr(named, "MIN_COMPILED_CALLS", calls)
+def test_elements_have_places_in_shared_arrays(way, rows):
     rng = np.random.default_rng(1)
-    wide, y = rng.normal(size=(COUNT, 9)), rng.normal(size=(rows, 4))
-    x = wide[:, 1:7]  # the rows of a slice are apart
-    places = {
-        "x": rng.integers(0, 6, (ELEMENTS, 2)), "y": rng.integers(0, 4, (ELEMENTS, 2)),
-        "sum": rng.permutation(6).reshape(ELEMENTS, 2), "product": rng.permutation(5)[:ELEMENTS, None],
-    }  # fmt: skip
-    results = {"sum": np.zeros((COUNT, 6)), "product": np.full((COUNT, 5), -1.0)}
-    function = sum_and_product().at(places)
-    for _ in range(2):  # the first call looks for machine code, the second one compiles
-        function(COUNT, {"x": x, "y": y, **results})
+    x = rng.normal(size=(COUNT, 9))[:, 1:7]  # the rows of a slice are apart
+    y = rng.normal(size=(rows, 4))  # one row counts for all realizations
+    of_x, of_y = rng.integers(0, 6, (ELEMENTS, 2)), rng.integers(0, 4, (ELEMENTS, 2))
+    of_sum, of_product = rng.permutation(6).reshape(ELEMENTS, 2), rng.permutation(5)[:ELEMENTS, None]
+    sums, products = np.zeros((COUNT, 6)), np.full((COUNT, 5), -1.0)
+    way(sum_and_product()).evaluate(COUNT, [x, y, sums, products], Places([of_x, of_y, of_sum, of_product]))
     for element in range(ELEMENTS):
-        a = x[:, places["x"][element]]
-        b = np.broadcast_to(y, (COUNT, 4))[:, places["y"][element]]
-        assert np.array_equal(results["sum"][:, places["sum"][element]], a + b)
-        assert np.allclose(results["product"][:, places["product"][element, 0]], (a * b).sum(axis=1), rtol=1e-15, atol=1e-15)
-    untouched = np.setdiff1d(np.arange(5), places["product"])
-    assert (results["product"][:, untouched] == -1).all()
+        a, b = x[:, of_x[element]], np.broadcast_to(y, (COUNT, 4))[:, of_y[element]]
+        assert np.array_equal(sums[:, of_sum[element]], a + b)
+        assert np.allclose(products[:, of_product[element, 0]], (a * b).sum(axis=1), rtol=1e-14, atol=1e-15)
+    assert (products[:, np.setdiff1d(np.arange(5), of_product)] == -1).all()
 
 
-def test_rows_with_gaps_are_refused(monkeypatch):
-    monkeypatch.setattr(named, "MIN_COMPILED_CALLS", 0)
-    first = np.zeros((1, 1), dtype=int)
-    function = sum_and_product().at({**dict.fromkeys(("x", "y", "sum"), np.array([[0, 1]])), "product": first})
-    arrays = {name: np.zeros((COUNT, 4)) for name in ("x", "y", "sum", "product")}
-    function(COUNT, arrays)  # the first call looks for machine code, the second one compiles
+def test_rows_with_gaps_are_refused():
+    function = NativeFunction(sum_and_product())
+    arrays = [np.zeros((COUNT, 8))[:, ::2], np.zeros((COUNT, 2)), np.zeros((COUNT, 2)), np.zeros((COUNT, 1))]
     with pytest.raises(ValueError, match="without gaps"):
-        function(COUNT, arrays | {"x": np.zeros((COUNT, 8))[:, ::2]})
+        function.evaluate(COUNT, arrays, Places.of_one([2, 2, 2, 1]))
