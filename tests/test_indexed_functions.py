@@ -34,6 +34,13 @@ def test_elements_have_places_in_shared_arrays(way, rows):
     assert (products[:, np.setdiff1d(np.arange(5), of_product)] == -1).all()
 
 
+@WAYS
+def test_no_realization_is_no_work(way):
+    function, nothing = way(sum_and_product()), np.zeros((0, 2))
+    function.evaluate(0, [nothing, nothing, nothing, nothing[:, :1]], Places.of_one([2, 2, 2, 1]))
+    assert [len(result) for result in function([nothing, nothing])] == [0, 0]
+
+
 def test_rows_with_gaps_are_refused():
     function = NativeFunction(sum_and_product())
     arrays = [np.zeros((COUNT, 8))[:, ::2], np.zeros((COUNT, 2)), np.zeros((COUNT, 2)), np.zeros((COUNT, 1))]

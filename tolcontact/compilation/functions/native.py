@@ -81,7 +81,7 @@ class NativeFunction:
 def _row_step(array: np.ndarray) -> int:
     """Return by how many numbers the rows of an array are apart, 0 if it has one. Raises ValueError if a row has gaps."""
     row, entry = array.strides
-    if array.dtype != np.float64 or (entry != array.itemsize and array.shape[1] > 1):
+    if array.dtype != np.float64 or (entry != array.itemsize and array.shape[1] > 1 and array.size):
         raise ValueError(f"rows of {array.dtype} with strides {array.strides}; expected rows of float64 without gaps")
     return row // array.itemsize if len(array) > 1 else 0
 
