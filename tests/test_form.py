@@ -16,7 +16,7 @@ from tolcontact.discretization import Offsets, discretize
 from tolcontact.errors import ModelError
 from tolcontact.features import FormField
 from tolcontact.simulation import simulate_blocks
-from tolcontact.simulation.surfaces import check_surfaces
+from tolcontact.simulation.surfaces import check_surfaces, warn_of
 from tolcontact.testing import assert_gaps_recompute, assert_resolved
 from tolcontact.vocabulary import CORRECTED, Status
 
@@ -106,6 +106,16 @@ def test_faces_of_a_seat_do_not_penetrate_each_other_between_contact_points():
     program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
     surfaces = check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
     assert 0 < surfaces.penetration[:, 0].max() < 1e-3
+
+
+def test_a_warning_of_penetration_gives_half_the_spacing():
+    program, run = simulate(seat(), samples=60, solver="daqp", method=SEATED)
+    surfaces = check_surfaces(program, run["poses"][:, CORRECTED], run["deviations"])
+    surfaces.penetration[:] = 1.0
+    with pytest.warns(tc.ContactWarning, match=r'pair "seat": .*; place contact points closer together, such as spacing=2.4$'):
+        warn_of(program, surfaces)
+    pair = program.nominal.pairs[0]
+    assert pair.form_spacing / 2 == pytest.approx(2.4, abs=0.05)
 
 
 def test_without_coefficients_a_face_is_flat():

@@ -46,3 +46,9 @@ def test_rows_with_gaps_are_refused():
     arrays = [np.zeros((COUNT, 8))[:, ::2], np.zeros((COUNT, 2)), np.zeros((COUNT, 2)), np.zeros((COUNT, 1))]
     with pytest.raises(ValueError, match="without gaps"):
         function.evaluate(COUNT, arrays, Places.of_one([2, 2, 2, 1]))
+    arrays[0] = np.zeros((COUNT, 1))
+    with pytest.raises(ValueError, match="at least 2 columns"):
+        function.evaluate(COUNT, arrays, Places.of_one([2, 2, 2, 1]))
+    arrays[0] = np.zeros((COUNT - 1, 2))
+    with pytest.raises(ValueError, match="expected 7 rows, or one"):
+        function.evaluate(COUNT, arrays, Places.of_one([2, 2, 2, 1]))

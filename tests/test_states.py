@@ -47,11 +47,9 @@ def test_the_better_of_two_states_is_kept():
     best, here = (State.start(poses + number, relative, 2, []) for number in (1.0, 2.0))
     best.slack[:], best.astray[:] = [[0.0, 0.2], [0.5, 0.0], [0.0, 0.0], [0.1, 0.0]], [0, 0, 0, 1.0]
     here.astray[:] = [0, 0, 1e-3, 0]
-    progress, still = Progress.unknown(best), np.zeros(4)
-    assert not progress.is_known.any()
+    progress, still = Progress.start(best), np.zeros(4)
     progress.look(best, best.slack.copy(), still, is_held=False)
     progress.look(here, inside, still, is_held=False)
-    assert progress.is_known.all()
     assert progress.best.poses[:, 0, 0].tolist() == [2, 1, 1, 2]  # of those that are alike the first one
     assert progress.best.slack.tolist() == [[0.1, 0.0], [0.5, 0.0], [0.0, 0.0], [0.3, 0.4]]
 
@@ -59,7 +57,7 @@ def test_the_better_of_two_states_is_kept():
 def test_steps_are_over_after_some_that_gained_nothing():
     """In a conflict gains are of penetration, else of the size of steps; steps that are held back do not count."""
     state = State.start(np.zeros((3, 1, 12)), np.zeros((3, 1, 12)), 2, [])
-    progress, falls = Progress.unknown(state), 0.85 ** np.arange(50)
+    progress, falls = Progress.start(state), 0.85 ** np.arange(50)
     conflicts, others = np.full(3, True), np.full(3, False)
     for number, fall in enumerate(falls):
         until = falls[min(number, 10)]  # the second goes on to fall, the third does so in the first ten steps

@@ -32,7 +32,8 @@ summary recommends `exact`. The single step fails for a U in a U without clearan
 True
 
 The exact resolution first takes steps like the paper's. Realizations that have not converged after eight steps continue with
-Newton steps, which take the curvature of the gaps and the objective into account. If there is a conflict, no solution, or a
+Newton steps, which take the curvature of the gaps and the objective into account. They end where twenty became no smaller, or
+where parts contradict each other and ten left no less penetration. If there is a conflict, no solution, or a
 solution far from the raw pose, other starts are tried: from the nominal pose, with small steps, or with contact points that
 are projected again. The best solution is kept; `starts` counts the starts.
 

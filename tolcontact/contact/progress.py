@@ -17,7 +17,7 @@ class Progress:
     """What was reached, and for how many steps, not held back, nothing better was.
 
     best       State (n) of least true penetration; its `slack` is the penetration of each pair
-    violation  (n,) [mm] of these poses: infinite as long as none is known
+    violation  (n,) [mm] of these poses
     stale      (n,) number of steps since the violation fell
     unrest     (n,) [mm]: the smallest step
     restless   (n,) number of steps since then
@@ -30,17 +30,12 @@ class Progress:
     restless: Int[Array, " n"]
 
     @classmethod
-    def unknown(cls, state: State) -> "Progress":
-        """Return the progress before the first step."""
+    def start(cls, state: State) -> "Progress":
+        """Return the progress before the first look."""
         count = len(state)
         violation, unrest = np.full((2, count), np.inf)
         stale, restless = np.zeros((2, count), dtype=int)
         return cls(state.take(np.arange(count)), violation, stale, unrest, restless)
-
-    @property
-    def is_known(self) -> Bool[Array, " n"]:
-        """(n,): whether there were poses to compare."""
-        return np.isfinite(self.violation)
 
     def is_over(self, in_conflict: Bool[Array, " n"]) -> Bool[Array, " n"]:
         """Return whether further steps are not expected to gain (n,): drift, cycles and chaos gain nothing at all."""
@@ -52,14 +47,14 @@ class Progress:
         unrest    (n,) [mm]: the size of the step
         is_held   whether the step was held back
         """
-        candidate = state.take(np.arange(len(state)))
-        candidate.slack[:] = penetration
-        violation = candidate.slack.max(axis=1, initial=0) + ASTRAY_WEIGHT * candidate.astray
+        violation = penetration.max(axis=1, initial=0) + ASTRAY_WEIGHT * state.astray
         falls, calms = violation < (1 - MIN_GAIN) * self.violation, unrest < (1 - MIN_CALMING) * self.unrest
         self.stale = np.where(falls | is_held, 0, self.stale + 1)
         self.restless = np.where(calms | is_held, 0, self.restless + 1)
         better = np.flatnonzero(violation < self.violation)
-        self.best.put(better, candidate.take(better))
+        candidate = state.take(better)
+        candidate.slack[:] = penetration[better]
+        self.best.put(better, candidate)
         self.violation[better] = violation[better]
         self.unrest = np.minimum(self.unrest, unrest)
 

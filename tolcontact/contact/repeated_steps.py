@@ -48,8 +48,8 @@ STEPS_WHERE_FACES_END = (
 
 def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task, state: State, stride: float) -> None:
     """Take the steps of `state` to their end. Without rest there is an answer only if the parts contradict each other."""
-    unsettled, progress = Unsettled(task, state), Progress.unknown(state)
-    trail: list[np.ndarray] = []
+    unsettled, trail = Unsettled(task, state), list[np.ndarray]()
+    progress: Progress | None = None
     if not len(task):
         return
     asleep, last = np.zeros(len(task), dtype=bool), None
@@ -77,7 +77,8 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
         unsettled.settle(~moves)
         # What rests while it is held back need not be held back longer.
         asleep = (size[moves] <= STEP_TOLERANCE) & (kind.width > 1)
-        unrest, progress, trail = unrest[moves], progress.take(moves), [poses[moves] for poses in trail]
+        unrest, trail = unrest[moves], [poses[moves] for poses in trail]
+        progress = None if progress is None else progress.take(moves)
         if not len(unsettled):
             return
         if candidates.bounded:
@@ -87,19 +88,22 @@ def repeat(step: LinearStep, limits: Limits, candidates: Candidates, task: Task,
             unsettled.task = replace(unsettled.task, scans=scans)
         if kind.newton:
             penetration = _true_penetration(unsettled.task, unsettled.state)
+            progress = progress or Progress.start(unsettled.state)
             progress.look(unsettled.state, penetration, unrest, is_held=kind.firmness > 1)
             ends = progress.is_over(_is_stuck(unsettled.state))
-            _end(unsettled, progress, unrest, ends)
-            asleep, unrest, progress = asleep[~ends], unrest[~ends], progress.take(~ends)
-            trail = [poses[~ends] for poses in trail]
+            if ends.any():
+                _end(unsettled, progress, unrest, ends)
+                asleep, unrest, progress = asleep[~ends], unrest[~ends], progress.take(~ends)
+                trail = [poses[~ends] for poses in trail]
     _end(unsettled, progress, unrest, np.ones(len(unsettled), dtype=bool))
 
 
-def _end(unsettled: Unsettled, progress: Progress, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
+def _end(unsettled: Unsettled, progress: Progress | None, unrest: Float[Array, " n"], ends: Bool[Array, " n"]) -> None:
     """End realizations without rest (n,): parts that contradict each other where their penetration was least."""
     state = unsettled.state
-    stuck = np.flatnonzero(ends & _is_stuck(state) & progress.is_known)
-    state.put_answer(stuck, progress.best.take(stuck))
+    if progress is not None:
+        stuck = np.flatnonzero(ends & _is_stuck(state))
+        state.put_answer(stuck, progress.best.take(stuck))
     residual = np.maximum(state.kkt_residual, np.where(state.in_conflict, 0, unrest))
     state.kkt_residual[ends] = residual[ends]
     unsettled.settle(ends)

@@ -103,7 +103,7 @@ def _points(
     rim = points.P_m[:, count:]
     row = np.repeat(np.arange(len(X_RM)), rim.shape[1])
     at_rim = form.at(row, rim.reshape(-1, 3), points.P_r[:, count:].reshape(-1, 3)).reshape(rim.shape[:2])
-    heights = np.concatenate([form.at_all(pair.P_m, pair.P_r), at_rim], axis=1)
+    heights = np.concatenate([pair.form_heights(deviations), at_rim], axis=1)
     numbers = _lowest_over(pair, X_RM, points, points.gaps - heights)
     if retained is not None:
         kept = np.where(retained >= FIRST_POINT, retained - FIRST_POINT, -1)

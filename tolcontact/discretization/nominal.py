@@ -23,6 +23,7 @@ from tolcontact.geometry.faces import Meshes, triangles
 from tolcontact.geometry.overlap import points_on_rim
 from tolcontact.geometry.surface import Surface
 
+EVERY_POINT = slice(None)
 RIM_REACH = 0.1  # of the size of the moving face: how far from it, nominally, rim points of the other face count
 GAPS_TOGETHER = 1 << 20  # that are computed at once
 
@@ -145,11 +146,16 @@ class ContactPoints:
         """Whether one of the faces has form."""
         return any(face is not None and face.form is not None for face in self.deviating)
 
+    @property
+    def form_spacing(self) -> float:
+        """The usual spacing [mm] of contact points of faces with form."""
+        return form_spacing(form_lengths(self.deviating))
+
     @cached_property
     def reference_rim(self) -> np.ndarray:
         """Points (point, 3) [mm] along the rim of a reference face where faces with form may touch."""
         assert self.moving_face is not None and self.reference_face is not None
-        points = points_on_rim(self.reference_face, form_spacing(form_lengths(self.deviating)))
+        points = points_on_rim(self.reference_face, self.form_spacing)
         distance = np.linalg.norm(self.moving_face.nearest(points)[1] - points, axis=1)
         return points[distance < RIM_REACH * self.moving_face.mesh.scale]
 
@@ -163,6 +169,20 @@ class ContactPoints:
         """Return the forms of both faces for deviations (row, contributor)."""
         return PairForm(self.deviating, deviations)
 
+    def form_heights(self, deviations: np.ndarray, points: np.ndarray | slice = EVERY_POINT) -> np.ndarray:
+        """Return the sums of both forms (row, point) [mm] at contact points, for deviations (row, contributor)."""
+        heights = np.zeros((len(deviations), len(self.P_m[points])))
+        for columns, modes in self._modes:
+            for column, mode in zip(columns, modes[points].T, strict=True):
+                heights += deviations[:, column, None] * mode
+        return heights
+
+    @cached_property
+    def _modes(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The columns (mode,) of the forms of both faces, and their heights (point, mode) at the points for deviations of 1."""
+        sides = zip(self.deviating, (self.P_m, self.P_r), strict=True)
+        return [(face.form_columns, face.form.heights(P)) for face, P in sides if face is not None and face.form is not None]
+
     def least_gap(self, X_RM: np.ndarray, deviations: np.ndarray | None = None) -> np.ndarray:
         """Return the least gap (row,) [mm] of the points at X_RM (row, 12) for deviations (row, contributor) of the faces."""
         gaps, together = np.empty(len(X_RM)), max(1, GAPS_TOGETHER // max(len(self.P_m), 1))
@@ -170,7 +190,7 @@ class ContactPoints:
             rows = slice(k, k + together)
             of_points = ((pose.apply(X_RM[rows], self.P_m) - self.P_r) * self.n_r).sum(axis=2)
             if deviations is not None and self.has_form:
-                of_points -= self.form(deviations[rows]).at_all(self.P_m, self.P_r)
+                of_points -= self.form_heights(deviations[rows])
             gaps[rows] = of_points.min(axis=1)
         return gaps if deviations is None else gaps - self.heights(deviations)
 

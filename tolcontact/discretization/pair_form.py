@@ -31,15 +31,6 @@ class PairForm:
                     heights += self.deviations[row, column] * modes
         return heights
 
-    def at_all(self, P_m: Float[Array, "point 3"], P_r: Float[Array, "point 3"]) -> Float[Array, "row point"]:
-        """Return the sums of both heights (row, point) [mm] at places that are the same in all rows."""
-        heights = np.zeros((len(self.deviations), len(P_m)))
-        for face, places in zip(self.deviating, (P_m, P_r), strict=True):
-            if face is not None and face.form is not None:
-                for column, modes in zip(face.form_columns, face.form.heights(places).T, strict=True):
-                    heights += self.deviations[:, column, None] * modes
-        return heights
-
     def highest(self) -> Float[Array, " row"]:
         """Return a bound (row,) [mm] of the sums of both heights, from the heights at many places of each face."""
         bound = np.zeros(len(self.deviations))

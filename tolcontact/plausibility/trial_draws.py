@@ -57,7 +57,7 @@ class TrialDraws:
             return np.asarray(self.program.round_gaps[k](X_RM=X_RM, deviations=deviations)["gaps"])[:, chosen_points]
         P_m, P_r, n_r = pair.P_m[chosen_points], pair.P_r[chosen_points], pair.n_r[chosen_points]
         gaps = ((pose.apply(X_RM, P_m) - P_r) * n_r).sum(axis=2) - pair.heights(deviations)[:, None]
-        return gaps - pair.form(deviations).at_all(P_m, P_r) if pair.has_form else gaps
+        return gaps - pair.form_heights(deviations, chosen_points)
 
     @cached_property
     def pushes(self) -> list[float]:

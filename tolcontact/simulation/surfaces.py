@@ -54,7 +54,7 @@ def check_surfaces(program: Program, poses: Float[Array, "n part 12"], deviation
         if fixed and not pair.round and k not in program.meetings:  # else contact points are those that stand over the face
             places = pose.apply(X_RM, pair.P_m)
             gaps = ((places - pair.P_r) * pair.n_r).sum(axis=2)
-            raised = heights[:, None] if form is None else heights[:, None] + form.at_all(pair.P_m, pair.P_r)
+            raised = heights[:, None] if form is None else heights[:, None] + pair.form_heights(deviations)
             row, point = np.nonzero(gaps < TOUCHING_GAP + raised)
             depth = np.maximum(-pair.least_gap(raw_relative[:, k], deviations), 0)
             inside = np.flatnonzero(depth)
@@ -97,6 +97,9 @@ def _advice(program: Program, k: int) -> str:
         return 'use --resolution exact, or tc.Method(resolution="exact")'
     if not program.method.is_bounded:
         return f'faces may end within reach of contact: leave out search="{program.method.search}"'
+    pair = program.nominal.pairs[k]
+    if pair.has_form:
+        return f"place contact points closer together, such as spacing={pair.form_spacing / 2:.2g}"
     return "use a finer mesh" if k in program.meetings else "use more contact points"
 
 

@@ -72,18 +72,21 @@ class NativeFunction:
     def evaluate(self, count: int, arrays: Sequence[Float[Array, "_ _"]], places: Places) -> None:
         """Read inputs from the first arrays, and write results into the others, at the `places` of all elements.
 
-        Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are.
+        Inputs of one row are the same for all realizations. Rows may be apart, as those of a slice of columns are. Raises
+        ValueError for arrays of another shape or order.
         """
-        steps = [_row_step(array) for array in arrays]
+        steps = [_row_step(array, count, width) for array, width in zip(arrays, places.widths, strict=True)]
         self._evaluate(count, places.elements, pointers(arrays), (ctypes.c_int64 * len(steps))(*steps), places.addresses)
 
 
-def _row_step(array: np.ndarray) -> int:
-    """Return by how many numbers the rows of an array are apart, 0 if it has one. Raises ValueError if a row has gaps."""
-    row, entry = array.strides
-    if array.dtype != np.float64 or (entry != array.itemsize and array.shape[1] > 1 and array.size):
+def _row_step(array: np.ndarray, count: int, width: int) -> int:
+    """Return by how many numbers the rows of an array are apart, 0 if it has one, or raise ValueError."""
+    (rows, columns), (row, entry) = array.shape, array.strides
+    if array.dtype != np.float64 or (entry != array.itemsize and columns > 1 and rows):
         raise ValueError(f"rows of {array.dtype} with strides {array.strides}; expected rows of float64 without gaps")
-    return row // array.itemsize if len(array) > 1 else 0
+    if columns < width or rows not in (1, count):
+        raise ValueError(f"an array {array.shape}; expected {count} rows, or one, and at least {width} columns")
+    return row // array.itemsize if rows > 1 else 0
 
 
 def _module(function: ca.Function) -> ir.Module:

@@ -9,11 +9,16 @@ from tolcontact.arrays import Array, Int
 
 
 class Places:
-    """Where the arguments of a Function, inputs first, stand in their arrays: columns (element, entry) of each argument."""
+    """Where the arguments of a Function, inputs first, stand in their arrays: columns (element, entry) of each argument.
+
+    elements   number of elements
+    widths     number of columns that the array of each argument must have, at least
+    """
 
     def __init__(self, columns: Sequence[Int[Array, "element _"]]) -> None:
         self.columns = [np.ascontiguousarray(table, dtype=np.int64) for table in columns]
         self.elements = len(self.columns[0])
+        self.widths = [int(table.max(initial=-1)) + 1 for table in self.columns]
         self.addresses = pointers(self.columns)
 
     @classmethod

@@ -220,7 +220,9 @@ def _way_out(summary: xr.Dataset) -> str:
     """Return what to do about surfaces that penetrate each other, or were resolved though apart."""
     if summary.attrs["resolution"] == "linearized":
         return "use --resolution exact"
-    return "use finer meshes" if summary.attrs["search"] == "bounded" else f'leave out search="{summary.attrs["search"]}"'
+    if summary.attrs["search"] == "bounded":
+        return "use finer meshes, or where faces have form a smaller spacing"
+    return f'leave out search="{summary.attrs["search"]}"'
 
 
 def _advice(summary: xr.Dataset, penetration: float) -> Iterator[str]:

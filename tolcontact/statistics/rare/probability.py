@@ -17,7 +17,7 @@ from tolcontact.statistics.rare.searches import (
     by_inflation,
     by_levels,
     first_inflation,
-)  # fmt: skip
+)
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
 FIRST_LOOK, MIN_LOOK, SUFFICIENT = 0.25, 4000, 1.5  # share and number of realizations; upper over lower bound that suffices
