@@ -35,41 +35,43 @@ def _exchanged(rigid: np.ndarray, heights: np.ndarray) -> np.ndarray:
     """Return the widths (n,) by exchange; NaN where exchanges do not end."""
     shifted = rigid + SHIFT * np.random.default_rng(0).uniform(-1, 1, rigid.shape) * [0, 1, 1]
     count = rigid.shape[1] + 1
-    own = np.tile(_spread_points(shifted), (len(heights), 1))
-    signs = np.ones(own.shape)
-    widths, left = np.full(len(heights), np.nan), np.arange(len(heights))
-    weights = np.linalg.svd(shifted[own[0]].T)[2][-1]
+    chosen = np.tile(_spread_points(shifted), (len(heights), 1))
+    signs = np.ones(chosen.shape)
+    widths, remaining = np.full(len(heights), np.nan), np.arange(len(heights))
+    weights = np.linalg.svd(shifted[chosen[0]].T)[2][-1]
     signs[:] = np.where(weights < 0, -1.0, 1.0)
     for _ in range(MAX_EXCHANGES):
-        columns = np.concatenate([signs[..., None] * shifted[own], np.ones((*own.shape, 1))], axis=2)  # (n, own, freedom + 1)
-        values = signs * np.take_along_axis(heights[left], own, axis=1)
+        columns = np.concatenate(
+            [signs[..., None] * shifted[chosen], np.ones((*chosen.shape, 1))], axis=2
+        )  # (n, chosen, freedom + 1)
+        values = signs * np.take_along_axis(heights[remaining], chosen, axis=1)
         solution = np.linalg.solve(columns, values[..., None])[..., 0]
-        residuals = heights[left] - solution[:, :-1] @ shifted.T
+        residuals = heights[remaining] - solution[:, :-1] @ shifted.T
         entering = np.abs(residuals).argmax(axis=1)
-        rows = np.arange(len(left))
+        rows = np.arange(len(remaining))
         largest = residuals[rows, entering]
         done = np.abs(largest) <= solution[:, -1] * (1 + FARTHER) + 1e-300
-        widths[left[done]] = 2 * np.abs(largest[done])
-        left, own, signs, columns = left[~done], own[~done], signs[~done], columns[~done]
-        if not len(left):
+        widths[remaining[done]] = 2 * np.abs(largest[done])
+        remaining, chosen, signs, columns = remaining[~done], chosen[~done], signs[~done], columns[~done]
+        if not len(remaining):
             break
         entering, sense = entering[~done], np.sign(largest[~done])
-        target = np.concatenate([sense[:, None] * shifted[entering], np.ones((len(left), 1))], axis=1)
+        target = np.concatenate([sense[:, None] * shifted[entering], np.ones((len(remaining), 1))], axis=1)
         weights = np.linalg.solve(columns.swapaxes(1, 2), np.eye(count)[-1][:, None])[..., 0]
         steps = np.linalg.solve(columns.swapaxes(1, 2), target[..., None])[..., 0]
         ratios = np.where(steps > MIN_STEP, np.maximum(weights, 0.0) / np.maximum(steps, MIN_STEP), np.inf)
-        leaving, rows = ratios.argmin(axis=1), np.arange(len(left))
-        own[rows, leaving], signs[rows, leaving] = entering, sense
+        leaving, rows = ratios.argmin(axis=1), np.arange(len(remaining))
+        chosen[rows, leaving], signs[rows, leaving] = entering, sense
     return widths
 
 
 def _spread_points(rigid: np.ndarray) -> np.ndarray:
     """Return the numbers of as many points as there are freedoms, and one more, that are far from dependent."""
-    left, numbers = rigid.copy(), list[int]()
+    remainder, numbers = rigid.copy(), list[int]()
     for _ in range(rigid.shape[1]):
-        numbers.append(int((left**2).sum(axis=1).argmax()))
-        direction = left[numbers[-1]] / np.linalg.norm(left[numbers[-1]])
-        left = left - np.outer(left @ direction, direction)
+        numbers.append(int((remainder**2).sum(axis=1).argmax()))
+        direction = remainder[numbers[-1]] / np.linalg.norm(remainder[numbers[-1]])
+        remainder = remainder - np.outer(remainder @ direction, direction)
     shares = np.linalg.solve(rigid[numbers].T, rigid.T)  # of the points before in each other point
     smallest = np.abs(shares).min(axis=0)
     smallest[numbers] = -1.0
