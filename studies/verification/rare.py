@@ -75,6 +75,7 @@ SCORES = {
     ),
     "heavy tails": (lambda u: stdtrit(3, ndtr(u[:, 0])) + stdtrit(3, ndtr(u[:, 1])) - PULL, 2, heavy_probability(), True),
     "shell, 10-D": (lambda u: np.sqrt((u**2).sum(axis=1)) - 6.5, 10, float(stats.chi2.sf(6.5**2, 10)), True),
+    "six ways, 30-D": (lambda u: np.where(u[:, :6].max(axis=1) > 4.2, 1.0, -1.0), 30, 1 - ndtr(4.2) ** 6, False),
     "yes or no": (lambda u: np.where(stuck(u), 1.0, -1.0), 6, 1 - (1 - 2 * Q(4.9)) * (1 - Q(4.6)), False),
 }  # fmt: skip
 

@@ -11,12 +11,15 @@ of which each is a fifth of the one before, and
 by inflation. All contributors are inflated until the event is common, u ~ N(0, s^2), and brought back to s = 1. With few
 contributors realizations are weighted by the ratio of the densities, and sampled again; with many the inflations are nested.
 
+Each search is made by eight strands that share levels or inflations. How they differ says how well the product is known.
+
 Each search moves along where the other may be led astray: levels follow the way that moves in the largest units, and inflation
 prefers what is far away. Realizations within the event walk by u' = sqrt(1 - b^2) u + b v, v standard normal, taken if u' is in
 the event (Papaioannou and others, 2015). What both have found are the centres of a mixture of standard normals, from which the
 probability is estimated by importance sampling, which is unbiased whatever was found. A way that neither search found is
 missing from it. So the estimate counts only if many realizations carry it, none of them much of it, and if neither search says
-significantly more. Otherwise the searches answer; where they disagree, the interval covers both, and `disagreement` says so.
+significantly more; and where single strands alone came to a way, there may be others, for which the interval is widened (Good,
+1953). Otherwise the searches answer; where they disagree, the interval covers both, and `disagreement` says so.
 
 With more than ten contributors, the means of those without influence are noise in a centre, which spreads the weights: what is
 smaller than five standard errors in a centre is taken for 0.

@@ -27,6 +27,10 @@ class Mixture(NamedTuple):
         exponents = u @ self.centres.T - 0.5 * (self.centres**2).sum(axis=1)
         return np.asarray(special.logsumexp(exponents + np.log(self.shares), axis=1))
 
+    def nearest(self, u: np.ndarray) -> np.ndarray:
+        """Return the number of the centre about which realizations u (n, d) are likeliest."""
+        return np.asarray(np.argmax(u @ self.centres.T - 0.5 * (self.centres**2).sum(axis=1), axis=1))
+
     def flattened(self) -> "Mixture":
         """Return the mixture with shares half as far from equal ones: small clusters are no less important."""
         return self._replace(shares=0.5 * self.shares + 0.5 / len(self.shares))

@@ -9,30 +9,24 @@ import numpy as np
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
-from tolcontact.statistics.rare.searches import (
-    Found,
-    Score,
-    Scores,
-    answered,
-    by_inflation,
-    by_levels,
-    first_inflation,
-)
+from tolcontact.statistics.rare.searches import STRANDS, Found, Score, Walk, by_inflation, by_levels, first_inflation
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
 FIRST_LOOK, MIN_LOOK, SUFFICIENT = 0.25, 4000, 1.5  # share and number of realizations; upper over lower bound that suffices
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
-REPLICATES = 4  # of each search
-MIN_LEVEL_SAMPLES = 50  # realizations at a level
-MIN_GROUP = 8  # realizations of a replicate that centres are found from
+TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the least of each strand
+MIN_PILOT_OF_MANY, MIN_LOOKS = 50, 50
+MIN_LEVEL = 10  # realizations of each strand at a level
+MIN_GROUP = 8  # realizations of a search that centres are found from
 AROUND_ZERO = 0.1  # share of the mixture that is drawn as it is
 REFITS = 2  # to what the searches found
 ROUNDS, ROUND = 2, 0.15  # of importance sampling, before the last one, and their shares: to find centres that are missing
 MIN_REFIT, REFIT = 40, 500  # hits from which centres are found again, and how many are drawn of them
+MAX_UNSEEN = 0.9  # of an event
 MIN_EFFECTIVE, MAX_WEIGHT = 200, 0.02  # hits that importance sampling needs, and the largest share of one of them
-SIGNIFICANT = 1.3  # times both half widths: by so much more a search says what importance sampling missed
+SIGNIFICANT = 1.7  # times both half widths: by so much more a search says what importance sampling missed (0.25 % by chance)
 
 
 class Tail(NamedTuple):
@@ -64,28 +58,30 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     """
     is_small = samples < SEARCHABLE
     pilot = (
-        score(rng.standard_normal((MIN_PILOT if is_small else max(int(PILOT * samples), MIN_LEVEL_SAMPLES), dimensions))) > 0
+        score(rng.standard_normal((MIN_PILOT if is_small else max(int(PILOT * samples), MIN_PILOT_OF_MANY), dimensions))) > 0
     )
     if pilot.sum() >= (MIN_FEW if is_small else MIN_COUNTED):
         return Tail(_counted(score, dimensions, samples - len(pilot), rng), 1.0)
     budgets = [int(share * samples) for share in SEARCHES]
-    searches = [_replicates(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
+    searches = [_searched(score, dimensions, sum(budgets) if not leads else budgets[1], rng, inflates=True)]
     if leads:
-        searches.insert(0, _replicates(score, dimensions, budgets[0], rng, inflates=False))
-    answers = [_mean([found.probability for found in search]) for search in searches]
+        searches.insert(0, _searched(score, dimensions, budgets[0], rng, inflates=False))
+    answers = [search.probability for search in searches]
     budget_drawn = int((1 - PILOT - sum(SEARCHES)) * samples)
-    groups = [[found.points for found in search if len(found.points) >= MIN_GROUP] for search in searches]
-    groups = [group for group in groups if group]
+    groups = [halves for search in searches if (halves := _halves(search.points))]
     if not groups:
         if not any(estimate.value for estimate in answers):
             return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
         return _agreed(answers)
-    weights = _importance(score, dimensions, groups, budget_drawn, rng)
+    u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
     if not _suffices(weights):
         return _agreed(answers)
     mean = float(weights.mean())
     reach = math.exp(intervals.student(np.inf) * float(weights.std()) / mean / math.sqrt(len(weights)))
-    estimate = Estimate(mean, mean / reach, min(mean * reach, 1.0))
+    hits = np.flatnonzero(weights)
+    hits = rng.choice(hits, min(2 * REFIT, len(hits)), p=weights[hits] / weights.sum())
+    unseen = _unseen([found for search in searches for found in search.points], u[hits], rng)
+    estimate = Estimate(mean, mean / reach, min(mean * reach / (1 - unseen), 1.0))
     for alternative in answers:
         if alternative.value > 0 and math.log(alternative.value / mean) > SIGNIFICANT * math.hypot(
             _log_width(alternative), _log_width(estimate)
@@ -110,33 +106,37 @@ def _counted(score: Score, dimensions: int, count: int, rng: np.random.Generator
     return intervals.proportion(score(rng.standard_normal((count, dimensions))) > 0)
 
 
-def _replicates(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> list[Found]:
-    """Return what independent repetitions of a search found, with about `budget` realizations in all."""
-    used = 0
+def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generator, *, inflates: bool) -> Found:
+    """Return what a search found with about `budget` realizations."""
+    used, inflation = 0, 1.0
 
     def counting(u: np.ndarray) -> np.ndarray:
         nonlocal used
         used += len(u)
         return score(u)
 
-    def search(count: int, rng: np.random.Generator) -> Scores[Found]:
-        return by_inflation(dimensions, count, rng, inflation) if inflates else by_levels(dimensions, count, rng)
+    def search(count: int) -> Found:
+        walk = Walk(counting, dimensions, count, rng)
+        return by_inflation(walk, inflation) if inflates else by_levels(walk)
 
-    inflation = 1.0
     if inflates:
-        looks = max(int(SCOUTING * budget), MIN_LEVEL_SAMPLES)
-        [inflation] = answered([first_inflation(dimensions, looks, rng)], counting)
-    trial, used_before = max(budget // 100, MIN_LEVEL_SAMPLES), used
-    answered([search(trial, rng)], counting)
-    cost = max((used - used_before) / trial, 1.0)  # the number of levels
-    count = max(int((budget - used) / REPLICATES / cost), MIN_LEVEL_SAMPLES)
-    return answered([search(count, generator) for generator in rng.spawn(REPLICATES)], counting)
+        inflation = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_LOOKS), rng)
+    trial, used_before = max(int(TRIAL * budget) // STRANDS, MIN_TRIAL), used
+    search(trial)
+    levels = max((used - used_before) / STRANDS / trial, 1.0)
+    return search(max(int((budget - used) / STRANDS / levels), MIN_LEVEL))
+
+
+def _halves(points: Sequence[np.ndarray]) -> list[np.ndarray]:
+    """Return realizations of the even strands and of the odd ones, (n, d); nothing of those with few."""
+    halves = [np.concatenate(strands) for k in range(2) if (strands := points[k::2])]
+    return [half for half in halves if len(half) >= MIN_GROUP]
 
 
 def _importance(
     score: Score, dimensions: int, groups: Sequence[Sequence[np.ndarray]], count: int, rng: np.random.Generator
-) -> np.ndarray:
-    """Return weights of realizations drawn about what each search found, groups of (n, d): (n,), 0 outside of the event."""
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return realizations drawn about what each search found, groups of (n, d), and their weights: 0 outside of the event."""
     around_zero = Mixture(np.zeros((1, dimensions)), np.ones(1))
     shares = [(1 - AROUND_ZERO) / len(groups)] * len(groups)
     mixtures = [fitted(group, rng).flattened() for group in groups]
@@ -149,7 +149,7 @@ def _importance(
         hits = np.flatnonzero(w)
         if len(hits) > MIN_REFIT:
             mixture = _completed(mixture, u[hits], w[hits], rng)
-    return mixture.weights(score, count - ROUNDS * batch, dimensions, rng)[1]
+    return mixture.weights(score, count - ROUNDS * batch, dimensions, rng)
 
 
 def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Generator) -> Mixture:
@@ -161,6 +161,22 @@ def _completed(mixture: Mixture, u: np.ndarray, w: np.ndarray, rng: np.random.Ge
     return joined([mixture, fitted(groups, rng).flattened()], [0.5, 0.5])
 
 
+def _unseen(strands: Sequence[np.ndarray], hits: np.ndarray, rng: np.random.Generator) -> float:
+    """Return the share of an event that no strand may have come to, at most.
+
+    Ways into the event are clusters of realizations drawn in it, `hits` (n, d). What single strands alone came to is about as
+    probable as what none did (Good, 1953; its standard error counts what two came to as well).
+    """
+    ways = fitted([hits[::2], hits[1::2]], rng)
+    strands = [points for points in strands if len(points)]
+    shares = np.array([np.bincount(ways.nearest(points), minlength=len(ways.shares)) / len(points) for points in strands])
+    visits = (shares > 0).sum(axis=0)
+    singles, doubles = (float(shares[:, visits == number].sum()) for number in (1, 2))
+    if not singles:
+        return 0.0
+    return min((singles + intervals.student(np.inf) * math.sqrt(singles + doubles)) / len(strands), MAX_UNSEEN)
+
+
 def _suffices(weights: np.ndarray) -> bool:
     """Return whether many realizations carry the estimate, and none much of it."""
     total = weights.sum()
@@ -168,22 +184,11 @@ def _suffices(weights: np.ndarray) -> bool:
     return bool(is_carried and weights.max() <= MAX_WEIGHT * total)
 
 
-def _mean(probabilities: Sequence[float]) -> Estimate:
-    """Return the mean of independent estimates of a probability, with its 95 % interval; [0, 1] if all are zero.
-
-    Estimates are skewed to the right: the interval of their mean is that of its logarithm.
-    """
-    values = np.array(probabilities)
-    mean = float(values.mean())
-    if mean == 0:
-        return Estimate(0.0, 0.0, 1.0)
-    error = float(values.std(ddof=1)) / math.sqrt(len(values))
-    reach = math.exp(min(intervals.student(len(values) - 1) * error / mean, 700.0))
-    return Estimate(mean, mean / reach, min(mean * reach, 1.0))
-
-
 def _agreed(answers: Sequence[Estimate]) -> Tail:
-    """Return the mean of what the searches say if they agree, else the larger with an interval that covers both."""
+    """Return the mean of what the searches say if they agree, else the larger with an interval that covers both.
+
+    A search that misses a way into the event says too little. So the mean is at most what either of them says at most.
+    """
     best = max(answers, key=lambda estimate: estimate.value)
     if len(answers) == 1:
         return Tail(best, 1.0)
@@ -196,7 +201,7 @@ def _agreed(answers: Sequence[Estimate]) -> Tail:
         return Tail(Estimate(best.value, *bounds), max(answer.value / alternative.value, alternative.value / answer.value))
     mean = (answer.value + alternative.value) / 2
     reach = math.exp(math.hypot(answer.value * widths[0], alternative.value * widths[1]) / 2 / mean)
-    return Tail(Estimate(mean, mean / reach, min(mean * reach, 1.0)), 1.0)
+    return Tail(Estimate(mean, mean / reach, max(answer.upper, alternative.upper)), 1.0)
 
 
 def _log_width(estimate: Estimate) -> float:

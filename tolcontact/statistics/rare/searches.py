@@ -1,17 +1,21 @@
 """Two searches for a rare event: by levels of its score, and by inflation of all contributors.
 
-Searches are generators that ask for scores, so that independent ones can be answered together: few realizations at a time cost
-almost as much as many.
+A search has several strands. They share its levels, and otherwise each goes its own way: from how they differ follows the
+interval of the product of shares that a search estimates. Realizations of all strands are simulated together.
 """
 
-from collections.abc import Callable, Generator, Sequence
-from typing import NamedTuple, TypeVar
+import math
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
-T = TypeVar("T")
+from tolcontact.statistics import intervals
+from tolcontact.statistics.intervals import Estimate
 
+STRANDS = 8
 SHARE = 0.2  # of each event, in the one before
+MIN_SEEDS = 2  # of a strand, from which it walks to the next level
 FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and the share of them that should be accepted
 MIN_STEP, MAX_STEP = 0.02, 0.99
 MAX_LEVELS = 60
@@ -20,87 +24,116 @@ COMMON, SEEN = 0.1, 0.01  # shares of realizations in the event: inflate no furt
 UNKNOWN_INFLATION = 3.0  # where no inflation leads to the event
 MAX_WEIGHTED = 10  # contributors: with more, the weights of inflation spread too far
 MAX_VARIANCE = 1.0  # of weights, of the square of their mean
-GOAL = 0.25  # share of an inflated event in the one before
-LOOKS, BISECTIONS = 60, 5  # realizations and steps that find the next inflation
+GOAL, MIN_GOAL = 0.25, 0.05  # share of an inflated event in the one before: aimed at, and accepted
+FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # by which 1 / s^2 grows from one inflated event to the next, and how it adapts
 LOOKS_BACK = 0.25  # share of realizations that are looked at in the event before
-MIN_SHARE_BACK = 1e-3
+BISECTIONS = 30
+MAX_REACH = 700.0  # of a logarithm
 
 Score = Callable[[np.ndarray], np.ndarray]  # u (n, d) -> (n,)
-Scores = Generator[np.ndarray, np.ndarray, T]  # yields realizations u (n, d), is sent their scores (n,), and returns something
-Judge = Callable[[np.ndarray], np.ndarray]  # scores (n,) -> whether realizations are in an event (n,)
 
 
 class Found(NamedTuple):
-    """What a search has found: its estimate of the probability, and realizations in the event (n, d)."""
+    """What a search has found: its estimate of the probability, and realizations of each strand in the event, (n, d)."""
 
-    probability: float
-    points: np.ndarray
+    probability: Estimate
+    points: list[np.ndarray]
 
     @classmethod
-    def nothing(cls, dimensions: int) -> "Found":
+    def nothing(cls) -> "Found":
         """Return what a search says that did not find the event."""
-        return cls(0.0, np.zeros((0, dimensions)))
+        return cls(Estimate(0.0, 0.0, 1.0), [])
 
 
-def answered(searches: Sequence[Scores[T]], score: Score) -> list[T]:
-    """Return what searches find, whose questions are answered together."""
-    found: dict[int, T] = {}
-    questions: dict[int, np.ndarray] = {}
-    replies: dict[int, np.ndarray | None] = dict.fromkeys(range(len(searches)))
-    while replies:
-        for number, reply in replies.items():
-            try:
-                questions[number] = searches[number].send(reply)  # type: ignore[arg-type]  # None at first
-            except StopIteration as end:
-                found[number] = end.value
-        if not questions:
-            break
-        scores = np.split(score(np.concatenate([*questions.values()])), np.cumsum([len(u) for u in questions.values()])[:-1])
-        replies, questions = dict(zip(questions, scores, strict=True)), {}
-    return [found[number] for number in range(len(searches))]
+class Product:
+    """A product of means over strands, and its interval.
 
-
-def walks(
-    inside: Judge, u: np.ndarray, g: np.ndarray, deviation: float, count: int, step: float, rng: np.random.Generator,
-    stretch: float = 1.0,
-) -> Scores[tuple[np.ndarray, np.ndarray, float]]:  # fmt: skip
-    """Return `count` realizations of N(0, deviation^2) in an event, by walks from u (n, d), their scores, and the last step.
-
-    Scores are those of realizations times `stretch`.
+    The influence of a strand on the logarithm of the product is the sum of its relative deviations from the means. The sum is
+    nearly normal where estimates of single strands, products themselves, are skewed.
     """
-    walked, scores = [], []
-    for _ in range(int(np.ceil(count / len(u)))):
-        candidates = np.sqrt(1 - step**2) * u + step * deviation * rng.standard_normal(u.shape)
-        candidate_scores = yield stretch * candidates
-        is_accepted = inside(candidate_scores)
-        u, g = np.where(is_accepted[:, None], candidates, u), np.where(is_accepted, candidate_scores, g)
-        step = float(np.clip(step * np.exp(is_accepted.mean() - ACCEPTANCE), MIN_STEP, MAX_STEP))
-        walked.append(u)
-        scores.append(g)
-    return np.concatenate(walked)[:count], np.concatenate(scores)[:count], step
+
+    def __init__(self) -> None:
+        self.log = 0.0
+        self._influence = np.zeros(STRANDS)
+
+    def times(self, values: np.ndarray, power: int = 1, log_scale: float = 0.0) -> None:
+        """Multiply by the mean of values (strand,) times exp(`log_scale`), to the power 1 or -1."""
+        mean = values.mean()
+        self.log += power * (math.log(mean) + log_scale)
+        self._influence += power * (values / mean - 1)
+
+    @property
+    def estimate(self) -> Estimate:
+        """The product with its 95 % interval (delta method on the logarithm, Student's t over the strands)."""
+        error = float(self._influence.std(ddof=1)) / math.sqrt(STRANDS)
+        reach = math.exp(min(intervals.student(STRANDS - 1) * error, MAX_REACH))
+        value = math.exp(self.log)
+        return Estimate(value, value / reach, min(value * reach, 1.0))
 
 
-def by_levels(dimensions: int, count: int, rng: np.random.Generator, inflation: float = 1.0) -> Scores[Found]:
-    """Search by levels of the score, with `count` realizations of N(0, inflation^2) at each level."""
-    u = inflation * rng.standard_normal((count, dimensions))
-    g = yield u
-    log_probability, step = 0.0, FIRST_STEP
-    for _ in range(MAX_LEVELS):
-        threshold = _threshold(g)
-        inside = g > threshold
-        if not inside.any():
-            break
-        log_probability += np.log(inside.mean())
-        u, g = u[inside], g[inside]
-        if threshold == 0.0:
-            return Found(float(np.exp(log_probability)), u)
-        u, g, step = yield from walks(_above(threshold), u, g, inflation, count, step, rng)
-    return Found.nothing(dimensions)
+class Walk:
+    """Realizations of all strands that walk within events, simulated by `score`: `count` of each strand at a level."""
+
+    def __init__(self, score: Score, dimensions: int, count: int, rng: np.random.Generator) -> None:
+        self._score, self.dimensions, self.count, self.rng = score, dimensions, count, rng
+        self.seeds, self._step = max(int(SHARE * count), MIN_SEEDS), FIRST_STEP
+
+    def scores(self, u: np.ndarray) -> np.ndarray:
+        """Return the scores (strand, n) of realizations u (strand, n, d)."""
+        return self._score(u.reshape(-1, self.dimensions)).reshape(u.shape[:2])
+
+    def begun(self, deviation: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return realizations of N(0, deviation^2) (strand, n, d), and their scores (strand, n)."""
+        u = deviation * self.rng.standard_normal((STRANDS, self.count, self.dimensions))
+        return u, self.scores(u)
+
+    def chosen(self, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the seeds (strand, seed) of the next level lie among realizations with weights (strand, n).
+
+        A strand of which nothing is left goes on from the others.
+        """
+        strands, places = [], []
+        for strand, own in enumerate(weights):
+            mine = own if own.any() else weights
+            source, place = np.divmod(_resampled(mine.ravel(), self.seeds, self.rng), weights.shape[1])
+            strands.append(source if mine is weights else np.full(self.seeds, strand))
+            places.append(place)
+        return np.array(strands), np.array(places)
+
+    def on(
+        self, u: np.ndarray, g: np.ndarray, threshold: float, deviation: float = 1.0, stretch: float = 1.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return realizations of N(0, deviation^2) with scores above a threshold, by walks from u (strand, seed, d), and g.
+
+        Scores are those of realizations times `stretch`.
+        """
+        walked, scores = [], []
+        for _ in range(math.ceil(self.count / self.seeds)):
+            candidates = np.sqrt(1 - self._step**2) * u + self._step * deviation * self.rng.standard_normal(u.shape)
+            candidate_scores = self.scores(stretch * candidates)
+            is_accepted = candidate_scores > threshold
+            u, g = np.where(is_accepted[..., None], candidates, u), np.where(is_accepted, candidate_scores, g)
+            self._step = float(np.clip(self._step * np.exp(is_accepted.mean() - ACCEPTANCE), MIN_STEP, MAX_STEP))
+            walked.append(u)
+            scores.append(g)
+        return np.concatenate(walked, axis=1), np.concatenate(scores, axis=1)
 
 
-def first_inflation(dimensions: int, count: int, rng: np.random.Generator) -> Scores[float]:
+def by_levels(walk: Walk) -> Found:
+    """Search by levels of the score."""
+    product = Product()
+    u = _levels(walk, 1.0, product)
+    return Found.nothing() if u is None else Found(product.estimate, u)
+
+
+def by_inflation(walk: Walk, inflation: float) -> Found:
+    """Search from an inflation back to none."""
+    return (_weighted if walk.dimensions <= MAX_WEIGHTED else _nested)(walk, inflation)
+
+
+def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> float:
     """Return the least inflation at which the event is common, or at which it is most common, from `count` looks at each."""
-    scores = yield np.concatenate([s * rng.standard_normal((count, dimensions)) for s in INFLATIONS])
+    scores = score(np.concatenate([s * rng.standard_normal((count, dimensions)) for s in INFLATIONS]))
     shares = [float((g > 0).mean()) for g in np.split(scores, len(INFLATIONS))]
     common = [s for s, share in zip(INFLATIONS, shares, strict=True) if share >= COMMON]
     if common:
@@ -108,94 +141,97 @@ def first_inflation(dimensions: int, count: int, rng: np.random.Generator) -> Sc
     return INFLATIONS[int(np.argmax(shares))] if max(shares) > SEEN else UNKNOWN_INFLATION
 
 
-def by_inflation(dimensions: int, count: int, rng: np.random.Generator, inflation: float) -> Scores[Found]:
-    """Search from an inflation back to none, with `count` realizations at each level."""
-    search = _weighted if dimensions <= MAX_WEIGHTED else _nested
-    return search(dimensions, count, rng, inflation)
+def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
+    """Return realizations of N(0, inflation^2) of each strand in the event; none if it is not found."""
+    u, g = walk.begun(inflation)
+    for _ in range(MAX_LEVELS):
+        threshold = _threshold(g)
+        inside = g > threshold
+        if not inside.any():
+            return None
+        product.times(inside.mean(axis=1))
+        if threshold == 0.0:
+            return [points[hits] for points, hits in zip(u, inside, strict=True)]
+        seeds = walk.chosen(inside)
+        u, g = walk.on(u[seeds], g[seeds], threshold, inflation)
+    return None
 
 
-def _weighted(dimensions: int, count: int, rng: np.random.Generator, inflation: float) -> Scores[Found]:
+def _inflated(walk: Walk, inflation: float, product: Product) -> np.ndarray | None:
+    """Return realizations of N(0, inflation^2) in the event (strand, n, d); none if it is not found."""
+    found = _levels(walk, inflation, product)
+    if found is None:
+        return None
+    points = np.concatenate(found)
+    sources = [own if len(own) else points for own in found]
+    seeds = np.stack([own[_resampled(np.ones(len(own)), walk.seeds, walk.rng)] for own in sources])
+    return walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, inflation)[0]
+
+
+def _weighted(walk: Walk, inflation: float) -> Found:
     """Bring an inflated event back by weights: P_t(F) = P_s(F) E_s[w | F], w the ratio of densities of N(0, t^2), N(0, s^2)."""
-    probability, u = yield from by_levels(dimensions, count, rng, inflation)
-    if not len(u):
-        return Found(probability, u)
-    log_probability, step, s = np.log(probability), FIRST_STEP, inflation
+    product, s = Product(), inflation
+    u = _inflated(walk, inflation, product)
+    if u is None:
+        return Found.nothing()
     while s > 1.0:
-        squares = 0.5 * (u**2).sum(axis=1)
+        squares = 0.5 * (u**2).sum(axis=-1)
 
         def log_weights(t: float, s: float = s, squares: np.ndarray = squares) -> np.ndarray:
-            return dimensions * np.log(s / t) - squares * (1 / t**2 - 1 / s**2)
+            return walk.dimensions * np.log(s / t) - squares * (1 / t**2 - 1 / s**2)
 
         t = _least(lambda t: _variance(log_weights(t)) <= MAX_VARIANCE, s)
         weights = log_weights(t)
-        largest = weights.max()
+        largest = float(weights.max())
         weights = np.exp(weights - largest)
-        log_probability += np.log(weights.mean()) + largest
-        if t == 1.0:
-            return Found(float(np.exp(log_probability)), u[_resampled(weights, count, rng)])
-        seeds = u[_resampled(weights, max(count // 5, 10), rng)]
-        u, _, step = yield from walks(_above(0.0), seeds, np.ones(len(seeds)), t, count, step, rng)
+        product.times(weights.mean(axis=1), log_scale=largest)
+        seeds = u[walk.chosen(weights)]
+        u, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, t)
         s = t
-    return Found(float(np.exp(log_probability)), u)
+    return Found(product.estimate, list(u))
 
 
-def _nested(dimensions: int, count: int, rng: np.random.Generator, inflation: float) -> Scores[Found]:
+def _nested(walk: Walk, inflation: float) -> Found:
     """Bring an inflated event back by nested ones, F_s = {z: g(s z) > 0} with z standard normal.
 
     P(F_t) / P(F_s) = P(z in F_t | F_s) / P(z in F_s | F_t) holds for any event.
     """
-    probability, u = yield from by_levels(dimensions, count, rng, inflation)
-    z, s, step = u / inflation, inflation, FIRST_STEP
-    log_probability = np.log(probability) if len(z) else -np.inf
-    for _ in range(MAX_LEVELS):
-        if s == 1.0 or not len(z):
-            break
-        sample = z[rng.choice(len(z), min(LOOKS, len(z)), replace=False)]
-        t = yield from _least_common(sample, s)
-        hits = (yield t * z) > 0
-        z = z[hits]
-        if not len(z):
-            break
-        log_probability += np.log(hits.mean())
-        z, _, step = yield from walks(_above(0.0), z, np.ones(len(z)), 1.0, count, step, rng, stretch=t)
-        looks = z[rng.choice(len(z), max(int(LOOKS_BACK * len(z)), 1), replace=False)]
-        share_back = float(((yield s * looks) > 0).mean())
-        log_probability -= np.log(max(share_back, MIN_SHARE_BACK))
+    product, s, pace = Product(), inflation, FIRST_PACE
+    u = _inflated(walk, inflation, product)
+    if u is None:
+        return Found.nothing()
+    z = u / inflation
+    while s > 1.0:
+        for _ in range(TRIES):
+            t = max(1 / math.sqrt(1 / s**2 + pace), 1.0)
+            hits = walk.scores(t * z) > 0
+            share = float(hits.mean())
+            change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
+            pace *= min(max(change, 1 / MAX_CHANGE), MAX_CHANGE)
+            if share >= MIN_GOAL:
+                break
+        if not share:
+            return Found.nothing()
+        product.times(hits.mean(axis=1))
+        seeds = z[walk.chosen(hits)]
+        z, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
+        looks = z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
+        hits_back = walk.scores(s * looks) > 0
+        if not hits_back.any():
+            return Found.nothing()
+        product.times(hits_back.mean(axis=1), power=-1)
         s = t
-    return Found(float(np.exp(log_probability)), z) if s == 1.0 and len(z) else Found.nothing(dimensions)
+    return Found(product.estimate, list(z))
 
 
 def _least(is_enough: Callable[[float], bool], s: float) -> float:
     """Return the least inflation from 1 to s that is enough, by bisection; if none is, one in between."""
-    bisection = _bisection(s, 30)
-    t = next(bisection)
-    while True:
-        try:
-            t = bisection.send(is_enough(t))
-        except StopIteration as end:
-            return float(end.value)
-
-
-def _least_common(z: np.ndarray, s: float) -> Scores[float]:
-    """Return the least inflation t from 1 to s of realizations z (n, d) of which enough, t z, are in the event."""
-    bisection = _bisection(s, BISECTIONS)
-    t = next(bisection)
-    while True:
-        g = yield t * z
-        try:
-            t = bisection.send(bool((g > 0).mean() >= GOAL))
-        except StopIteration as end:
-            return float(end.value)
-
-
-def _bisection(s: float, bisections: int) -> Generator[float, bool, float]:
-    """Yield inflations from 1 to s, and return the least that is said to be enough; if none is, one in between."""
-    if (yield 1.0):
+    if is_enough(1.0):
         return 1.0
     low, high = 1.0, s
-    for _ in range(bisections):
+    for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        low, high = (low, middle) if (yield middle) else (middle, high)
+        low, high = (low, middle) if is_enough(middle) else (middle, high)
     return high if high < s else (s + low) / 2
 
 
@@ -211,15 +247,9 @@ def _resampled(weights: np.ndarray, count: int, rng: np.random.Generator) -> np.
     return np.searchsorted(cumulative / cumulative[-1], places).clip(max=len(weights) - 1)
 
 
-def _above(threshold: float) -> Judge:
-    def inside(g: np.ndarray) -> np.ndarray:
-        return g > threshold
-
-    return inside
-
-
 def _threshold(g: np.ndarray) -> float:
     """Return the threshold, at most 0, that a fifth of the scores exceed; a lower one if otherwise none would exceed it."""
+    g = g.ravel()
     threshold = float(np.sort(g)[-int(np.ceil(SHARE * len(g))) - 1])
     if threshold >= g.max() and threshold < 0:
         lower = g[g < g.max()]
