@@ -41,8 +41,9 @@ def tails(
     An event is that a corrected measure is beyond its limits by more than its accuracy, or, in an exact resolution, that parts
     cannot be assembled. The score of the former is the measure itself, and each limit is searched for by itself; the latter is
     searched for by inflation of all deviations alone. By default all events share 60 000 realizations, with 10 000 to 40 000
-    for each. A quarter of the samples suffices where the upper bound of the interval is at most 1.5 times the lower one;
-    otherwise the other three quarters answer. Where two searches disagree, the interval covers what both say, and more
+    for each. A quarter of the samples suffices where the upper bound of the interval is at most 1.5 times the lower one,
+    or at most 1e-7; otherwise the other three quarters answer. A probability of 0 with an upper bound stands for an event whose
+    search ended below 1e-9. Where two searches disagree, the interval covers what both say, and more
     realizations are needed.
     Probabilities include realizations that are not resolved, with their last poses. `progress` is called with the number of
     realizations simulated, and with the approximate number of all.

@@ -9,16 +9,28 @@ import numpy as np
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 from tolcontact.statistics.rare.mixture import Mixture, fitted, joined
-from tolcontact.statistics.rare.searches import STRANDS, Found, Score, Walk, by_inflation, by_levels, first_inflation
+from tolcontact.statistics.rare.searches import (
+    BEFORE_NESTED,
+    MAX_WEIGHTED,
+    MIN_LEVEL,
+    STRANDS,
+    Found,
+    Score,
+    Walk,
+    by_inflation,
+    by_levels,
+    first_inflation,
+    nested_levels,
+)
 
 PILOT, MIN_COUNTED = 0.05, 50  # of all realizations; hits among them from which on the event is counted
-FIRST_LOOK, MIN_LOOK, SUFFICIENT = 0.25, 4000, 1.5  # share and number of realizations; upper over lower bound that suffices
+FIRST_LOOK, MIN_LOOK = 0.25, 3500  # share of realizations, and their number
+SUFFICIENT, NO_CONCERN = 1.5, 1e-7  # upper over lower bound that suffices, and an upper bound that does
 SEARCHABLE, MIN_PILOT, MIN_FEW = 10_000, 500, 3  # with fewer realizations a count is narrower than searches from few hits on
 SEARCHES = (0.25, 0.3)  # of all realizations: by levels, by inflation
 SCOUTING = 0.04  # of a search, for each inflation that is tried
 TRIAL, MIN_TRIAL = 0.01, 5  # of a search, at each level, to count its levels; and the least of each strand
 MIN_PILOT_OF_MANY, MIN_LOOKS = 50, 50
-MIN_LEVEL = 10  # realizations of each strand at a level
 MIN_GROUP = 8  # realizations of a search that centres are found from
 AROUND_ZERO = 0.1  # share of the mixture that is drawn as it is
 REFITS = 2  # to what the searches found
@@ -39,13 +51,13 @@ class Tail(NamedTuple):
 def sufficient_tail(score: Score, dimensions: int, *, samples: int, rng: np.random.Generator, leads: bool = True) -> Tail:
     """Return the `tail_probability` from at most about `samples` realizations.
 
-    A quarter of them suffices if the searches agree and the upper bound is at most 1.5 times the lower one. Otherwise the
-    others answer alone.
+    A quarter of them suffices if the searches agree, and the upper bound is at most 1.5 times the lower one, or at most 1e-7.
+    Otherwise the others answer alone.
     """
     look = int(FIRST_LOOK * samples)
     if look >= MIN_LOOK:
         tail = tail_probability(score, dimensions, samples=look, rng=rng, leads=leads)
-        if tail.disagreement == 1.0 and 0 < tail.probability.upper <= SUFFICIENT * tail.probability.lower:
+        if tail.disagreement == 1.0 and tail.probability.upper <= max(SUFFICIENT * tail.probability.lower, NO_CONCERN):
             return tail
         samples -= look
     return tail_probability(score, dimensions, samples=samples, rng=rng, leads=leads)
@@ -70,7 +82,7 @@ def tail_probability(score: Score, dimensions: int, *, samples: int, rng: np.ran
     budget_drawn = int((1 - PILOT - sum(SEARCHES)) * samples)
     groups = [halves for search in searches if (halves := _halves(search.points))]
     if not groups:
-        if not any(estimate.value for estimate in answers):
+        if all(estimate.upper == 1.0 for estimate in answers):
             return Tail(_counted(score, dimensions, budget_drawn, rng), 1.0)
         return _agreed(answers)
     u, weights = _importance(score, dimensions, groups, budget_drawn, rng)
@@ -117,13 +129,16 @@ def _searched(score: Score, dimensions: int, budget: int, rng: np.random.Generat
 
     def search(count: int) -> Found:
         walk = Walk(counting, dimensions, count, rng)
-        return by_inflation(walk, inflation) if inflates else by_levels(walk)
+        return by_inflation(walk, inflation, budget - used) if inflates else by_levels(walk)
 
     if inflates:
-        inflation = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_LOOKS), rng)
-    trial, used_before = max(int(TRIAL * budget) // STRANDS, MIN_TRIAL), used
-    search(trial)
-    levels = max((used - used_before) / STRANDS / trial, 1.0)
+        inflation, share = first_inflation(counting, dimensions, max(int(SCOUTING * budget), MIN_LOOKS), rng)
+    if inflates and dimensions > MAX_WEIGHTED:
+        levels = BEFORE_NESTED + nested_levels(inflation, share)
+    else:
+        trial, used_before = max(int(TRIAL * budget) // STRANDS, MIN_TRIAL), used
+        search(trial)
+        levels = max((used - used_before) / STRANDS / trial, 1.0)
     return search(max(int((budget - used) / STRANDS / levels), MIN_LEVEL))
 
 
@@ -193,6 +208,8 @@ def _agreed(answers: Sequence[Estimate]) -> Tail:
     if len(answers) == 1:
         return Tail(best, 1.0)
     answer, alternative = answers
+    if min(answer.value, alternative.value) == 0.0 and best.value <= min(answer.upper, alternative.upper):
+        return Tail(best, 1.0)  # the other search ended where the event was negligible
     if not (answer.value > 0 and alternative.value > 0):
         return Tail(best._replace(lower=0.0), math.inf)
     widths = _log_width(answer), _log_width(alternative)

@@ -9,12 +9,14 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from scipy import special
 
 from tolcontact.statistics import intervals
 from tolcontact.statistics.intervals import Estimate
 
 STRANDS = 8
 SHARE = 0.2  # of each event, in the one before
+MIN_LEVEL = 10  # realizations of a strand at a level
 MIN_SEEDS = 2  # of a strand, from which it walks to the next level
 FIRST_STEP, ACCEPTANCE = 0.8, 0.4  # length of steps, and the share of them that should be accepted
 MIN_STEP, MAX_STEP = 0.02, 0.99
@@ -25,9 +27,12 @@ UNKNOWN_INFLATION = 3.0  # where no inflation leads to the event
 MAX_WEIGHTED = 10  # contributors: with more, the weights of inflation spread too far
 MAX_VARIANCE = 1.0  # of weights, of the square of their mean
 GOAL, MIN_GOAL = 0.25, 0.05  # share of an inflated event in the one before: aimed at, and accepted
+NESTED_SEEDS = 1 / 3  # of all realizations: fewer and larger questions to the score than with the share of hits
 FIRST_PACE, MAX_CHANGE, TRIES = 0.05, 3.0, 6  # by which 1 / s^2 grows from one inflated event to the next, and how it adapts
 LOOKS_BACK = 0.25  # share of realizations that are looked at in the event before
 BISECTIONS = 30
+NEGLIGIBLE = 1e-9  # probability below which a search with nested inflations ends
+BEFORE_NESTED = 3.0  # realizations for each place at a level, before the first nested event
 MAX_REACH = 700.0  # of a logarithm
 
 Score = Callable[[np.ndarray], np.ndarray]  # u (n, d) -> (n,)
@@ -56,11 +61,18 @@ class Product:
         self.log = 0.0
         self._influence = np.zeros(STRANDS)
 
-    def times(self, values: np.ndarray, power: int = 1, log_scale: float = 0.0) -> None:
-        """Multiply by the mean of values (strand,) times exp(`log_scale`), to the power 1 or -1."""
+    def times(self, values: np.ndarray, log_scale: float = 0.0) -> None:
+        """Multiply by the mean of values (strand,) times exp(`log_scale`)."""
         mean = values.mean()
-        self.log += power * (math.log(mean) + log_scale)
-        self._influence += power * (values / mean - 1)
+        self.log += math.log(mean) + log_scale
+        self._influence += values / mean - 1
+
+    def over(self, hits: np.ndarray) -> None:
+        """Divide by the share of hits (strand, n), which is taken for one of them if there is none."""
+        if hits.size:
+            mean = max(float(hits.mean()), 1 / hits.size)
+            self.log -= math.log(mean)
+            self._influence -= hits.mean(axis=1) / mean - 1
 
     @property
     def estimate(self) -> Estimate:
@@ -76,10 +88,20 @@ class Walk:
 
     def __init__(self, score: Score, dimensions: int, count: int, rng: np.random.Generator) -> None:
         self._score, self.dimensions, self.count, self.rng = score, dimensions, count, rng
-        self.seeds, self._step = max(int(SHARE * count), MIN_SEEDS), FIRST_STEP
+        self._simulated, self._step = 0, FIRST_STEP
+
+    @property
+    def seeds(self) -> int:
+        """The number of realizations of each strand from which it walks to the next level."""
+        return max(int((SHARE if self.dimensions <= MAX_WEIGHTED else NESTED_SEEDS) * self.count), MIN_SEEDS)
+
+    def spread(self, budget: int, levels: float) -> None:
+        """Choose the number of realizations at a level so that levels to come use up what is left of a budget."""
+        self.count = max(int((budget - self._simulated) / STRANDS / levels), MIN_LEVEL)
 
     def scores(self, u: np.ndarray) -> np.ndarray:
         """Return the scores (strand, n) of realizations u (strand, n, d)."""
+        self._simulated += u.shape[0] * u.shape[1]
         return self._score(u.reshape(-1, self.dimensions)).reshape(u.shape[:2])
 
     def begun(self, deviation: float) -> tuple[np.ndarray, np.ndarray]:
@@ -126,19 +148,34 @@ def by_levels(walk: Walk) -> Found:
     return Found.nothing() if u is None else Found(product.estimate, u)
 
 
-def by_inflation(walk: Walk, inflation: float) -> Found:
-    """Search from an inflation back to none."""
-    return (_weighted if walk.dimensions <= MAX_WEIGHTED else _nested)(walk, inflation)
+def by_inflation(walk: Walk, inflation: float, budget: int) -> Found:
+    """Search from an inflation back to none, where inflations are nested with about `budget` realizations in all."""
+    return _weighted(walk, inflation) if walk.dimensions <= MAX_WEIGHTED else _nested(walk, inflation, budget)
 
 
-def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> float:
-    """Return the least inflation at which the event is common, or at which it is most common, from `count` looks at each."""
+def nested_levels(inflation: float, share: float) -> float:
+    """Return how many levels with all their realizations a nested search has ahead.
+
+    share   of an event in realizations with this inflation. It is taken for one beyond a plane, whose probability at the
+            inflation s is Q(distance / s).
+    """
+    distance = -inflation * special.ndtri(share)
+    ratio = math.log(share) - max(float(special.log_ndtr(-distance)), math.log(NEGLIGIBLE))
+    return (2 + LOOKS_BACK) * (1 + ratio / -math.log(GOAL))
+
+
+def first_inflation(score: Score, dimensions: int, count: int, rng: np.random.Generator) -> tuple[float, float]:
+    """Return the least inflation at which the event is common, or at which it is most common, from `count` looks at each.
+
+    The second number is the share of the event at the inflation, at least that of a single look.
+    """
     scores = score(np.concatenate([s * rng.standard_normal((count, dimensions)) for s in INFLATIONS]))
     shares = [float((g > 0).mean()) for g in np.split(scores, len(INFLATIONS))]
-    common = [s for s, share in zip(INFLATIONS, shares, strict=True) if share >= COMMON]
+    common = [(s, share) for s, share in zip(INFLATIONS, shares, strict=True) if share >= COMMON]
     if common:
         return common[0]
-    return INFLATIONS[int(np.argmax(shares))] if max(shares) > SEEN else UNKNOWN_INFLATION
+    most = int(np.argmax(shares))
+    return (INFLATIONS[most] if shares[most] > SEEN else UNKNOWN_INFLATION), max(shares[most], 1 / count)
 
 
 def _levels(walk: Walk, inflation: float, product: Product) -> list[np.ndarray] | None:
@@ -191,7 +228,7 @@ def _weighted(walk: Walk, inflation: float) -> Found:
     return Found(product.estimate, list(u))
 
 
-def _nested(walk: Walk, inflation: float) -> Found:
+def _nested(walk: Walk, inflation: float, budget: int) -> Found:
     """Bring an inflated event back by nested ones, F_s = {z: g(s z) > 0} with z standard normal.
 
     P(F_t) / P(F_s) = P(z in F_t | F_s) / P(z in F_s | F_t) holds for any event.
@@ -200,11 +237,14 @@ def _nested(walk: Walk, inflation: float) -> Found:
     u = _inflated(walk, inflation, product)
     if u is None:
         return Found.nothing()
-    z = u / inflation
+    z, looks = u / inflation, u[:, :0]  # u (strand, n, d) to be looked at, whether it is in the event before
     while s > 1.0:
         for _ in range(TRIES):
             t = max(1 / math.sqrt(1 / s**2 + pace), 1.0)
-            hits = walk.scores(t * z) > 0
+            scores = walk.scores(np.concatenate([looks, t * z], axis=1))  # together: one question takes less time than two
+            hits_before, hits = np.split(scores > 0, [looks.shape[1]], axis=1)
+            product.over(hits_before)
+            looks = looks[:, :0]
             share = float(hits.mean())
             change = math.log(GOAL) / math.log(min(max(share, 1 / hits.size), 1 - 1 / hits.size))
             pace *= min(max(change, 1 / MAX_CHANGE), MAX_CHANGE)
@@ -213,14 +253,14 @@ def _nested(walk: Walk, inflation: float) -> Found:
         if not share:
             return Found.nothing()
         product.times(hits.mean(axis=1))
+        if product.log < math.log(NEGLIGIBLE):
+            return Found(Estimate(0.0, 0.0, product.estimate.upper), [])
+        walk.spread(budget, nested_levels(t, math.exp(product.log)))
         seeds = z[walk.chosen(hits)]
         z, _ = walk.on(seeds, np.ones(seeds.shape[:2]), 0.0, stretch=t)
-        looks = z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
-        hits_back = walk.scores(s * looks) > 0
-        if not hits_back.any():
-            return Found.nothing()
-        product.times(hits_back.mean(axis=1), power=-1)
+        looks = s * z[:, walk.rng.choice(z.shape[1], max(int(LOOKS_BACK * z.shape[1]), 1), replace=False)]
         s = t
+    product.over(walk.scores(looks) > 0)
     return Found(product.estimate, list(z))
 
 
