@@ -143,6 +143,8 @@ move are corrected together, each with six degrees of freedom, including parts t
 
 `force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Only the objective "seating" uses
 forces (see `tolcontact.mechanics`): they press parts onto their supports and neighbours, and decide which supports carry load.
+`tc.seating` asks whether forces push a part home against friction at its other contacts. A coefficient of friction is stated
+for all contacts, `tc.Assembly("clamp", mu=0.15)`, or for a pair, `contact(..., mu=0.1)`. Contact is resolved without friction.
 
 >>> weight = clamp.force("weight", at=plate.point(30, 20, 4), vector=(0, 0, -100))
 >>> print(weight)

@@ -300,6 +300,29 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
 
 
+def _seating(dataset: xr.Dataset) -> AnalysisReport:
+    notes = [
+        "Least coefficient of friction, the same at all other contacts, that can hold a part short of a",
+        "seat: 0 if no force presses it there, inf if none can; and the contacts that then hold it, with",
+        "their shares of the normal forces. All parts stand as drawn.",
+    ]
+    if dataset.attrs["open_pairs"]:
+        notes.append(f"They do not touch as drawn, so they hold nothing: {dataset.attrs['open_pairs']}.")
+    rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
+    columns = ["", "critical", "over stated", "held by"]
+    return AnalysisReport("Seating", f"{len(rows)} seats", notes, [AnalysisTable("", columns, rows)])
+
+
+def _seat(dataset: xr.Dataset) -> list[str]:
+    """Return the row of a seat: the contacts that hold most come first."""
+    critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
+    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE]
+    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders if critical > 0]
+    warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
+    over = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
+    return [str(dataset["seat"].values), f"{float(critical):.4g}", over, ", ".join(names)]
+
+
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
@@ -307,4 +330,5 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.TAILS.name: _tails,
     terms.ALLOCATION.name: _allocation,
     terms.RELOCATION.name: _relocation,
+    terms.SEATING.name: _seating,
 }
