@@ -52,7 +52,8 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Form`, `Feature`, `Pattern`, `DatumTargets`, `Variable` |
-| measure faces | `Gap`, `Flush`, `Clearance`, `AxisDistance`, `Angle`, `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
+| measure faces | `Gap`, `Flush`, `Clearance`, `LargestGap`, `MeanGap`, `AxisDistance`, `Angle`; |
+| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
 | | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
