@@ -12,6 +12,7 @@ from studies.benchmarks.problems import friction_on_an_incline as incline
 from tests import cases
 from tests.cases.frames import STILL
 from tests.helpers import call
+from tolcontact.report.html.analyses import tables_of
 
 PADS = np.array([(10, 10, 0), (90, 15, 0), (45, 50, 0)], dtype=float)
 STOPS = {"left": ((0, 20, 12), (1, 0, 0)), "front": ((60, 0, 8), (0, 1, 0))}
@@ -118,8 +119,13 @@ def test_what_cannot_be_asked_is_refused():
         tc.seating(seat((0, 0, 300)))
 
 
-def test_the_command_prints_seats_and_what_holds_them(tmp_path):
-    done = call(tmp_path, "seating", incline.__file__)
+def test_the_command_prints_seats_and_what_holds_them_and_keeps_them_for_the_page(tmp_path):
+    results = tc.run(incline.assembly(), samples=4, solver="daqp", surfaces=0, fields="none", out=tmp_path / "run.nc")
+    results.close()
+    done = call(tmp_path, "seating", tmp_path / "run.nc", "--into", tmp_path / "run.nc")
     assert done.returncode == 0, done.stderr
+    with tc.open_archive(tmp_path / "run.nc") as results:
+        (table,) = tables_of(results)
+    assert table["title"] == "Seating" and ["block.stop", "0.364", "-", "plane 100 %"] in table["rows"]
     rows = [line.split() for line in done.stdout.splitlines()]
     assert ["block.stop", "0.364", "-", "plane", "100", "%"] in rows

@@ -62,9 +62,16 @@ class Balance:
         for number in self.contacts:
             holders = [holder for holder in self.contacts if holder != number]
             critical, shares = self._critical(holders, self._equal(holders))
-            stated = [self._touching.contacts[holder].mu for holder in holders]
-            reserve = np.nan if None in stated else self._critical(holders, np.array(stated))[0]
-            yield Seat(self._touching.contacts[number], critical, reserve, shares)
+            yield Seat(self._touching.contacts[number], critical, self._reserve(holders, critical), shares)
+
+    def _reserve(self, numbers: Sequence[int], critical: float) -> float:
+        """Return the least factor of the coefficients that contacts (k,) state; NaN if one of them states none."""
+        stated = [self._touching.contacts[number].mu for number in numbers if not self._touching.contacts[number].is_guide]
+        if None in stated:
+            return np.nan
+        if len(values := {mu for mu in stated if mu}) == 1:
+            return critical / float(values.pop())
+        return self._critical(numbers, np.array([self._touching.contacts[number].mu or 0.0 for number in numbers]))[0]
 
     def _equal(self, numbers: Sequence[int]) -> np.ndarray:
         """Return 1 for each contact (k,), but 0 where friction is stated to be 0."""

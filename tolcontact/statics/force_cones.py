@@ -109,31 +109,37 @@ class _Program:
 
     def __init__(self, cones: ForceCones, factor: float) -> None:
         points, rough = len(cones.roughness), np.flatnonzero(factor * cones.roughness > 0)
-        identity = np.eye(points + 2 * len(rough) + 2)
-        normals, self.load, self.distance = identity[:points], identity[-2], identity[-1]
-        tangents = identity[points:-2].reshape(2, len(rough), len(identity))
-        self.wrenches = np.zeros((len(cones.load), len(identity)))
+        count = points + 2 * len(rough) + 2
+        self.load, self.distance = np.eye(1, count, count - 2)[0], np.eye(1, count, count - 1)[0]
+        self.wrenches = np.zeros((len(cones.load), count))
         self.wrenches[:, :-1] = np.column_stack([cones.normals, *cones.tangents[:, :, rough], cones.load])
-        self._matrices: list[np.ndarray] = [normals.sum(axis=0)[None] + self.load]
+        normals = np.append(np.arange(points), [count - 2, count - 1])
+        self._matrices = [sparse.csc_matrix(np.where(np.arange(count) < points, 1.0, self.load))]
         self._cones: list[Any] = [clarabel.ZeroConeT(1)]
-        self.add(-np.vstack([normals, self.load, self.distance]), clarabel.NonnegativeConeT(points + 2))
-        for number, (u, v) in zip(rough, zip(*tangents, strict=True), strict=True):
-            radius = factor * cones.roughness[number] * normals[number]
-            self.add(-np.array([radius, u, v]), clarabel.SecondOrderConeT(3))
+        self.add(_entries(-np.ones(len(normals)), normals, count), clarabel.NonnegativeConeT(len(normals)))
+        # The three rows of a cone: its radius, and both components of its friction force.
+        columns = np.column_stack([rough, points + np.arange(len(rough)), points + len(rough) + np.arange(len(rough))])
+        values = np.column_stack([factor * cones.roughness[rough], np.ones((len(rough), 2))])
+        self.add(_entries(-values.ravel(), columns.ravel(), count), *[clarabel.SecondOrderConeT(3)] * len(rough))
 
-    def add(self, matrix: np.ndarray, cone: Any) -> None:
-        """Demand that -matrix @ x lies in a cone."""
-        self._matrices.append(matrix)
-        self._cones.append(cone)
+    def add(self, matrix: Any, *cones: Any) -> None:
+        """Demand that -matrix @ x lies in a product of cones."""
+        self._matrices.append(sparse.csc_matrix(matrix))
+        self._cones += cones
 
     def solve(self, cost: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return x (column,) of least cost (column,), and the multipliers of the cone that was added last."""
-        A = np.vstack(self._matrices)
-        b = np.zeros(len(A))
+        """Return x (column,) of least cost (column,), and the multipliers of the rows that were added last."""
+        A = sparse.csc_matrix(sparse.vstack(self._matrices))
+        b = np.zeros(A.shape[0])
         b[0] = 1.0
         settings = clarabel.DefaultSettings()
         settings.verbose, settings.max_threads = False, 1
         settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = ACCURACY
         nothing = sparse.csc_matrix((len(cost), len(cost)))
-        solution = clarabel.DefaultSolver(nothing, cost, sparse.csc_matrix(A), b, self._cones, settings).solve()
-        return np.array(solution.x), np.array(solution.z)[len(A) - len(self._matrices[-1]) :]
+        solution = clarabel.DefaultSolver(nothing, cost, A, b, self._cones, settings).solve()
+        return np.array(solution.x), np.array(solution.z)[A.shape[0] - self._matrices[-1].shape[0] :]
+
+
+def _entries(values: np.ndarray, columns: np.ndarray, count: int) -> sparse.csc_matrix:
+    """Return a matrix (row, count) with one entry in each row."""
+    return sparse.csc_matrix((values, (np.arange(len(values)), columns)), shape=(len(values), count))
