@@ -5,6 +5,7 @@ import pytest
 
 import tolcontact as tc
 from tests.cases.frames import STILL, Frame
+from tests.cases.measured import ring, shaft
 from tests.cases.seats import seat
 from tests.helpers import SEATED, R_t, simulate
 from tests.test_form import coefficients, modes_at
@@ -47,20 +48,21 @@ def test_with_form_they_are_those_of_a_dense_grid_in_a_run_and_in_its_archive(tm
     faces = model.parts[1].face("-z"), model.parts[0].face("+z")
     model.measure("largest", tc.LargestGap(*faces))
     model.measure("mean", tc.MeanGap(*faces))
-    program, run = simulate(model, samples=40, solver="daqp", method=SEATED)
+    results = tc.run(model, samples=20, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none")
+    measured = results["measured"].values
+    results.close()
+    program, again = simulate(tmp_path / "run.nc", samples=20, solver="daqp")
+    np.testing.assert_array_equal(again["measured"], measured)
     grid = np.stack(np.meshgrid(np.linspace(0, 100, 101), np.linspace(0, 50, 51)), axis=-1).reshape(-1, 2)
     places = np.column_stack([grid, np.zeros(len(grid))])
-    form = coefficients(program, run, "under") @ modes_at(program, "under", places).T
-    R, t = R_t(run["poses"][:, CORRECTED, 1])
+    form = coefficients(program, again, "under") @ modes_at(program, "under", places).T
+    R, t = R_t(again["poses"][:, CORRECTED, 1])
     heights = (np.einsum("nij,kj->nki", R, places) + t[:, None])[..., 2] - form
     weights = np.prod([np.where(np.isin(grid[:, k], (0, side)), 0.5, 1.0) for k, side in enumerate((100, 50))], axis=0)
-    largest, mean = run["measured"][:, CORRECTED, -2:].T
+    largest, mean = measured[:, CORRECTED, -2:].T
     assert np.abs(largest - heights.max(axis=1)).max() < 5e-4
     assert np.abs(mean - heights @ weights / weights.sum()).max() < 2e-4
     assert 0.01 < mean.mean() < largest.mean() < 0.05
-    tc.run(model, samples=10, solver="daqp", method=SEATED, out=tmp_path / "run.nc", surfaces=0, fields="none").close()
-    _, again = simulate(tmp_path / "run.nc", samples=10, solver="daqp")
-    np.testing.assert_array_equal(again["measured"], run["measured"][:10])
 
 
 @pytest.mark.parametrize(
@@ -73,3 +75,19 @@ def test_faces_between_which_there_is_no_gap_are_refused(faces, message):
     a.measure("none", tc.LargestGap(block, table))
     with pytest.raises(tc.ModelError, match=message):
         tc.build(a)
+
+
+def test_between_a_shaft_and_its_bore_the_mean_is_the_clearance_and_the_largest_gap_that_of_the_far_end():
+    a = tc.Assembly("pin")
+    bore = a.part("ring", ring(), fixed=True).face(tc.Cylinder(inner=True))
+    pin = a.part("shaft", shaft())
+    across = [("x1", (0, 0, -10), "x"), ("x2", (0, 0, 10), "x"), ("y1", (0, 0, -10), "y"), ("y2", (0, 0, 10), "y")]
+    along = [("z", (0, 0, -15), "z"), ("t", (3, 0, 0), "y")]
+    a.locate(pin, [tc.Locator(*locator, 0.1) for locator in across + along])
+    a.measure("largest", tc.LargestGap(bore, pin.face(tc.Cylinder())))
+    a.measure("mean", tc.MeanGap(bore, pin.face(tc.Cylinder())))
+    _, run = simulate(a, samples=20, solver="daqp")
+    R, t = R_t(run["poses"][:, RAW, 1])
+    ends = np.hypot(*np.moveaxis([(R @ (0, 0, z) + t)[:, :2] for z in (-6, 6)], 2, 0)).max(axis=0)
+    assert np.abs(run["measured"][:, RAW, 1] - 0.2).max() < 1e-4
+    assert 0 <= (0.2 + ends - run["measured"][:, RAW, 0]).min() and (0.2 + ends - run["measured"][:, RAW, 0]).max() < 2e-3

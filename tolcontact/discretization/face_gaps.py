@@ -11,6 +11,7 @@ from tolcontact.geometry.overlap import overlap_corners
 from tolcontact.geometry.spreading import spread
 
 DEFAULT_PLACES, MAX_PLACES = 200, 1000
+MIN_SHARE = 0.04  # of a face, over which the other one is: smaller regions have fewer places
 MAX_FACING = 0.0  # cosine between the normals of faces that do not face each other
 
 
@@ -40,15 +41,21 @@ def face_gap(moving: MeasuredFace, reference: MeasuredFace, is_largest: bool) ->
 
 
 def _places(moving: MeasuredFace, reference: MeasuredFace) -> np.ndarray:
-    """Return places (place, 3) all over the moving face, and along the rim of the region over which the reference face is."""
+    """Return places (place, 3) of the moving face over the reference face, also along the rim of the region that they cover."""
     surface, lengths = moving.surface, form_lengths([moving.deviation, reference.deviation])
     spacing = form_spacing(lengths) if lengths else (surface.mesh.area / DEFAULT_PLACES) ** 0.5
     places = spread(surface.mesh, None, spacing)
+    share = float(reference.surface.project(places)[2].mean())
+    if not lengths and share < 1:
+        spacing *= max(share, MIN_SHARE) ** 0.5
+        places = spread(surface.mesh, None, spacing)
     if is_flat(surface) and is_flat(reference.surface):
         places = np.concatenate([places, overlap_corners(surface, reference.surface)])
         reach = float(np.ptp(np.vstack([surface.mesh.bounds, reference.surface.mesh.bounds]), axis=0).sum())
         places = with_rims(places, surface, reference.surface, spacing, reach)
     places = places[reference.surface.project(places)[2]]
+    if len(places) and surface.surfaces:
+        places, _, _ = surface.project(places)  # from triangles onto the round face that they stand for
     if len(places) > MAX_PLACES:
         raise GeometryFault(
             f"the gap between {moving.face} and {reference.face} needs {len(places)} places, by the correlation length of "
