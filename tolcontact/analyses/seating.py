@@ -17,8 +17,9 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
     """Return the critical coefficient of friction of each locator and each contact pair of the parts that forces press.
 
         critical  (seat)          the least coefficient of friction, the same at all other contacts, at which these can hold the
-                                  part short of the seat. Below it, the forces push the part onto the seat. It is 0 if no force
-                                  does, and infinite if no friction holds the part short of the seat
+                                  part short of the seat. Below it, the forces push the part onto the seat. It is 0 if the other
+                                  contacts hold the part without friction, as where no force presses it against the seat, and
+                                  infinite if no friction holds the part short of the seat
         reserve   (seat)          the least factor of the stated coefficients (`mu`) at which the other contacts can hold it: up
                                   to 1 the part may stop short. Not a number unless all of these state one
         share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part

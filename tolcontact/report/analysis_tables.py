@@ -303,8 +303,8 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
 def _seating(dataset: xr.Dataset) -> AnalysisReport:
     notes = [
         "Least coefficient of friction, the same at all other contacts, that can hold a part short of a",
-        "seat: 0 if no force presses it there, inf if none can; and the contacts that then hold it, with",
-        "their shares of the normal forces. All parts stand as drawn.",
+        "seat: 0 if they hold it without friction, inf if they cannot with any; and the contacts that",
+        "then hold it, with their shares of the normal forces. All parts stand as drawn.",
     ]
     if dataset.attrs["open_pairs"]:
         notes.append(f"They do not touch as drawn, so they hold nothing: {dataset.attrs['open_pairs']}.")

@@ -20,8 +20,8 @@ MIN_GUIDE = 1e-9  # of the largest singular value of the guides: a smaller one i
 class Seat:
     """A contact, and how its part can be held short of it.
 
-    critical   the least coefficient of friction, the same at all other contacts, at which these can balance the forces: 0 if no
-               force presses the part against the seat, infinite if no friction holds it short of the seat
+    critical   the least coefficient of friction, the same at all other contacts, at which these can balance the forces: 0 if
+               they can without friction, infinite if they cannot with any
     reserve    the least factor of the stated coefficients at which the other contacts can; NaN if not all are stated
     shares     (contact,): share of the sum of all normal forces at the critical coefficient
     """
