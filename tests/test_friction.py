@@ -11,6 +11,7 @@ from studies.benchmarks.friction import least_coefficient
 from studies.benchmarks.problems import friction_on_an_incline as incline
 from tests import cases
 from tests.cases.frames import STILL
+from tests.cases.measured import ring, shaft
 from tests.helpers import call
 from tolcontact.report.html.analyses import tables_of
 
@@ -99,6 +100,20 @@ def test_contacts_that_press_against_each_other_hold_along_themselves_but_not_ab
     assert pinched(-9)["block.rest 0"] == pytest.approx(1, abs=1e-4)
 
 
+def test_a_pin_in_a_wider_bore_lies_at_its_bottom():
+    a = tc.Assembly("pin")
+    bore = a.part("ring", ring(), fixed=True)
+    pin = a.part("pin", shaft())
+    a.locate(pin, [tc.Locator("shoulder", (0, 0, -15), "z", 0.1, one_sided=True)], floating=True)
+    a.contact("bore", moving=pin.face(tc.Cylinder()), reference=bore.face(tc.Cylinder(inner=True)))
+    a.force("weight", at=pin.point(0, 0, 0), vector=(1.2, -1.6, 0))
+    a.force("push", at=pin.point(0, 0, 0), vector=(0, 0, -0.6))
+    a.measure("end", pin.point(0, 0, 15), along="z")
+    result = tc.seating(a).sel(seat="pin.shoulder")
+    assert float(result.critical) == pytest.approx(0.6 / 2, abs=1e-6)
+    assert float(result.share.sel(holder="bore")) == pytest.approx(1) and not result.attrs["open_pairs"]
+
+
 def test_friction_is_part_of_a_json_model(tmp_path):
     tc.write_model(with_friction(incline.assembly(), 0.3, plane=0.0), tmp_path / "model.json")
     document = json.loads((tmp_path / "model.json").read_text())
@@ -115,7 +130,7 @@ def test_friction_that_is_no_coefficient_is_refused(mu):
 def test_what_cannot_be_asked_is_refused():
     with pytest.raises(tc.OptionError, match="has no forces, so nothing presses"):
         tc.seating(cases.ra1())
-    with pytest.raises(tc.OptionError, match='holds "block" against the forces, even with friction'):
+    with pytest.raises(tc.OptionError, match='nothing that touches holds "block" against the forces, even'):
         tc.seating(seat((0, 0, 300)))
 
 

@@ -101,7 +101,7 @@ True
 
 ## What seats
 
-`tc.seating` looks at the assembly as drawn, under its forces, and takes no other arguments than the model and `into`. For each
+`tc.seating` looks at the assembly where its forces seat it, and takes no other arguments than the model and `into`. For each
 locator and each contact pair it finds the least coefficient of friction at which the other contacts can hold the part short of
 it. Below, the forces push the part home; above, it may stay where it was let go. A model that states coefficients
 (`tc.Assembly(..., mu=0.15)`) gets their `reserve`, too, and a warning `[friction]` where it is at most 1.

@@ -7,10 +7,13 @@ import xarray as xr
 
 from tolcontact import vocabulary as terms
 from tolcontact.analyses.analysis import Question
+from tolcontact.analyses.seated_contacts import seated_contacts
 from tolcontact.compilation import Program
 from tolcontact.errors import OptionError
-from tolcontact.statics import Balance, Touching, balances, touching_contacts
+from tolcontact.statics import Balance, Touching, balances, drawn_contacts
 from tolcontact.workflow.models import Model
+
+SEATED, DRAWN = "where the forces seat them", "as drawn, since the forces find no pose without friction"
 
 
 def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dataset:
@@ -24,16 +27,22 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
                                   to 1 the part may stop short. Not a number unless all of these state one
         share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part
 
-    All parts stand as drawn, and what touches there may carry: one-sided locators and contact pairs with friction, two-sided
-    locators without. A contact that states mu=0 has no friction. Opposed contacts may press against each other as hard as the
-    balance of forces allows, as in a drawer that jams. Whether a part does stop short depends on how it was put down, which
-    nobody knows; the coefficient states whether it can. It is exact to 1e-6 (see tolcontact.statics); where contacts can also
-    press against each other without holding the forces, to 1e-3. Triangles of round faces touch if they are nearer than their
-    distance from these faces.
+    Parts stand where the forces seat them without deviations and without friction, in the exact resolution, whatever the method
+    of the model; if they find no such pose, parts stand as drawn (attribute `place`). What touches there may carry: one-sided
+    locators and contact pairs with friction, two-sided locators without. A contact that states mu=0 has no friction. Opposed
+    contacts may press against each other as hard as the balance of forces allows, as in a drawer that jams. Whether a part does
+    stop short depends on how it was put down, which nobody knows; the coefficient states whether it can. It is exact to 1e-6;
+    where contacts can also press against each other without holding the forces, to 1e-3 (see tolcontact.statics).
     Arguments that all analyses share, and what they raise, are described in tolcontact.analyses.
     """
     question = Question(terms.SEATING, model, solver=None, method=None, into=into)
-    touching = touching_contacts(question.program.nominal)
+    if not question.program.nominal.assembly.forces:
+        raise OptionError(
+            f'"{question.assembly}" has no forces, so nothing presses its parts onto their seats; declare them: '
+            'model.force("clamp", at=part.point(x, y, z), vector=(0, 0, -100))'
+        )
+    seated = seated_contacts(question.program)
+    touching = seated or drawn_contacts(question.program.nominal)
     seats = [seat for balance in _pressed(question, touching) for seat in balance.seats()]
     labels = [contact.label for contact in touching.contacts]
     arrays = {
@@ -45,29 +54,19 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
         arrays,
         {terms.SEAT: [seat.contact.label for seat in seats], terms.HOLDER: labels},
         open_pairs=", ".join(touching.open_pairs),
+        place=SEATED if seated else DRAWN,
     )
 
 
 def _pressed(question: Question, touching: Touching) -> list[Balance]:
-    """Return the balances of parts that forces press. Raises OptionError if there are none, or if nothing holds their parts."""
-    if not touching.force:
-        raise OptionError(
-            f'"{question.assembly}" has no forces, so nothing presses its parts onto their seats; declare them: '
-            'model.force("clamp", at=part.point(x, y, z), vector=(0, 0, -100))'
-        )
+    """Return the balances of parts that forces press. Raises OptionError if nothing holds their parts, even with friction."""
     pressed = [balance for balance in balances(touching) if balance.is_pressed]
     for balance in pressed:
         if not balance.is_held:
             parts = ", ".join(f'"{question.program.nominal.parts[part].name}"' for part in balance.parts)
+            open_pairs = ", ".join(f'"{name}"' for name in touching.open_pairs)
             raise OptionError(
-                f"nothing that touches in the assembly as drawn holds {parts} against the forces, even with friction; "
-                f"check the vectors of the forces{_open_pairs(touching)}"
+                f"nothing that touches holds {parts} against the forces, even with friction; check the vectors of the forces"
+                + (f", and the contact pairs that do not touch: {open_pairs}" if open_pairs else "")
             )
-    if not pressed:
-        raise OptionError(f'the forces of "{question.assembly}" act on fixed parts only; let them press parts that are located')
     return pressed
-
-
-def _open_pairs(touching: Touching) -> str:
-    pairs = ", ".join(f'"{name}"' for name in touching.open_pairs)
-    return f", and the contact pairs that do not touch as drawn: {pairs}" if pairs else ""

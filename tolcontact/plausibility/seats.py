@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from tolcontact.plausibility.trial_draws import TrialDraws
-from tolcontact.statics import balances, touching_contacts
+from tolcontact.statics import balances, drawn_contacts
 
 
 def unsure_seats(draws: TrialDraws) -> Iterator[str]:
@@ -11,7 +11,7 @@ def unsure_seats(draws: TrialDraws) -> Iterator[str]:
     assembly = draws.program.nominal.assembly
     if not assembly.forces or all(mu is None for mu in (assembly.mu, *(pair.mu for pair in assembly.pairs))):
         return
-    touching = touching_contacts(draws.program.nominal)
+    touching = drawn_contacts(draws.program.nominal)
     for balance in balances(touching):
         for seat in balance.seats() if balance.is_pressed and balance.is_held else ():
             if seat.critical > 0 and seat.reserve <= 1:

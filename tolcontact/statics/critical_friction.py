@@ -13,6 +13,7 @@ from tolcontact.statics.touching import Contact, Touching, across, wrenches
 
 USUAL_FRICTION = 0.5
 MIN_LOAD = 1e-9  # of the sum of all forces: a smaller load is rounding
+MAX_UNBALANCED = 1e-7  # of the sum of all forces: a smaller component of the load that no contact can balance is rounding
 MIN_GUIDE = 1e-9  # of the largest singular value of the guides: a smaller one is rounding
 
 
@@ -109,9 +110,9 @@ class Balance:
         normals, *tangents = (np.hstack([nothing, *column]) for column in columns)
         U, sizes, _ = np.linalg.svd(np.hstack([nothing, *guides]))
         Z = U[:, int((sizes > MIN_GUIDE * sizes.max(initial=0.0)).sum()) :]
-        counts = [0 if contact.is_guide else len(contact.points) for contact in contacts]
-        return ForceCones(
-            Z.T @ normals, np.array([Z.T @ tangent for tangent in tangents]), Z.T @ self._load, np.repeat(roughness, counts)
+        of_points = np.repeat(roughness, [0 if contact.is_guide else len(contact.points) for contact in contacts])
+        return _spanned(
+            ForceCones(Z.T @ normals, np.array([Z.T @ tangent for tangent in tangents]), Z.T @ self._load, of_points)
         )
 
     def _wrenches(self, contact: Contact, forces: np.ndarray) -> np.ndarray:
@@ -123,6 +124,18 @@ class Balance:
             if part in self.parts:
                 rows[self.parts.index(part)] += sign * wrench
         return rows.reshape(-1, len(forces))
+
+
+def _spanned(cones: ForceCones) -> ForceCones:
+    """Return force cones in the directions that their forces span, if the load has next to no other component.
+
+    So rounding of a load about the line through two contacts, which no force there can balance, does not matter.
+    """
+    U, sizes, _ = np.linalg.svd(np.hstack([cones.normals, *cones.tangents * cones.roughness]), full_matrices=False)
+    span = U[:, sizes > MIN_GUIDE * sizes.max(initial=0.0)].T
+    if not len(span) or np.linalg.norm(cones.load - span.T @ (span @ cones.load)) > MAX_UNBALANCED:
+        return cones
+    return ForceCones(span @ cones.normals, span @ cones.tangents, span @ cones.load, cones.roughness)
 
 
 def balances(touching: Touching) -> Iterator[Balance]:

@@ -1,12 +1,13 @@
-"""The contacts of the assembly as drawn: its locators, and the places where the faces of a pair touch."""
+"""The contacts of an assembly at some poses of its parts: locators, and the places where the faces of a pair touch."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
+from tolcontact import poses as pose
 from tolcontact.arrays import Array, Bool, Float
 from tolcontact.discretization import ContactPoints, Nominal
 
@@ -35,7 +36,7 @@ class Contact(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Touching:
-    """The contacts of an assembly as drawn, and its pairs that do not touch there.
+    """The contacts of an assembly, and its pairs that do not touch.
 
     loads        (part, 6): the sum of the forces on each part [N], and of their moments about the origin [N mm]
     force        the sum of the sizes of all forces [N]
@@ -47,6 +48,13 @@ class Touching:
     loads: Float[Array, "part 6"]
     force: float
     is_located: Bool[Array, " part"]
+
+
+class Places(NamedTuple):
+    """Places (place, 3) [mm] at which a pair touches, and unit vectors (place, 3) there, into the moving part."""
+
+    points: Float[Array, "place 3"]
+    normals: Float[Array, "place 3"]
 
 
 def wrenches(points: np.ndarray, forces: np.ndarray) -> np.ndarray:
@@ -61,43 +69,56 @@ def across(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return u, np.cross(normals, u)
 
 
-def touching_contacts(nominal: Nominal) -> Touching:
-    """Return the contacts of a nominal assembly, and the loads of its parts."""
+def drawn_contacts(nominal: Nominal) -> Touching:
+    """Return the contacts of the assembly as drawn, and the loads of its parts."""
     pairs = [pair for pair in nominal.pairs if not pair.is_supports]
-    stated = [nominal.assembly.mu if declared.mu is None else declared.mu for declared in nominal.assembly.pairs]
-    candidates = [_pair_contact(pair, mu) for pair, mu in zip(pairs, stated, strict=True)]
-    contacts = [contact for contact in candidates if len(contact.points)]
-    touching = {contact.label for contact in contacts}
+    return contacts_at(nominal, np.tile(pose.AT_REST, (len(nominal.parts), 1)), [_drawn_places(pair) for pair in pairs])
+
+
+def contacts_at(nominal: Nominal, poses: np.ndarray, places: Sequence[Places]) -> Touching:
+    """Return the contacts at poses (part, 12) where each declared pair touches at some places, and the loads of the parts."""
+    declared = nominal.assembly.pairs
     loads = np.zeros((len(nominal.parts), 6))
     for force in nominal.assembly.forces:
-        loads[nominal.part_index(force.at.part)] += wrenches(nominal.position(force.at)[None], np.array([force.vector]))[0]
-    located = [nominal.assembly.location_of(part.part) is not None for part in nominal.parts]
-    open_pairs = tuple(pair.name for pair in pairs if pair.name not in touching)
-    size = float(sum(np.linalg.norm(force.vector) for force in nominal.assembly.forces))
-    return Touching((*_locator_contacts(nominal), *contacts), open_pairs, loads, size, np.array(located))
+        part = nominal.part_index(force.at.part)
+        at = pose.apply(poses[part], nominal.position(force.at)[None])
+        loads[part] += wrenches(at, np.array([force.vector]))[0]
+    return Touching(
+        (*_locator_contacts(nominal, poses), *_pair_contacts(nominal, places)),
+        tuple(pair.name for pair, touched in zip(declared, places, strict=True) if not len(touched.points)),
+        loads,
+        float(sum(np.linalg.norm(force.vector) for force in nominal.assembly.forces)),
+        np.array([nominal.assembly.location_of(part.part) is not None for part in nominal.parts]),
+    )
 
 
-def _locator_contacts(nominal: Nominal) -> Iterator[Contact]:
+def _locator_contacts(nominal: Nominal, poses: np.ndarray) -> Iterator[Contact]:
     """Yield the locators of all parts."""
     for number, part in enumerate(nominal.parts):
         locators, parent = part.locators, GROUND if part.parent is None else part.parent
-        for label, point, direction, one_sided in zip(
-            locators.labels, locators.points, locators.directions, locators.one_sided, strict=True
-        ):
+        points = pose.apply(poses[number], locators.points)
+        directions = locators.directions if parent == GROUND else locators.directions @ pose.rotation(poses[parent]).T
+        for label, point, direction, one_sided in zip(locators.labels, points, directions, locators.one_sided, strict=True):
             yield Contact(label, number, parent, point[None], direction[None], not one_sided, nominal.assembly.mu)
 
 
-def _pair_contact(pair: ContactPoints, mu: float | None) -> Contact:
-    """Return where a pair touches; points that cannot carry more than others do are left out."""
-    assert pair.moving_face is not None and pair.reference_face is not None and pair.reference is not None
+def _pair_contacts(nominal: Nominal, places: Sequence[Places]) -> Iterator[Contact]:
+    """Yield the pairs that touch; points that cannot carry more than others do are left out."""
+    for declared, (points, normals) in zip(nominal.assembly.pairs, places, strict=True):
+        moving, reference = (nominal.part_index(face.part) for face in (declared.moving, declared.reference))
+        corners, mu = carrying(points, normals), nominal.assembly.mu if declared.mu is None else declared.mu
+        if len(corners):
+            yield Contact(declared.name, moving, reference, points[corners], normals[corners], False, mu)
+
+
+def _drawn_places(pair: ContactPoints) -> Places:
+    """Return where a pair touches as drawn."""
+    assert pair.moving_face is not None and pair.reference_face is not None
     size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
-    nearness = TOUCH_SHARE * size + pair.facets + pair.bulge
-    touches = np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= nearness
+    touches = np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge
     if pair.round is not None:
         touches &= ~pair.round.points["is_hollow"]  # these have a place of their own at every pose
-    points, normals = pair.P_r[touches], pair.n_r[touches]
-    corners = carrying(points, normals)
-    return Contact(pair.name, pair.moving, pair.reference, points[corners], normals[corners], False, mu)
+    return Places(pair.P_r[touches], pair.n_r[touches])
 
 
 def carrying(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
