@@ -25,7 +25,8 @@ def seating(model: Model | Program, *, into: str | Path | None = None) -> xr.Dat
                                   infinite if no friction holds the part short of the seat
         reserve   (seat)          the least factor of the stated coefficients (`mu`) at which the other contacts can hold it: up
                                   to 1 the part may stop short. Not a number unless all of these state one
-        share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part
+        share     (seat, holder)  the share that each contact then has in the sum of all normal forces: what holds the part; one
+                                  distribution of several where it is not unique
 
     Parts stand where the forces seat them without deviations and without friction, in the exact resolution, whatever the method
     of the model; if they find no such pose, parts stand as drawn (attribute `place`). What touches there may carry: one-sided

@@ -318,8 +318,8 @@ def _seating(dataset: xr.Dataset) -> AnalysisReport:
 def _seat(dataset: xr.Dataset) -> list[str]:
     """Return the row of a seat: the contacts that hold most come first."""
     critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
-    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE]
-    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS] if critical > 0]
+    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
+    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
     names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
     warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
     over = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
