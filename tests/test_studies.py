@@ -25,6 +25,7 @@ STUDIES = {
     "certificates/ends.py": ["--scenes", "6", "--samples", "3"],
     "certificates/judge.py": ["--scenes", "3", "--samples", "20"],
     "exact/tables.py": ["--samples", "20"],
+    "form/measure.py": ["--samples", "10", "--figure", "gaps.png"],
     "paper/reproduce.py": ["--large", "2000", "--to", "."],
     "report/picture.py": ["ra1.png"],
     "robustness/files.py": ["--archives", "1", "--shapes", "2", "--models", "2", "--steps", "2", "--hostile-steps", "2"],

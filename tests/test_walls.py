@@ -15,6 +15,7 @@ FILES = sorted(PACKAGE.rglob("*.py"))
 # Who may import a library: folders and files, relative to the package.
 ROOMS = {
     "casadi": ("mechanics/", "compilation/"),
+    "clarabel": ("statics/force_cones.py",),
     "matplotlib": ("plot/",),
     "jinja2": ("report/html/",),
     "fast_simplification": ("report/html/decimation.py",),
@@ -33,7 +34,7 @@ ROOMS = {
 NOT_IN = {
     "xarray": (
         "declaration/", "geometry/", "features/", "discretization/", "variation/", "mechanics/", "compilation/", "contact/",
-        "simulation/",
+        "simulation/", "statics/",
     )
 }  # fmt: skip
 # Who may import a library by a call, when it is first needed: it is optional, or slow to import.
@@ -63,8 +64,8 @@ APART = {
 ORDER = (
     "version", "errors", "interrupts", "later", "readable", "child", "kernel", "vocabulary", "checksums", "realizations",
     "arrays", "method", "poses", "limits", "code_cache", "replacing", "compiled", "declaration", "geometry", "features",
-    "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "plausibility", "contact", "simulation",
-    "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
+    "fasteners", "pmi", "discretization", "variation", "mechanics", "compilation", "statics", "plausibility", "contact",
+    "simulation", "statistics", "archive", "report", "plot", "workflow", "analyses", "testing", "cli", "__init__", "__main__",
 )  # fmt: skip
 
 

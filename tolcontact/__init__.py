@@ -39,7 +39,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | report | `tolcontact.report` | tables, pages for a browser, notebooks |
 | draw pictures | `tolcontact.plot` | histograms, fields and assemblies for papers and slides |
 | whole flow in Python | `tolcontact.workflow` | `run`, `build`, `check`, `simulate`, `compare`, `summarize` |
-| analyse | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and positions suffice |
+| analyse | `tolcontact.analyses` | what matters, what is extreme or rare, which tolerances and positions suffice, what seats |
 | whole flow in a shell | `tolcontact.cli` | the command `tolcontact`, its exit codes |
 
 `python -m pydoc tolcontact.declaration` shows a chapter in the terminal. Every example in the guide is run by the tests.
@@ -52,7 +52,8 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | tolerance features | `Size`, `Position`, `Profile`, `LineProfile`, `Parallelism`, `Perpendicularity`, `Angularity`, |
 | | `Symmetry`, `Coaxiality`, `CircularRunout`, `TotalRunout`, `Straightness`, `Flatness`, `Roundness`, `Cylindricity`; |
 | | `Form`, `Feature`, `Pattern`, `DatumTargets`, `Variable` |
-| measure faces | `Gap`, `Flush`, `Clearance`, `AxisDistance`, `Angle`, `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
+| measure faces | `Gap`, `Flush`, `Clearance`, `LargestGap`, `MeanGap`, `AxisDistance`, `Angle`; |
+| | `Minimum`, `Maximum`, `Mean`, `Sum`, `Difference`; |
 | | `stations`, `Measurement` |
 | choose faces | `Facing`, `Inside`, `Near`, `Brep`, `Cylinder`, `Largest` |
 | STEP files | `bodies_in`, `faces_in`, `parts_from`, `read_pmi` |
@@ -61,7 +62,7 @@ Each phase of a run is a package, and its documentation is a chapter: read them 
 | commands | `main`, `command_line` |
 | draw pictures | `plot` |
 | write models as JSON | `write_model` |
-| analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate` |
+| analyse | `contributions`, `sensitivities`, `tails`, `worst_case`, `allocate`, `relocate`, `seating` |
 | read results | `summarize`, `compare_runs`, `open_archive`, `model_of`, `Status` |
 | catch | `TolcontactError` and its kinds `ModelError`, `OptionError`, `ArchiveError`, `ScriptError`, `ClusterError` |
 | warnings | `ContactWarning`, `FaceWarning`, `NominalWarning`, `UnitsWarning` |

@@ -2,6 +2,7 @@ from . import plot as plot
 from .analyses.allocate import allocate as allocate
 from .analyses.contributions import contributions as contributions
 from .analyses.relocate import relocate as relocate
+from .analyses.seating import seating as seating
 from .analyses.sensitivities import sensitivities as sensitivities
 from .analyses.tails import tails as tails
 from .analyses.worst_case import worst_case as worst_case
@@ -33,10 +34,12 @@ from .declaration import (
     Gap as Gap,
     Inside as Inside,
     Largest as Largest,
+    LargestGap as LargestGap,
     LineProfile as LineProfile,
     Locator as Locator,
     Maximum as Maximum,
     Mean as Mean,
+    MeanGap as MeanGap,
     Measure as Measure,
     Measurement as Measurement,
     Mesh as Mesh,

@@ -89,6 +89,11 @@ def within(value: float, tolerance: float) -> Estimate:
     return Estimate(float(value), float(value) - tolerance, float(value) + tolerance)
 
 
+def critical_friction(model: tc.Assembly, seat: str) -> Estimate:
+    """Return the least coefficient of friction that can hold a part short of a seat."""
+    return within(float(tc.seating(model).critical.sel(seat=seat)), 1e-6)
+
+
 def of_analysis(estimate: Any) -> Estimate:
     """Return an estimate (interval,) of an analysis, its 95 % interval widened to 99.9 %."""
     value, lower, upper = map(float, estimate.values)

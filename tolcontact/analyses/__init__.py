@@ -12,6 +12,7 @@ also a command, which prints tables, JSON or CSV.
 | `tails` | `tails` | How often is a measure outside its limits (a rare-event estimate in ppm)? |
 | `allocate` | `allocate` | Which tolerance ranges suffice at the lowest cost, and which one should be tightened first? |
 | `relocate` | `relocate` | At which position of a locator does a measure vary least? |
+| `seating` | `seating` | From which coefficient of friction on can a part be held short of a locator or a seat? |
 
 ## Arguments of all analyses
 
@@ -97,4 +98,24 @@ True
 >>> moved = tc.relocate(assembly, "block.A3", between=((0, 25, 0), (50, 25, 0)), least="height: 6 sigma", samples=256)
 >>> moved.point.sel(stage="before").values.tolist(), moved.sizes["trial"] > 9
 ([25.0, 25.0, 0.0], True)
+
+## What seats
+
+`tc.seating` looks at the assembly where its forces seat it, and takes no other arguments than the model and `into`. For each
+locator and each contact pair it finds the least coefficient of friction at which the other contacts can hold the part short of
+it. Below, the forces push the part home; above, it may stay where it was let go. A model that states coefficients
+(`tc.Assembly(..., mu=0.15)`) gets their `reserve`, too, and a warning `[friction]` where it is at most 1.
+
+>>> clamped = tc.Assembly("clamped")
+>>> table = clamped.part("table", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+>>> block = clamped.part("block", tc.Box(50, 25, 10))
+>>> sides = [tc.Locator(f"side {x}", (x, 0, 5), "y") for x in (5, 45)]
+>>> location = clamped.locate(
+...     block, [*sides, tc.Locator("stop", (0, 12, 5), "x", one_sided=True)], tolerance=0.1, floating=True
+... )
+>>> pair = clamped.contact("seat", moving=block.face("-z"), reference=table.face("+z"))
+>>> measure = clamped.measure("place", block.point(0, 0, 0), along="x")
+>>> clamp = clamped.force("clamp", at=block.point(30, 12, 10), vector=(-20, 0, -40))
+>>> tc.seating(clamped).critical.sel(seat="block.stop").round(6).item()
+0.5
 """

@@ -19,21 +19,17 @@ from tolcontact.workflow.models import Choice, Model, check_counts, program_of
 SPREAD_SAMPLES = 1 << 14  # realizations that the spreads of contributors are estimated from
 
 
-class Analysis:
-    """One analysis of one model. Nothing is simulated before all of its options are checked.
+class Question:
+    """A question about one model, and its answer: a dataset with a place in an archive.
 
     Raises ModelError, ArchiveError, OptionError for arguments that cannot be used.
     """
 
     def __init__(
-        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
-        method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
+        self, record: terms.AnalysisRecord, model: Model | Program, *, solver: str | None, method: Choice | None,
+        into: str | Path | None,
     ) -> None:  # fmt: skip
-        check_counts(samples=samples, seed=seed)
-        self.record, self.samples, self.seed, self.progress = record, samples, seed, progress
-        self.program = program_of(model, solver, method)
-        self.blocks, self._client = mapping(client), client
-        self._into = into
+        self.record, self.program, self._into = record, program_of(model, solver, method), into
         if into is not None:
             check_room_for(into, record, self.program)
 
@@ -42,26 +38,10 @@ class Analysis:
         """The name of the assembly."""
         return self.program.nominal.assembly.name
 
-    def engine(self, total: int | None = None) -> Engine:
-        """Return an engine that reports its progress if there is a `total` of realizations.
-
-        Raises OptionError if so many realizations cannot end.
-        """
-        self.check_affordable(self.samples if total is None else total)
-        return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
-
-    def check_affordable(self, realizations: int) -> None:
-        """Raise OptionError if so many realizations cannot end."""
-        check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
-
-    def sampled_deviations(self) -> np.ndarray:
-        """Return deviations (n, contributor) of enough realizations to estimate spreads."""
-        return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
-
-    def check_varies(self, varies: object) -> None:
-        """Raise OptionError if nothing varies."""
-        if not varies:
-            raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The attributes of the dataset that state how its numbers were computed."""
+        return {}
 
     def dataset(
         self, values: Mapping[str, Any], labels: Mapping[str, Sequence[str]], *, units: str | None = None, **attributes: Any
@@ -71,7 +51,7 @@ class Analysis:
         values      array for each variable of the record
         labels      labels of dimensions that neither the vocabulary nor the model knows
         units       units of the only measure, where no dimension lists measures
-        attributes  beside the title, the seed and the method
+        attributes  beside the title and the settings
         """
         arrays = {v.name: v.entry(np.array(values[v.name])) for v in self.record.variables}
         dataset = xr.Dataset(
@@ -80,10 +60,7 @@ class Analysis:
             attrs={
                 "title": self.record.title.format(assembly=self.assembly, **attributes),
                 **attributes,
-                "seed": self.seed,
-                "solver": self.program.plugin.name,
-                "resolution": self.program.method.resolution,
-                "objective": self.program.method.objective,
+                **self.settings,
             },
         )
         if self._into is not None:
@@ -109,3 +86,47 @@ class Analysis:
             if self.record.has_units_of(dim):
                 coordinates[f"{dim}_units"] = (dim, [units[dim][label] for label in coordinates[dim]])
         return coordinates
+
+
+class Analysis(Question):
+    """A question that is answered by simulations. Nothing is simulated before all of its options are checked."""
+
+    def __init__(
+        self, record: terms.AnalysisRecord, model: Model | Program, *, samples: int, seed: int, solver: str | None,
+        method: Choice | None, into: str | Path | None, client: Any, progress: Progress | None,
+    ) -> None:  # fmt: skip
+        check_counts(samples=samples, seed=seed)
+        super().__init__(record, model, solver=solver, method=method, into=into)
+        self.samples, self.seed, self.progress = samples, seed, progress
+        self.blocks, self._client = mapping(client), client
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """The attributes of the dataset that state how its numbers were computed."""
+        return {
+            "seed": self.seed,
+            "solver": self.program.plugin.name,
+            "resolution": self.program.method.resolution,
+            "objective": self.program.method.objective,
+        }
+
+    def engine(self, total: int | None = None) -> Engine:
+        """Return an engine that reports its progress if there is a `total` of realizations.
+
+        Raises OptionError if so many realizations cannot end.
+        """
+        self.check_affordable(self.samples if total is None else total)
+        return Engine(self.program, self.blocks, progress=None if total is None else self.progress, total=total or 0)
+
+    def check_affordable(self, realizations: int) -> None:
+        """Raise OptionError if so many realizations cannot end."""
+        check_affordable(self.program, samples=realizations, seed=self.seed, threads=threads_of(self._client))
+
+    def sampled_deviations(self) -> np.ndarray:
+        """Return deviations (n, contributor) of enough realizations to estimate spreads."""
+        return self.program.draws(seed=self.seed, start=0, stop=SPREAD_SAMPLES)
+
+    def check_varies(self, varies: object) -> None:
+        """Raise OptionError if nothing varies."""
+        if not varies:
+            raise OptionError(f'nothing varies in "{self.assembly}"; give it tolerances first')

@@ -18,6 +18,7 @@
     tolcontact tails MODEL.py                            probabilities of rare violations of limits
     tolcontact allocate MODEL.py --require "gap: ppm 1000"   tolerance ranges at the lowest cost
     tolcontact relocate MODEL.py --locator top.A3 ...   best position of a locator
+    tolcontact seating MODEL.py                          friction that can hold parts short of their seats
     tolcontact compare A.nc B.nc [--report FILE.html]    compare runs, from the same draws or not
     tolcontact view MODEL.py | FILE.stp                  show an assembly or a file before a run
     tolcontact bodies FILE.stp                           the product tree of a STEP file, with numbers and sizes

@@ -14,6 +14,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.analyses.allocate import allocate
 from tolcontact.analyses.contributions import contributions
 from tolcontact.analyses.relocate import relocate
+from tolcontact.analyses.seating import seating
 from tolcontact.analyses.sensitivities import sensitivities
 from tolcontact.analyses.tails import tails
 from tolcontact.analyses.worst_case import worst_case
@@ -26,11 +27,12 @@ from tolcontact.report.text import analysis_text
 from tolcontact.simulation.cluster import client_of
 from tolcontact.workflow.models import DEFAULT_SOLVER, is_archive
 
-SHARED = {  # options of every analysis, with their defaults
-    "seed": (common.Seed, 1), "solver": (common.Solver, DEFAULT_SOLVER), "resolution": (common.Resolution, None),
-    "objective": (common.Objective, None), "as_json": (common.AsJson, False), "as_csv": (common.AsCsv, False),
-    "into": (common.Into, None), "workers": (common.Workers, None), "scheduler": (common.Scheduler, None),
-    "quiet": (common.Quiet, False),
+SHARED = {  # options of analyses, with their defaults, and the argument of an analysis that an option needs
+    "seed": (common.Seed, 1, "seed"), "solver": (common.Solver, DEFAULT_SOLVER, "solver"),
+    "resolution": (common.Resolution, None, "method"), "objective": (common.Objective, None, "method"),
+    "as_json": (common.AsJson, False, "model"), "as_csv": (common.AsCsv, False, "model"), "into": (common.Into, None, "into"),
+    "workers": (common.Workers, None, "client"), "scheduler": (common.Scheduler, None, "client"),
+    "quiet": (common.Quiet, False, "progress"),
 }  # fmt: skip
 CORNER = "X,Y,Z"
 REQUIRED = inspect.Parameter.empty
@@ -42,7 +44,7 @@ Frame = Callable[[xr.Dataset], Any]
 class AnalysisCommand:
     """A command that asks one analysis of a model.
 
-    samples    what the number of samples is, for the help text
+    samples    what the number of samples is, for the help text; empty for an analysis that simulates nothing
     frame      makes the data frame that --csv prints
     options    options of its own by parameter: their typer annotations, and defaults (REQUIRED: none)
     arguments  makes arguments of the analysis from these options, where they differ
@@ -60,14 +62,16 @@ class AnalysisCommand:
 
     def register(self) -> None:
         """Add the command to the application."""
-        default = inspect.signature(self.analysis).parameters["samples"].default
-        samples = Annotated[int if default is not None else int | None, typer.Option(help=self.samples)]  # type: ignore[valid-type]
         options = {
             "context": (typer.Context, REQUIRED),
             "model": (common.AnalysedModel, REQUIRED),
             **self.options,
-            "samples": (samples, default),
-            **SHARED,
+            **self._samples,
+            **{
+                name: (annotation, default)
+                for name, (annotation, default, needed) in SHARED.items()
+                if needed in self._parameters
+            },
         }
         command = functools.partial(self._run)
         command.__signature__ = inspect.Signature(  # type: ignore[attr-defined]
@@ -79,17 +83,33 @@ class AnalysisCommand:
         command.__annotations__ = {}  # type: ignore[attr-defined]
         common.app.command(self.name, help=self.purpose, epilog=common.examples(*self.examples))(command)
 
+    @property
+    def _parameters(self) -> Mapping[str, inspect.Parameter]:
+        return inspect.signature(self.analysis).parameters
+
+    @property
+    def _samples(self) -> dict[str, tuple[Any, Any]]:
+        """The option of the number of samples, if there is one."""
+        if not self.samples:
+            return {}
+        default = self._parameters["samples"].default
+        kind = int if default is not None else int | None
+        return {"samples": (Annotated[kind, typer.Option(help=self.samples)], default)}  # type: ignore[valid-type]
+
     def _run(
-        self, *, context: typer.Context, model: Path, resolution: str | None, objective: str | None, as_json: bool,
-        as_csv: bool, workers: int | None, scheduler: str | None, quiet: bool, **options: Any,
+        self, *, context: typer.Context, model: Path, as_json: bool, as_csv: bool, resolution: str | None = None,
+        objective: str | None = None, workers: int | None = None, scheduler: str | None = None, quiet: bool = True,
+        **options: Any,
     ) -> None:  # fmt: skip
         common.only_one(json=as_json, csv=as_csv)
         if is_archive(model):
-            options |= _settings_of_run(model, context)
+            options |= {name: value for name, value in _settings_of_run(model, context).items() if name in self._parameters}
         arguments = self.arguments(options)
         with shown_progress(model.stem, 1, quiet=quiet) as show, client_of(workers, scheduler) as client:
             method = common.chosen(resolution=resolution, objective=objective)
-            dataset = self.analysis(model, method=method, client=client, progress=show, **arguments)
+            shared = {"method": method, "client": client, "progress": show}
+            arguments |= {name: value for name, value in shared.items() if name in self._parameters}
+            dataset = self.analysis(model, **arguments)
         if as_json:
             print_data(dataset)
         elif as_csv:
@@ -258,6 +278,15 @@ COMMANDS = (
             ),
         },
         arguments=_with_corners,
+    ),
+    AnalysisCommand(
+        "seating",
+        "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
+        seating,
+        terms.SEATING,
+        "",
+        ("seating model.py", "seating model.py --csv > friction.csv"),
+        lambda dataset: dataset[["critical", "reserve"]].to_dataframe(),
     ),
 )
 for _command in COMMANDS:

@@ -24,6 +24,10 @@ COMMANDS = {
         "Print the tolerance ranges of least cost for what is required, and the ranges to tighten first.",
     ),
     "relocate": ("analyses", "Print the place of a locator, within a box, at which a measure varies least."),
+    "seating": (
+        "analyses",
+        "Print the least friction at which parts can be held short of their locators and seats, and what holds them.",
+    ),
     "summary": ("archives", "Print the statistics of an archive."),
     "report": (
         "archives",

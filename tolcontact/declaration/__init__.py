@@ -143,6 +143,8 @@ move are corrected together, each with six degrees of freedom, including parts t
 
 `force(name, at=point, vector=...)` declares a force in N, constant in the assembly frame. Only the objective "seating" uses
 forces (see `tolcontact.mechanics`): they press parts onto their supports and neighbours, and decide which supports carry load.
+`tc.seating` asks whether forces push a part home against friction at its other contacts. A coefficient of friction is stated
+for all contacts, `tc.Assembly("clamp", mu=0.15)`, or for a pair, `contact(..., mu=0.1)`. Contact is resolved without friction.
 
 >>> weight = clamp.force("weight", at=plate.point(30, 20, 4), vector=(0, 0, -100))
 >>> print(weight)
@@ -175,6 +177,8 @@ Measurements of faces are declared as objects. Their units follow from their kin
 | `tc.Gap(point, face)` | distance of a point of one part from a face of another, perpendicular to this face |
 | `tc.Flush(point, face)` | the same distance, of a point from a neighbouring outer face |
 | `tc.Clearance(face, face)` | least distance of two planes, of a ball or a shaft from walls beside it, of any faces or parts |
+| `tc.LargestGap(face, face)` | largest gap left between two faces, with their form: the widest leak |
+| `tc.MeanGap(face, face)` | mean of this gap by area |
 | `tc.AxisDistance(face, face)` | shortest distance of the axes of two holes or shafts, each as long as its face |
 | `tc.AxisDistance(..., across="z")` | their distance in the plane across a direction, through the middle of the first axis |
 | `tc.AxisDistance(..., along="x")` | component of the perpendicular from the middle of the first axis to the second one |
@@ -274,8 +278,10 @@ from tolcontact.declaration.measurement import (
     Difference,
     Flush,
     Gap,
+    LargestGap,
     Maximum,
     Mean,
+    MeanGap,
     Measurement,
     Minimum,
     Sum,
@@ -293,7 +299,8 @@ __all__ = [
     "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
     "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
-    "Largest", "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum", "Near",
+    "Largest", "LargestGap", "LineProfile", "Location", "Locator", "Maximum", "Mean", "MeanGap", "Measure", "Measurement",
+    "Mesh", "Minimum", "Near",
     "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
     "Roundness", "Size", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",

@@ -21,7 +21,15 @@ from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
-from tolcontact.declaration.values import direction, key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.declaration.values import (
+    direction,
+    friction_faults,
+    key_faults,
+    repetitions,
+    script_line,
+    text_faults,
+    vector as _vector,
+)
 from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
@@ -49,8 +57,8 @@ class Assembly(Pictured):
     """Parts, how they are located, which faces may touch, and what is measured. Lengths in mm, angles in rad.
 
     The methods only record declarations; `faults()` lists everything that is wrong with them. `method` states how contact in
-    this model is resolved; a run may state another one. `title_block` heads its reports. Raises TypeError for an argument of a
-    wrong type.
+    this model is resolved; a run may state another one. `title_block` heads its reports. `mu` is the coefficient of friction of
+    all contacts, of which `tc.seating` makes use. Raises TypeError for an argument of a wrong type.
     """
 
     parts = Declared[Part]()
@@ -62,12 +70,15 @@ class Assembly(Pictured):
     correlations = Declared[Correlation]()
     populations = Declared[Population]()
 
-    def __init__(self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None) -> None:
+    def __init__(
+        self, name: str, *, method: Method | None = None, title_block: TitleBlock | None = None, mu: float | None = None
+    ) -> None:  # fmt: skip
         _expect(f'assembly "{name}": method', method, Method | None, "tc.Method(...)")
         _expect(f'assembly "{name}": title_block', title_block, TitleBlock | None, "tc.TitleBlock(...)")
         self.name = name
         self.method = method
         self.title_block = title_block
+        self.mu = mu
         self._declared: dict[str, list[Any]] = {name: [] for name in MAX_COUNTS}
 
     def _add(self, name: str, thing: T) -> T:
@@ -77,7 +88,7 @@ class Assembly(Pictured):
 
     def replaced(self, **lists: Iterable[Any]) -> "Assembly":
         """Return a copy in which `lists` (parts=..., pairs=...) replace its lists. Raises TypeError for other names."""
-        copy = Assembly(self.name, method=self.method, title_block=self.title_block)
+        copy = Assembly(self.name, method=self.method, title_block=self.title_block, mu=self.mu)
         copy._declared |= {name: list(lists.pop(name, things)) for name, things in self._declared.items()}
         if lists:
             raise TypeError(f"an assembly has no list {', '.join(lists)}; its lists are: {', '.join(MAX_COUNTS)}")
@@ -89,14 +100,8 @@ class Assembly(Pictured):
         return tuple(feature for part in self.parts for feature in part.features)
 
     def part(
-        self,
-        name: str,
-        geometry: Geometry,
-        *,
-        at: Any = (0, 0, 0),
-        rotation: Any = (0, 0, 0),
-        fixed: bool | None = None,
-    ) -> Part:
+        self, name: str, geometry: Geometry, *, at: Any = (0, 0, 0), rotation: Any = (0, 0, 0), fixed: bool | None = None
+    ) -> Part:  # fmt: skip
         """Declare a part: its shape, its position `at` [mm] and rotation vector [rad] in the nominal assembly (see Part)."""
         _expect(f'part "{name}": geometry', geometry, Geometry, "tc.Box(x, y, z) or tc.Mesh(file)")
         _expect(f'part "{name}": fixed', fixed, bool | None, "True, False or None")
@@ -127,20 +132,14 @@ class Assembly(Pictured):
         return self._add("locations", Location(part, scheme, zone, on, script_line(), floating))
 
     def contact(
-        self,
-        name: str,
-        *,
-        moving: Face | Feature,
-        reference: Face | Feature,
-        points: int | str | None = None,
-        spacing: float | None = None,
-        within: float | None = None,
-    ) -> ContactPair:
+        self, name: str, *, moving: Face | Feature, reference: Face | Feature, points: int | str | None = None,
+        spacing: float | None = None, within: float | None = None, mu: float | None = None,
+    ) -> ContactPair:  # fmt: skip
         """Declare that points of the `moving` face stay outside the `reference` face (see ContactPair)."""
         for side, face in (("moving", moving), ("reference", reference)):
             _expect(f'contact "{name}": {side}', face, Face | Feature, 'part.face("+z"), or a feature')
         sides = face_of(moving), face_of(reference)
-        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line()))
+        return self._add("pairs", ContactPair(name, *sides, points, spacing, within, script_line(), mu))
 
     def fasten(
         self,
@@ -245,7 +244,7 @@ class Assembly(Pictured):
         if not self.parts:
             yield "it has no parts; declare at least one with assembly.part(name, geometry)"
         yield from self.omissions()
-        yield from text_faults("assembly", [self.name])
+        yield from (*text_faults("assembly", [self.name]), *friction_faults(self.mu))
         yield from (f"title block: {fault}" for fault in (self.title_block.faults() if self.title_block else ()))
         for name, most in MAX_COUNTS.items():
             if (count := len(self._declared[name])) > most:

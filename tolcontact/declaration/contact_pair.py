@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from tolcontact.declaration.part import Face
+from tolcontact.declaration.values import friction_faults
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
@@ -21,6 +22,8 @@ class ContactPair(Readable):
     spacing   [mm] largest distance of a spot of the face from a point, in place of a number of points
     within    [mm] a point takes part if the reference face is this near in the nominal assembly; by default a tenth of the
               diagonal of the moving part
+    mu        coefficient of friction, of which tc.seating and tc.check make use; contact is resolved without friction. By
+              default that of the assembly
     """
 
     name: str
@@ -30,6 +33,7 @@ class ContactPair(Readable):
     spacing: float | None = None
     within: float | None = None
     declared_at: str = ""
+    mu: float | None = None
 
     def faults(self) -> Iterator[str]:
         yield from self.moving.faults()
@@ -42,6 +46,7 @@ class ContactPair(Readable):
             length = getattr(self, option)
             if length is not None and not (isinstance(length, int | float) and math.isfinite(length) and length > 0):
                 yield f"{option} is {length!r}; expected a length in mm above 0"
+        yield from friction_faults(self.mu)
         if self.points is not None and self.spacing is not None:
             yield "both points and spacing are given; give one of them"
 

@@ -215,9 +215,9 @@ RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
     "locations": Record(Location, "part on tolerance scheme declared_at floating?", scheme=SCHEME, on=GROUND),
     "pairs": Record(
-        ContactPair, "moving reference name points spacing within declared_at",
+        ContactPair, "moving reference name points spacing within declared_at mu?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),
-        spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None),
+        spacing=Plain(POSITIVE | None), within=Plain(POSITIVE | None), mu=Plain(NOT_NEGATIVE | None, write=floats),
     ),
     "measures": Record(
         Measure, "name of to? along tolerance units declared_at absolute? limits?", of=Inline(
@@ -234,7 +234,7 @@ RECORDS = {
 DOCUMENT = msgspec.defstruct("Document", [
     ("name", str), ("parts", Items(RECORDS["parts"]).wire), ("measures", Items(RECORDS["measures"]).wire),
     ("schema", str | UnsetType, UNSET), ("method", METHOD.wire | None, None),
-    ("title_block", TITLE_BLOCK.wire | None, None),
+    ("title_block", TITLE_BLOCK.wire | None, None), ("mu", NOT_NEGATIVE | None, None),
     *((name, Items(record).wire, []) for name, record in RECORDS.items() if name not in ("parts", "measures")),
 ], forbid_unknown_fields=True, rename={"schema": "$schema"})  # fmt: skip
 
@@ -246,7 +246,8 @@ def to_document(
     writing = Writing(triangles, tapes, folder)
     lists = {name: [record.encode(thing, writing) for thing in getattr(assembly, name)] for name, record in RECORDS.items()}
     titles = {} if assembly.title_block is None else {"title_block": TITLE_BLOCK.encode(assembly.title_block, writing)}
-    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **lists}
+    friction = {} if assembly.mu is None else {"mu": float(assembly.mu)}
+    return {"name": assembly.name, "method": Optional(METHOD).encode(assembly.method, writing), **titles, **friction, **lists}
 
 
 def tolerance_of_entry(entry: Any) -> Size | GeometricTolerance:
@@ -297,7 +298,7 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     things["measures"] = Items(RECORDS["measures"]).decode(struct.measures, Place(sources)["measures"])
     method = Optional(METHOD).decode(struct.method, place["method"])
     title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
-    assembly = Assembly(struct.name, method=method, title_block=title_block).replaced(**things)
+    assembly = Assembly(struct.name, method=method, title_block=title_block, mu=struct.mu).replaced(**things)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly

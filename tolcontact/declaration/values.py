@@ -13,6 +13,7 @@ from typing import Any, overload
 from tolcontact.errors import CONTROL_CHARACTERS, shown
 
 MAX_NAME = 500  # characters
+MAX_FRICTION = 10  # more does not exist
 _KEY = re.compile(r"\w(?:[^/]*[^/\s])?")
 
 
@@ -114,6 +115,12 @@ def is_finite(value: Vector) -> bool:
 def is_length(value: Any) -> bool:
     """Return True for a finite number; a truth value is not a number."""
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def friction_faults(mu: Any) -> Iterator[str]:
+    """Yield the fault of a coefficient of friction; None states none."""
+    if mu is not None and not (is_length(mu) and 0 <= mu <= MAX_FRICTION):
+        yield f"mu is {mu!r}; expected a coefficient of friction from 0 to {MAX_FRICTION}, or None"
 
 
 def script_line() -> str:

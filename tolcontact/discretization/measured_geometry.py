@@ -148,6 +148,15 @@ class Heights(NominalMeasurement):
 
 
 @dataclass(frozen=True, eq=False)
+class FaceGap(NominalMeasurement):
+    """The largest or the mean height of stations all over a face, each over its wall; `weights` are shares of the area."""
+
+    stations: Sequence[tuple[Station, Wall]]
+    weights: np.ndarray
+    is_largest: bool
+
+
+@dataclass(frozen=True, eq=False)
 class Outline:
     """The rim of a plane face: its corners (corner, 3) [mm], and the edges (edge, 2) between them by number."""
 

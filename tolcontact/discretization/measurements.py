@@ -8,7 +8,19 @@ import scipy
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-from tolcontact.declaration import Angle, AxisDistance, Clearance, Combination, Face, Flush, Gap, Measurement
+from tolcontact.declaration import (
+    Angle,
+    AxisDistance,
+    Clearance,
+    Combination,
+    Face,
+    Flush,
+    Gap,
+    LargestGap,
+    MeanGap,
+    Measurement,
+)
+from tolcontact.discretization.face_gaps import face_gap
 from tolcontact.discretization.measured_geometry import (
     Axis,
     AxisPair,
@@ -124,7 +136,7 @@ def _clearance(clearance: Clearance, faces: MeasuredFaces) -> NominalMeasurement
         if face.deviation is not None and face.deviation.form is not None:
             raise GeometryFault(
                 f"the clearance of {face.face}, which has form, cannot be measured; measure the gaps of stations with tc.Gap, "
-                "or give its tolerance of form form=None"
+                "or what is left between the faces with tc.LargestGap, or give its tolerance of form form=None"
             )
     if is_flat(moving.surface) and is_flat(reference.surface):
         return _clearance_of_planes(moving, reference)
@@ -267,4 +279,6 @@ def _nearest_places(moving: np.ndarray, reference: np.ndarray) -> np.ndarray:
 Builder = Callable[[Any, MeasuredFaces], NominalMeasurement]
 BUILDERS: Mapping[type[Measurement], Builder] = {
     Gap: _gap, Flush: _gap, Clearance: _clearance, AxisDistance: _axis_distance, Angle: _angle,
+    LargestGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=True),
+    MeanGap: lambda gap, faces: face_gap(*faces.pair(gap), is_largest=False),
 }  # fmt: skip

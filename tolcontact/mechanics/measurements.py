@@ -11,6 +11,7 @@ from tolcontact.discretization.measured_geometry import (
     Combined,
     Crossing,
     DirectionPair,
+    FaceGap,
     Heights,
     MeasuredFace,
     MeshClearance,
@@ -57,6 +58,12 @@ def value_of(measurement: NominalMeasurement, observed: Observed) -> ca.SX:
 def _least_height(heights: Heights, observed: Observed) -> ca.SX:
     over_walls = [_height(station, wall, observed) for station, wall in heights.stations]
     return least([*over_walls, *(_edge_height(crossing, observed) for crossing in heights.crossings)])
+
+
+def _face_gap(gap: FaceGap, observed: Observed) -> ca.SX:
+    """Return the largest gap of all stations, or their mean by area [mm]."""
+    heights = ca.vertcat(*(_height(station, wall, observed) for station, wall in gap.stations))
+    return ca.mmax(heights) if gap.is_largest else ca.dot(ca.DM(gap.weights), heights)
 
 
 def _plane_clearance(clearance: PlaneClearance, observed: Observed) -> ca.SX:
@@ -158,8 +165,8 @@ def _combined(combined: Combined, observed: Observed) -> ca.SX:
 
 
 EXPRESSIONS: Mapping[type[NominalMeasurement], Callable[[Any, Observed], ca.SX]] = {
-    Heights: _least_height, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance, MeshClearance: _mesh_clearance,
-    AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
+    Heights: _least_height, FaceGap: _face_gap, PlaneClearance: _plane_clearance, RoundClearance: _round_clearance,
+    MeshClearance: _mesh_clearance, AxisPair: _axis_distance, DirectionPair: _angle, Combined: _combined,
 }  # fmt: skip
 COMBINATIONS: Mapping[str, Callable[[ca.SX], ca.SX]] = {
     "minimum": ca.mmin, "maximum": ca.mmax, "mean": lambda values: ca.sum1(values) / values.numel(), "sum": ca.sum1,

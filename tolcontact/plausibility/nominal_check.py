@@ -11,6 +11,7 @@ from tolcontact.plausibility.magnitudes import rotations, wide_tolerances
 from tolcontact.plausibility.measure_limits import measure_limits
 from tolcontact.plausibility.measured_reach import measured_reach
 from tolcontact.plausibility.pair_gaps import pair_clearances, pair_overlaps
+from tolcontact.plausibility.seats import unsure_seats
 from tolcontact.plausibility.trial_draws import TrialDraws
 
 KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
@@ -22,6 +23,7 @@ KINDS: dict[str, tuple[Callable[[TrialDraws], Iterator[str]], ...]] = {
     "gap": (pair_clearances,),
     "limits": (measure_limits,),
     "reach": (measured_reach,),
+    "friction": (unsure_seats,),
 }
 
 

@@ -20,12 +20,12 @@ variation simulation of stand: 1000 realizations
 
 `write_page` (the command `tolcontact report`) writes one page for a browser, from an archive alone. The page is a single file
 that needs no network and runs no scripts but its own; commands replace other files than pages only with `--overwrite`. It shows
-the assembly in 3D, with fields, single realizations and sections; histograms with limits, and the convergence of estimates;
-measurements against contributors; contact, certificates, and the settings of the run. `write_view` (`tolcontact view`) writes
-the assembly before a run: faces with their selectors, features with their tolerances, locators, contact points, nominal gaps.
-A feature or a pattern that you choose in the list is highlighted on all of its faces, and a face that you click on names its
-features. The model may still lack measures and locations of parts. In a notebook, a declared assembly or a program shows this
-page, a summary shows its tables, and `results.tolcontact` shows the report.
+the assembly in 3D, with fields, sections, and single realizations with their form and the gaps that it leaves; histograms with
+limits, and the convergence of estimates; measurements against contributors; contact, certificates, and the settings of the run.
+`write_view` (`tolcontact view`) writes the assembly before a run: faces with their selectors, features with their tolerances,
+locators, contact points, nominal gaps. A feature or a pattern that you choose in the list is highlighted on all of its faces,
+and a face that you click on names its features. The model may still lack measures and locations of parts. In a notebook, a
+declared assembly or a program shows this page, a summary shows its tables, and `results.tolcontact` shows the report.
 `write_comparison` (`tolcontact compare A.nc B.nc --report`) writes a comparison of runs.
 
 How to read the text:

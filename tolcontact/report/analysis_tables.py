@@ -16,6 +16,7 @@ from tolcontact.report.figures import grouped, number, percent, share
 SMALL_SHARE = 0.005  # groups with smaller total shares, in both states, are counted only
 SMALL_SLOPE = 1e-3  # of the largest derivative of a measure: smaller ones are counted only
 AT_END = 1.001  # times the smallest factor of a tolerance: below, it is as small as allowed
+MAX_HOLDERS = 3  # of a part, in a table
 FEW_SEARCHES = 0.25  # of all: if no more end at a value, a remark states that there may be worse ones
 
 
@@ -300,6 +301,31 @@ def _relocation(dataset: xr.Dataset) -> AnalysisReport:
     return AnalysisReport("Place of a locator", f"{grouped(dataset.sizes['trial'])} places tried", notes, [table])
 
 
+def _seating(dataset: xr.Dataset) -> AnalysisReport:
+    notes = [
+        "Least coefficient of friction, the same at all other contacts, that can hold a part short of a",
+        "seat: 0 if they hold it without friction, inf if they cannot with any; and the contacts that",
+        "then hold it, with their shares of the normal forces.",
+        f"Parts stand {dataset.attrs['place']}.",
+    ]
+    if dataset.attrs["open_pairs"]:
+        notes.append(f"They do not touch there, so they hold nothing: {dataset.attrs['open_pairs']}.")
+    rows = [_seat(dataset.isel(seat=k)) for k in range(dataset.sizes["seat"])]
+    columns = ["", "critical", "over stated", "held by"]
+    return AnalysisReport("Seating", f"{len(rows)} seats", notes, [AnalysisTable("", columns, rows)])
+
+
+def _seat(dataset: xr.Dataset) -> list[str]:
+    """Return the row of a seat: the contacts that hold most come first."""
+    critical, reserve, shares = (dataset[name].values for name in ("critical", "reserve", "share"))
+    holders = [k for k in np.argsort(-shares, kind="stable") if shares[k] >= SMALL_SHARE and critical > 0]
+    names = [f"{dataset['holder'].values[k]} {100 * shares[k]:.0f} %" for k in holders[:MAX_HOLDERS]]
+    names += [f"and {len(holders) - MAX_HOLDERS} more"] if len(holders) > MAX_HOLDERS else []
+    warning = ", may stop short" if 0 < critical and reserve <= 1 else ""
+    over = "-" if np.isnan(reserve) else f"{float(reserve):.3g}{warning}"
+    return [str(dataset["seat"].values), f"{float(critical):.4g}", over, ", ".join(names)]
+
+
 _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.CONTRIBUTIONS.name: _contributions,
     terms.SENSITIVITIES.name: _sensitivities,
@@ -307,4 +333,5 @@ _REPORTS: dict[str, Callable[[xr.Dataset], AnalysisReport]] = {
     terms.TAILS.name: _tails,
     terms.ALLOCATION.name: _allocation,
     terms.RELOCATION.name: _relocation,
+    terms.SEATING.name: _seating,
 }

@@ -23,6 +23,7 @@ CONTACT, CONTACT_STATES = "contact", ("untouched", "touched")
 END, ENDS, SENSES = "end", ("least", "largest"), (-1, 1)
 CASE = "case"  # a corrected worst case as a realization, with the variables that archives have of realizations
 EVENT, REQUIREMENT, TRIAL = "event", "requirement", "trial"
+SEAT, HOLDER = "seat", "holder"  # contacts: one that a part may not reach, and those that may hold it short of that
 STAGE, STAGES = "stage", ("before", "after")
 OF_EFFECT, EFFECTS = "of_effect", ("6 sigma", OUTSIDE)
 FIXED_LABELS = {
@@ -161,4 +162,16 @@ RELOCATION = AnalysisRecord(
         ArchiveVariable("tried_value", (TRIAL,), "f8", "what is to be least, at the places tried"),
     ),
 )
-ANALYSES = {record.name: record for record in (CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION)}
+SEATING = AnalysisRecord(
+    "seating",
+    "friction at the seats of {assembly}",
+    (
+        ArchiveVariable(
+            "critical", (SEAT,), "f8", "least coefficient of friction that can hold the part short of the seat", "1"
+        ),
+        ArchiveVariable("reserve", (SEAT,), "f8", "least factor of the stated coefficients that can", "1"),
+        ArchiveVariable("share", (SEAT, HOLDER), "f8", "share of the normal forces that then hold the part", "1"),
+    ),
+)
+_RECORDS = CONTRIBUTIONS, SENSITIVITIES, WORST_CASE, TAILS, ALLOCATION, RELOCATION, SEATING
+ANALYSES = {record.name: record for record in _RECORDS}

@@ -1,7 +1,7 @@
 "use strict";
 // The report: fields and single realizations in the scene, and charts with plotly.
 
-const OF_CONTACT = ["touching", "reaction"];
+const OF_CONTACT = ["touching", "reaction", "gapsLeft"];
 const MOST_PORTRAITS = 40;
 
 function drive(viewer) {
@@ -14,7 +14,8 @@ function drive(viewer) {
   function painted() {
     const name = byId("field").value, isOfContact = OF_CONTACT.includes(name);
     const bodies = viewer.paint(isOfContact ? "" : name, Number(byId("component").value), state());
-    const points = viewer.paintContacts(isOfContact ? name : ""), range = isOfContact ? points : bodies;
+    const single = byId("single").checked ? Number(byId("which").value) - one.worstCases : -1;
+    const points = viewer.paintContacts(isOfContact ? name : "", single, Math.min(state(), CORRECTED)), range = isOfContact ? points : bodies;
     byId("bar").hidden = !range;
     if (!range) return;
     byId("low").textContent = figure(range.low);
@@ -26,6 +27,7 @@ function drive(viewer) {
   function moved() {
     if (!byId("single").checked) {
       byId("said").textContent = "";
+      viewer.bend(-1);
       return viewer.move(null);
     }
     const k = Number(byId("which").value), seen = Math.min(state(), CORRECTED), pairs = gaps.shape[2];
@@ -38,21 +40,26 @@ function drive(viewer) {
     byId("said").textContent = [
       one.names[k], `status: ${one.status[k]}, residual ${figure(residual[k])} mm`, deepest, ...values,
     ].join("\n");
+    viewer.bend(k - one.worstCases, Number(byId("factor").value));
     return viewer.move(motions, k, seen, Number(byId("factor").value), own.map((gap) => gap < -1e-6));
   }
 
   const both = () => { painted(); moved(); };
   document.querySelectorAll("input[name=state]").forEach((input) => input.addEventListener("change", both));
-  ["field", "component"].forEach((id) => byId(id).addEventListener("change", painted));
-  ["single", "factor"].forEach((id) => byId(id).addEventListener("change", moved));
-  byId("which").addEventListener("input", () => { byId("single").checked = true; moved(); });
+  byId("field").addEventListener("change", () => {
+    if (byId("field").value === "gapsLeft" && one.names.length) byId("single").checked = true;
+    both();
+  });
+  byId("component").addEventListener("change", painted);
+  ["single", "factor"].forEach((id) => byId(id).addEventListener("change", both));
+  byId("which").addEventListener("input", () => { byId("single").checked = true; both(); });
   let playing = null;
   byId("play").addEventListener("click", () => {
     const stop = playing !== null;
     if (stop) playing = clearInterval(playing) ?? null;
     else {
       byId("single").checked = true;
-      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.names.length; moved(); }, 300);
+      playing = setInterval(() => { byId("which").value = (Number(byId("which").value) + 1) % one.names.length; both(); }, 300);
     }
     byId("play").textContent = stop ? "play" : "stop";
     byId("play").setAttribute("aria-pressed", String(!stop));

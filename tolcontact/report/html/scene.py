@@ -15,6 +15,7 @@ from tolcontact.report.analysis_tables import archived_analysis
 from tolcontact.report.annotations import Marks, fixed_points, marks_of, marks_of_nominal
 from tolcontact.report.html.decimation import coarser, triangle_budgets
 from tolcontact.report.html.feature_list import feature_lists
+from tolcontact.report.html.form_scene import MAX_GAPS, SingleStates
 from tolcontact.report.html.single_realizations import SingleRealization, single_realizations
 from tolcontact.statistics import touching
 
@@ -33,8 +34,12 @@ Scene = dict[str, Any]
 def scene_of(results: xr.DataTree, summary: xr.Dataset) -> Scene:
     """Return the scene of an archive in the nominal assembly frame [mm], without what the archive does not have."""
     singles = single_realizations(results)
-    scene = {"parts": _parts(results), **packed_marks(marks_of(results)), "realizations": _realizations(results, singles)}
+    states = SingleStates(results, np.array([single.row for single in singles], dtype=int))
+    scene = {
+        "parts": _parts(results, states), **packed_marks(marks_of(results)), "realizations": _realizations(results, singles),
+    }  # fmt: skip
     _add_contact(scene["contacts"], results, summary)
+    _add_gaps(scene["contacts"], states, len(singles))
     return {**scene, "reactionUnits": summary["reaction"].attrs["units"]}
 
 
@@ -47,6 +52,15 @@ def _add_contact(pairs: list[Scene], results: xr.DataTree, summary: xr.Dataset) 
             pair["touching"] = packed(contact["touching"].sel(interval="estimate").values[is_of_pair])
         mean = float(summary["reaction"].sel(pair=pair["name"], of_reaction="mean", interval="estimate"))
         pair["reaction"] = mean if np.isfinite(mean) else None
+
+
+def _add_gaps(pairs: list[Scene], states: SingleStates, count: int) -> None:
+    """Add triangles between the contact points of each pair of planes, and the gaps left there in single realizations."""
+    points = sum(pair["points"]["shape"][0] for pair in pairs)
+    for number, pair in enumerate(pairs):
+        pair["triangles"] = packed(states.triangles(number), "i4")
+        gaps = states.gaps(number) if count * len(terms.STATES) * points <= MAX_GAPS else None
+        pair["gapsLeft"] = None if gaps is None else packed(gaps)
 
 
 def packed_marks(marks: Marks) -> Scene:
@@ -63,17 +77,22 @@ def packed_marks(marks: Marks) -> Scene:
     }
 
 
-def _parts(results: xr.DataTree) -> list[Scene]:
+def _parts(results: xr.DataTree, states: SingleStates) -> list[Scene]:
     names = [str(name) for name in results.to_dataset()[terms.PART].values]
     fields = [results["field"].children[terms.group_of(name)].to_dataset() for name in names]
     counts = triangle_budgets([field.sizes[terms.FACE] for field in fields])
-    return [_part(name, field, count) for name, field, count in zip(names, fields, counts, strict=True)]
+    return [_part(name, field, count, states) for name, field, count in zip(names, fields, counts, strict=True)]
 
 
-def _part(name: str, field: xr.Dataset, count: int) -> Scene:
+def _part(name: str, field: xr.Dataset, count: int, states: SingleStates) -> Scene:
     triangles = field[terms.FIELD_FACES.name].values
     vertices, faces, nearest = coarser(field[terms.FIELD_VERTICES.name].values, triangles, count)
     entries: Scene = {"name": name, "vertices": packed(vertices), "faces": packed(faces, "i4"), "triangles": len(triangles)}
+    entries["forms"] = [
+        {"vertices": packed(form.vertices, "i4"), "normal": form.normal.tolist(), "modes": packed(form.modes),
+         "coefficients": packed(form.coefficients)}
+        for form in states.forms(name, vertices, faces)
+    ]  # fmt: skip
     for key, variable in (("mean", terms.FIELD_MEAN), ("sixSigma", terms.FIELD_SIX_SIGMA)):
         values = field[variable.name].values[:, nearest]
         if np.isfinite(values[..., :3]).all():
@@ -96,6 +115,7 @@ def _realizations(results: xr.DataTree, singles: list[SingleRealization]) -> Sce
         return values if worst is None else np.concatenate([worst[variable.name].values, values])
 
     entries: Scene = {
+        "worstCases": len(names),
         "names": names + [f"realization {single.row} ({single.reason})" for single in singles],
         "status": [terms.STATUS_MEANINGS[status] for status in values_of(terms.STATUS)],
         "residual": packed(values_of(terms.KKT_RESIDUAL)),

@@ -74,7 +74,10 @@ class Viewer {
     this.scene.add(group);
     const fields = {};
     for (const name of ["mean", "sixSigma"]) if (part[name]) fields[name] = unpacked(part[name]);
-    return { name: part.name, group, mesh, materials: [material, ink], faces: faces.values, fields, own: part.faulty ? FAULTY : GREYS[number % GREYS.length] };
+    const forms = (part.forms || []).map((form) => ({ normal: form.normal, vertices: unpacked(form.vertices).values,
+      modes: unpacked(form.modes), coefficients: unpacked(form.coefficients) }));
+    return { name: part.name, group, mesh, materials: [material, ink], faces: faces.values, fields, forms, flat: vertices.values,
+      own: part.faulty ? FAULTY : GREYS[number % GREYS.length] };
   }
 
   arrows(things, colour, share) {
@@ -102,10 +105,24 @@ class Viewer {
       const points = new THREE.Points(geometry, material);
       points.matrixAutoUpdate = false;
       group.add(points);
-      return { name: pair.name, part: pair.part, points, material };
+      return { name: pair.name, part: pair.part, points, material, map: this.map(pair, geometry, group) };
     });
     this.scene.add(group);
     return group;
+  }
+
+  /** The area between the contact points of two planes, coloured as these are; null for other pairs. */
+  map(pair, points, group) {
+    if (!pair.triangles || !pair.triangles.shape[0]) return null;
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", points.getAttribute("position"));
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(unpacked(pair.triangles).values), 1));
+    const material = new THREE.MeshBasicMaterial({ vertexColors: true, side: THREE.DoubleSide, depthTest: false, transparent: true });
+    const mesh = new THREE.Mesh(geometry, material);
+    mesh.matrixAutoUpdate = mesh.visible = false;
+    mesh.renderOrder = -1;
+    group.add(mesh);
+    return mesh;
   }
 
   /** The axes of the assembly, beside it. */
@@ -249,18 +266,21 @@ class Viewer {
     return known.length && high >= low ? { low, high, map } : null;
   }
 
-  /** Colour contact points by what is known of them, and return its range; without it in their own colour. */
-  paintContacts(name) {
-    const known = name ? this.data.contacts.map((pair) => this.ofPoints(pair, name)) : [];
+  /** Colour contact points, and the areas between them, by what is known of them, and return its range; without it in their own colour. */
+  paintContacts(name, single, state) {
+    const known = name ? this.data.contacts.map((pair) => this.ofPoints(pair, name, single, state)) : [];
     const every = known.flatMap((values) => Array.from(values || [])).filter(Number.isFinite);
-    const high = name === "touching" ? 1 : Math.max(0, ...every), colour = new THREE.Color();
+    const high = every.reduce((most, value) => Math.max(most, value), 0), colour = new THREE.Color();
     this.pairs.forEach((pair, k) => {
       const geometry = pair.points.geometry, own = every.length && known[k];
       if (own) {
         const grey = colour.set("#7f8894").toArray(), table = TABLES.get(VIRIDIS);
-        const colours = Array.from(own).flatMap((value) => (Number.isFinite(value) ? table[Math.round((255 * value) / (high || 1))] : grey));
+        const place = (value) => Math.round((255 * Math.max(value, 0)) / (high || 1));
+        const colours = Array.from(own).flatMap((value) => (Number.isFinite(value) ? table[place(value)] : grey));
         geometry.setAttribute("color", new THREE.BufferAttribute(Float32Array.from(colours), 3));
+        if (pair.map) pair.map.geometry.setAttribute("color", geometry.getAttribute("color"));
       }
+      if (pair.map) pair.map.visible = Boolean(own);
       Object.assign(pair.material, { vertexColors: Boolean(own), size: own ? 7 : 4, needsUpdate: true });
       pair.material.color.set(own ? "#ffffff" : TOUCHED);
     });
@@ -269,9 +289,33 @@ class Viewer {
   }
 
   /** A value for each contact point of a pair; null if the archive does not tell. */
-  ofPoints(pair, name) {
+  ofPoints(pair, name, single, state) {
+    if (name === "gapsLeft") {
+      if (!pair.gapsLeft || single < 0) return null;
+      const gaps = unpacked(pair.gapsLeft), count = gaps.shape[2], start = (2 * single + state) * count;
+      return gaps.values.subarray(start, start + count);
+    }
     if (name === "touching") return pair.touching ? unpacked(pair.touching).values : null;
     return Number.isFinite(pair.reaction) ? new Float32Array(pair.points.shape[0]).fill(pair.reaction) : null;
+  }
+
+  /** Give faces their form in one realization, exaggerated by a factor; flat for a negative number. */
+  bend(number, factor) {
+    for (const part of this.parts.filter((own) => own.forms.length)) {
+      const bent = part.flat.slice();
+      for (const form of number < 0 ? [] : part.forms) {
+        const count = form.modes.shape[1];
+        form.vertices.forEach((vertex, k) => {
+          let height = 0;
+          for (let m = 0; m < count; m++) height += form.modes.values[k * count + m] * form.coefficients.values[number * count + m];
+          for (let axis = 0; axis < 3; axis++) bent[3 * vertex + axis] += factor * height * form.normal[axis];
+        });
+      }
+      const position = part.mesh.geometry.getAttribute("position");
+      part.faces.forEach((vertex, corner) => position.setXYZ(corner, bent[3 * vertex], bent[3 * vertex + 1], bent[3 * vertex + 2]));
+      position.needsUpdate = true;
+      part.mesh.geometry.computeVertexNormals();
+    }
   }
 
   /** Move the parts as in one realization, exaggerated by a factor; back to nominal without one. */
@@ -283,6 +327,10 @@ class Viewer {
     this.pairs.forEach((pair, k) => {
       pair.points.matrix.copy(this.parts[pair.part].group.matrix);
       pair.points.matrixWorldNeedsUpdate = true;
+      if (pair.map) {
+        pair.map.matrix.copy(pair.points.matrix);
+        pair.map.matrixWorldNeedsUpdate = true;
+      }
       if (!pair.material.vertexColors) pair.material.color.set(penetrating && penetrating[k] ? RED : TOUCHED);
     });
     this.draw();

@@ -1,0 +1,153 @@
+"""The least friction at which a part can be held short of a seat: of a locator, or of a face that it touches."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import sparse
+from scipy.sparse import csgraph
+
+from tolcontact.arrays import Array, Float
+from tolcontact.statics.force_cones import MIN_HELD, ForceCones
+from tolcontact.statics.touching import Contact, Touching, across, wrenches
+
+USUAL_FRICTION = 0.5
+MIN_LOAD = 1e-9  # of the sum of all forces: a smaller load is rounding
+MAX_UNBALANCED = 1e-7  # of the sum of all forces: a smaller component of the load that no contact can balance is rounding
+MIN_GUIDE = 1e-9  # of the largest singular value of the guides: a smaller one is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A contact, and how its part can be held short of it.
+
+    critical   the least coefficient of friction, the same at all other contacts, at which these can balance the forces: 0 if
+               they can without friction, infinite if they cannot with any
+    reserve    the least factor of the stated coefficients at which the other contacts can; NaN if not all are stated
+    shares     (contact,): share of the sum of all normal forces at the critical coefficient
+    """
+
+    contact: Contact
+    critical: float
+    reserve: float
+    shares: Float[Array, " contact"]
+
+
+class Balance:
+    """The balance of forces of all parts that contacts connect with each other.
+
+    parts, contacts   their numbers
+    """
+
+    def __init__(self, touching: Touching, parts: Sequence[int], contacts: Sequence[int]) -> None:
+        self.parts, self.contacts, self._touching = list(parts), list(contacts), touching
+        points = np.vstack([touching.contacts[number].points for number in contacts])
+        self._centre, self._length = points.mean(axis=0), float(np.linalg.norm(np.ptp(points, axis=0))) or 1.0
+        forces, moments = np.split(touching.loads[self.parts], 2, axis=1)
+        moments = (moments - np.cross(self._centre, forces)) / self._length
+        self._load = np.hstack([forces, moments]).ravel() / (touching.force or 1.0)
+
+    @property
+    def is_pressed(self) -> bool:
+        """Whether forces act on the parts."""
+        return bool(np.abs(self._load).max() > MIN_LOAD)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether all contacts together hold the parts, without more friction than usual."""
+        cones = self._cones(self.contacts, self._equal(self.contacts))
+        return not self._is_loaded(cones) or cones.held(USUAL_FRICTION) > MIN_HELD
+
+    def seats(self) -> Iterator[Seat]:
+        """Yield all contacts as seats."""
+        for number in self.contacts:
+            holders = [holder for holder in self.contacts if holder != number]
+            critical, shares = self._critical(holders, self._equal(holders))
+            yield Seat(self._touching.contacts[number], critical, self._reserve(holders, critical), shares)
+
+    def _reserve(self, numbers: Sequence[int], critical: float) -> float:
+        """Return the least factor of the coefficients that contacts (k,) state; NaN if one of them states none."""
+        stated = [self._touching.contacts[number].mu for number in numbers if not self._touching.contacts[number].is_guide]
+        if None in stated:
+            return np.nan
+        if len(values := {mu for mu in stated if mu}) == 1:
+            return critical / float(values.pop())
+        return self._critical(numbers, np.array([self._touching.contacts[number].mu or 0.0 for number in numbers]))[0]
+
+    def _equal(self, numbers: Sequence[int]) -> np.ndarray:
+        """Return 1 for each contact (k,), but 0 where friction is stated to be 0."""
+        return np.array([0.0 if self._touching.contacts[number].mu == 0 else 1.0 for number in numbers])
+
+    def _critical(self, numbers: Sequence[int], roughness: np.ndarray) -> tuple[float, np.ndarray]:
+        """Return the critical factor of the roughness (k,) of contacts, and the shares of all contacts (contact,)."""
+        shares = np.zeros(len(self._touching.contacts))
+        cones = self._cones(numbers, roughness)
+        if not self._is_loaded(cones):
+            return 0.0, shares
+        factor, of_points = cones.critical_factor()
+        np.add.at(shares, self._owners(numbers), of_points / (of_points.sum() or 1.0))
+        return factor, shares
+
+    @staticmethod
+    def _is_loaded(cones: ForceCones) -> bool:
+        return bool(np.linalg.norm(cones.load) > MIN_LOAD)
+
+    def _owners(self, numbers: Sequence[int]) -> np.ndarray:
+        """Return the contact of each point (point,) that has friction or may lift off."""
+        contacts = self._touching.contacts
+        return np.repeat(numbers, [0 if contacts[k].is_guide else len(contacts[k].points) for k in numbers]).astype(int)
+
+    def _cones(self, numbers: Sequence[int], roughness: np.ndarray) -> ForceCones:
+        """Return the force cones of contacts with a roughness (k,) in the directions that guides leave open."""
+        contacts = [self._touching.contacts[number] for number in numbers]
+        guides = [self._wrenches(contact, contact.normals) for contact in contacts if contact.is_guide]
+        lifting = [contact for contact in contacts if not contact.is_guide]
+        forces = [(contact.normals, *across(contact.normals)) for contact in lifting]
+        columns = [
+            [self._wrenches(contact, vectors[k]) for contact, vectors in zip(lifting, forces, strict=True)] for k in range(3)
+        ]
+        nothing = np.zeros((len(self._load), 0))
+        normals, *tangents = (np.hstack([nothing, *column]) for column in columns)
+        U, sizes, _ = np.linalg.svd(np.hstack([nothing, *guides]))
+        Z = U[:, int((sizes > MIN_GUIDE * sizes.max(initial=0.0)).sum()) :]
+        of_points = np.repeat(roughness, [0 if contact.is_guide else len(contact.points) for contact in contacts])
+        return _spanned(
+            ForceCones(Z.T @ normals, np.array([Z.T @ tangent for tangent in tangents]), Z.T @ self._load, of_points)
+        )
+
+    def _wrenches(self, contact: Contact, forces: np.ndarray) -> np.ndarray:
+        """Return the wrenches (row, point) that unit forces (point, 3) on the moving part mean for all parts."""
+        wrench = wrenches(contact.points - self._centre, forces).T
+        wrench[3:] /= self._length
+        rows = np.zeros((len(self.parts), 6, len(forces)))
+        for part, sign in ((contact.moving, 1), (contact.reference, -1)):
+            if part in self.parts:
+                rows[self.parts.index(part)] += sign * wrench
+        return rows.reshape(-1, len(forces))
+
+
+def _spanned(cones: ForceCones) -> ForceCones:
+    """Return force cones in the directions that their forces span, if the load has next to no other component.
+
+    So rounding of a load about the line through two contacts, which no force there can balance, does not matter.
+    """
+    U, sizes, _ = np.linalg.svd(np.hstack([cones.normals, *cones.tangents * cones.roughness]), full_matrices=False)
+    span = U[:, sizes > MIN_GUIDE * sizes.max(initial=0.0)].T
+    if not len(span) or np.linalg.norm(cones.load - span.T @ (span @ cones.load)) > MAX_UNBALANCED:
+        return cones
+    return ForceCones(span @ cones.normals, span @ cones.tangents, span @ cones.load, cones.roughness)
+
+
+def balances(touching: Touching) -> Iterator[Balance]:
+    """Yield the balances of all parts that are located."""
+    located = np.flatnonzero(touching.is_located)
+    ends = np.array([(contact.moving, contact.reference) for contact in touching.contacts]).reshape(-1, 2)
+    inner = ends[np.isin(ends, located).all(axis=1)]
+    count = len(touching.is_located)
+    links = sparse.coo_matrix((np.ones(len(inner)), inner.T), shape=(count, count))
+    _, labels = csgraph.connected_components(links, directed=False)
+    for label in dict.fromkeys(labels[located]):
+        parts = [int(part) for part in located if labels[part] == label]
+        contacts = np.flatnonzero(np.isin(ends, parts).any(axis=1))
+        if contacts.size:
+            yield Balance(touching, parts, [int(contact) for contact in contacts])

@@ -1,0 +1,143 @@
+"""The contacts of an assembly at some poses of its parts: locators, and the places where the faces of a pair touch."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import ConvexHull, QhullError
+
+from tolcontact import poses as pose
+from tolcontact.arrays import Array, Bool, Float
+from tolcontact.discretization import ContactPoints, Nominal
+
+TOUCH_SHARE = 1e-6  # of a face's size: faces nearer than that touch
+FLATNESS = 1e-9  # of the extent of points, that lie in a plane or on a line up to that
+GROUND = -1
+
+
+class Contact(NamedTuple):
+    """A locator, or a contact pair that touches.
+
+    moving, reference   numbers of the parts; GROUND for the ground
+    points, normals     (point, 3) [mm] and (point, 3): where it holds the moving part, and unit vectors into that part
+    is_guide            whether it holds both ways, without friction
+    mu                  stated coefficient of friction; None if none is stated
+    """
+
+    label: str
+    moving: int
+    reference: int
+    points: Float[Array, "point 3"]
+    normals: Float[Array, "point 3"]
+    is_guide: bool
+    mu: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """The contacts of an assembly, and its pairs that do not touch.
+
+    loads        (part, 6): the sum of the forces on each part [N], and of their moments about the origin [N mm]
+    force        the sum of the sizes of all forces [N]
+    is_located   (part,): whether a part is located; others stand still
+    """
+
+    contacts: tuple[Contact, ...]
+    open_pairs: tuple[str, ...]
+    loads: Float[Array, "part 6"]
+    force: float
+    is_located: Bool[Array, " part"]
+
+
+class Places(NamedTuple):
+    """Places (place, 3) [mm] at which a pair touches, and unit vectors (place, 3) there, into the moving part."""
+
+    points: Float[Array, "place 3"]
+    normals: Float[Array, "place 3"]
+
+
+def wrenches(points: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Return forces (n, 3) with their moments about the origin, (n, 6), at points (n, 3)."""
+    return np.hstack([forces, np.cross(points, forces)])
+
+
+def across(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return two unit vectors (n, 3) each across unit vectors (n, 3) and each other."""
+    u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
+    u /= np.linalg.norm(u, axis=1)[:, None]
+    return u, np.cross(normals, u)
+
+
+def drawn_contacts(nominal: Nominal) -> Touching:
+    """Return the contacts of the assembly as drawn, and the loads of its parts."""
+    pairs = [pair for pair in nominal.pairs if not pair.is_supports]
+    return contacts_at(nominal, np.tile(pose.AT_REST, (len(nominal.parts), 1)), [_drawn_places(pair) for pair in pairs])
+
+
+def contacts_at(nominal: Nominal, poses: np.ndarray, places: Sequence[Places]) -> Touching:
+    """Return the contacts at poses (part, 12) where each declared pair touches at some places, and the loads of the parts."""
+    declared = nominal.assembly.pairs
+    loads = np.zeros((len(nominal.parts), 6))
+    for force in nominal.assembly.forces:
+        part = nominal.part_index(force.at.part)
+        at = pose.apply(poses[part], nominal.position(force.at)[None])
+        loads[part] += wrenches(at, np.array([force.vector]))[0]
+    return Touching(
+        (*_locator_contacts(nominal, poses), *_pair_contacts(nominal, places)),
+        tuple(pair.name for pair, touched in zip(declared, places, strict=True) if not len(touched.points)),
+        loads,
+        float(sum(np.linalg.norm(force.vector) for force in nominal.assembly.forces)),
+        np.array([nominal.assembly.location_of(part.part) is not None for part in nominal.parts]),
+    )
+
+
+def _locator_contacts(nominal: Nominal, poses: np.ndarray) -> Iterator[Contact]:
+    """Yield the locators of all parts."""
+    for number, part in enumerate(nominal.parts):
+        locators, parent = part.locators, GROUND if part.parent is None else part.parent
+        points = pose.apply(poses[number], locators.points)
+        directions = locators.directions if parent == GROUND else locators.directions @ pose.rotation(poses[parent]).T
+        for label, point, direction, one_sided in zip(locators.labels, points, directions, locators.one_sided, strict=True):
+            yield Contact(label, number, parent, point[None], direction[None], not one_sided, nominal.assembly.mu)
+
+
+def _pair_contacts(nominal: Nominal, places: Sequence[Places]) -> Iterator[Contact]:
+    """Yield the pairs that touch; points that cannot carry more than others do are left out."""
+    for declared, (points, normals) in zip(nominal.assembly.pairs, places, strict=True):
+        moving, reference = (nominal.part_index(face.part) for face in (declared.moving, declared.reference))
+        corners, mu = carrying(points, normals), nominal.assembly.mu if declared.mu is None else declared.mu
+        if len(corners):
+            yield Contact(declared.name, moving, reference, points[corners], normals[corners], False, mu)
+
+
+def _drawn_places(pair: ContactPoints) -> Places:
+    """Return where a pair touches as drawn."""
+    assert pair.moving_face is not None and pair.reference_face is not None
+    size = max(pair.moving_face.mesh.scale, pair.reference_face.mesh.scale)
+    touches = np.linalg.norm(pair.P_m - pair.P_r, axis=1) <= TOUCH_SHARE * size + pair.facets + pair.bulge
+    if pair.round is not None:
+        touches &= ~pair.round.points["is_hollow"]  # these have a place of their own at every pose
+    return Places(pair.P_r[touches], pair.n_r[touches])
+
+
+def carrying(points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return the numbers of the points (point, 3) that suffice to carry whatever all of them carry, also by friction.
+
+    Where all normals (point, 3) are equal and the points lie in one plane, these are the corners of their hull: a force within
+    the friction cone of any point is the sum of forces within those of the corners, with the same moment.
+    """
+    numbers = np.arange(len(points))
+    if len(points) < 2 or np.ptp(normals, axis=0).max() > FLATNESS:
+        return numbers
+    _, sizes, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    rank = int((sizes > FLATNESS * sizes[0]).sum())
+    coordinates = (points - points.mean(axis=0)) @ axes[:rank].T
+    if rank == 1:
+        return np.unique([coordinates.argmin(), coordinates.argmax()])
+    if rank == 2 and len(points) > 3:
+        try:
+            return np.sort(ConvexHull(coordinates).vertices)
+        except QhullError:  # the points lie almost on one line
+            pass
+    return numbers
