@@ -16,6 +16,7 @@ from tolcontact.compilation.elements import ElementQP, has_elements
 from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
+from tolcontact.compilation.station_program import StationProgram, station_programs
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
@@ -60,6 +61,7 @@ class Program(Pictured):
     groups       the contact QPs
     nominal_measures  values of the measures in the nominal assembly
     accuracies   of the measures, in their units (see measure_accuracies)
+    stations     of an assembly that is built in steps, in their order; `place` then places the parts of all of them
     tapes        the users' own expressions by measure name
     """
 
@@ -77,6 +79,7 @@ class Program(Pictured):
     nominal_measures: np.ndarray
     accuracies: np.ndarray
     tapes: dict[str, Tape]
+    stations: tuple[StationProgram, ...] = ()
 
     def __str__(self) -> str:
         nominal, method = self.nominal, self.method
@@ -161,6 +164,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
                 for measure, value in zip(nominal.measures, values, strict=True)
                 if measure.is_expression
             },
+            stations=tuple(station_programs(nominal, groups, method)),
         )
 
 
@@ -229,7 +233,7 @@ def _check_forces(nominal: Nominal, groups: list[Group]) -> None:
         f'force "{force.name}" acts on part "{force.at.part.name}", which contact cannot move, but the objective is "seating"; '
         "leave the force out, or declare the part free, with its contacts"
         for force in nominal.assembly.forces
-        if nominal.part_index(force.at.part) not in moved
+        if nominal.part_index(force.at.part, force.station) not in moved
     ]
     if not nominal.assembly.forces:
         faults = ['objective "seating" needs a force, and none is declared; declare one with assembly.force(...)']

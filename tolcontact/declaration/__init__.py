@@ -264,6 +264,7 @@ from tolcontact.declaration.feature_tolerance import (
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import Form
 from tolcontact.declaration.geometry import Box, Geometry, Mesh, Pin
+from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne, three_two_one
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import (
@@ -285,6 +286,7 @@ from tolcontact.declaration.mobility import has_supports, is_free, movers
 from tolcontact.declaration.part import OUTSIDE, DatumTargets, Face, Feature, Part, Pattern, Point
 from tolcontact.declaration.selection import Brep, Cylinder, Facing, Inside, Largest, Near, Picked, Triangles
 from tolcontact.declaration.size import Size
+from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import Tolerance
 from tolcontact.declaration.values import degrees
@@ -293,8 +295,8 @@ __all__ = [
     "OUTSIDE", "Angle", "Angularity", "Assembly", "AxisDistance", "Box", "Brep", "CircularRunout", "Clearance",
     "Coaxiality", "Combination", "ContactPair", "Correlation", "Cylinder", "Cylindricity", "DatumTargets", "Difference",
     "Face", "Facing", "Feature", "Flatness", "Flush", "Force", "Form", "Gap", "GeometricTolerance", "Geometry", "Inside",
-    "Largest", "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum", "Near",
-    "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
-    "Roundness", "Size", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
+    "Joint", "Largest", "LineProfile", "Location", "Locator", "Maximum", "Mean", "Measure", "Measurement", "Mesh", "Minimum",
+    "Near", "Parallelism", "Part", "Pattern", "Perpendicularity", "Picked", "Pin", "Point", "Population", "Position", "Profile",
+    "Roundness", "Size", "Station", "Straightness", "Sum", "Symmetry", "ThreeTwoOne", "TitleBlock", "Tolerance", "TotalRunout",
     "Triangles", "Variable", "degrees", "has_supports", "is_free", "movers", "stations", "three_two_one",
 ]  # fmt: skip

@@ -30,6 +30,7 @@ class ContactPair(Readable):
     spacing: float | None = None
     within: float | None = None
     declared_at: str = ""
+    station: str = ""
 
     def faults(self) -> Iterator[str]:
         yield from self.moving.faults()

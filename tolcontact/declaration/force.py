@@ -16,6 +16,7 @@ class Force(Readable):
     at: Point
     vector: Vector
     declared_at: str = ""
+    station: str = ""
 
     def faults(self) -> Iterator[str]:
         yield from self.at.faults()

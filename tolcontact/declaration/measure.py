@@ -42,6 +42,7 @@ class Measure(Readable):
     declared_at: str = ""
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
+    station: str = ""
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tolcontact.declaration import movers
 from tolcontact.discretization import Nominal
 from tolcontact.mechanics.correction import Mobility
 from tolcontact.mechanics.displacement import moment_table
@@ -75,7 +74,7 @@ def contact_groups(nominal: Nominal, *, weighs_areas: bool) -> list[Group]:
 
     Contact points count by the areas that they stand for if `weighs_areas`; in the paper each counts once.
     """
-    chains = [tuple(nominal.part_index(mover) for mover in movers(nominal.assembly, part.part)) for part in nominal.parts]
+    chains = [part.movers for part in nominal.parts]
     clusters: list[set[int]] = []
     for pair in nominal.pairs:
         joined = set(chains[pair.moving]) | _movers_of(pair.reference, chains)

@@ -1,0 +1,160 @@
+"""The sequence of stations: which parts are present in each, as which bodies, and what is wrong with that.
+
+A station is a model by itself: its parts, with the locations, contact pairs, forces and measures that it declares, and the
+joints that it locates.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
+
+from tolcontact.declaration.joint import Joint
+from tolcontact.declaration.locator import Location
+from tolcontact.declaration.part import Part
+from tolcontact.declaration.station import Station
+from tolcontact.declaration.values import key_faults, repetitions
+
+SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
+
+
+class Line(Protocol):
+    """The assembly that the stations build."""
+
+    parts: Any
+    locations: Any
+    pairs: Any
+    measures: Any
+    forces: Any
+    stations: Any
+    joints: Any
+
+
+def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
+    """Return the joint of each part that is joined when a station begins: the latest one."""
+    names = [earlier.name for earlier in line.stations[: line.stations.index(station)]]
+    return {part: joint for name in names for joint in line.joints if joint.station == name for part in joint.members}
+
+
+def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
+    """Return the declarations of a station by the name of their list."""
+    return {name: [thing for thing in getattr(line, name) if thing.station == station.name] for name in SETTINGS}
+
+
+def present_parts(line: Line, station: Station) -> tuple[Part, ...]:
+    """Return the parts in a station: those that it locates, with all parts of their joints, and fixed ones that it mentions."""
+    joined, settings = joined_before(line, station), settings_of(line, station)
+    located = {
+        part
+        for location in settings["locations"]
+        for part in (joined[location.part].members if location.part in joined else (location.part,))
+    }
+    mentioned = {part for things in settings.values() for thing in things for part in mentioned_parts(thing)}
+    return tuple(part for part in line.parts if part in located or (part.fixed is True and part in mentioned))
+
+
+def mentioned_parts(thing: Any) -> tuple[Part, ...]:
+    """Return the parts to which a location, contact pair, measure or force refers."""
+    if isinstance(thing, Location):
+        return (thing.part, *([thing.parent] if thing.parent else []), *thing.mentioned)
+    if hasattr(thing, "moving"):
+        return (*thing.moving.parts, *thing.reference.parts)
+    return (thing.at.part,) if hasattr(thing, "at") else tuple(thing.parts)
+
+
+def sequence_faults(line: Line) -> Iterator[str]:
+    """Yield the faults of the sequence: each names the station, the part and the script line."""
+    names = [station.name for station in line.stations]
+    yield from key_faults("station", names)
+    yield from key_faults("joint", [joint.name for joint in line.joints])
+    yield from repetitions("part or joint", [part.name for part in line.parts] + [joint.name for joint in line.joints])
+    for list_name, method in SETTINGS.items():
+        for thing in getattr(line, list_name):
+            if thing.station not in names:
+                yield f"{_designation(thing)} belongs to no station; declare it in one: station.{method}(...)"
+    for joint in line.joints:
+        yield from (f"{_designation(joint)}: {fault}" for fault in joint.faults())
+        if joint.station not in names:
+            yield f'{_designation(joint)} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
+    for station in line.stations:
+        yield from _station_faults(line, station)
+
+
+def _station_faults(line: Line, station: Station) -> Iterator[str]:
+    joined, settings = joined_before(line, station), settings_of(line, station)
+    if not settings["locations"]:
+        yield f"{_designation(station)}: it locates nothing; call {station.name}.locate(...)"
+    bodies: dict[Joint | Part, Location] = {}
+    for location in settings["locations"]:
+        yield from (f"{_designation(location)}: {fault}" for fault in _location_faults(location, joined, station))
+        body = joined.get(location.part, location.part)
+        if body in bodies:
+            noun = "joint" if isinstance(body, Joint) else "part"
+            yield (
+                f'{_designation(location)}: station "{station.name}" locates {noun} "{body.name}" twice, first in '
+                f"{bodies[body].declared_at or 'an earlier location'}; locate it once"
+            )
+        bodies.setdefault(body, location)
+    present = present_parts(line, station)
+    for things in settings.values():
+        for thing in things:
+            for part in dict.fromkeys(mentioned_parts(thing)):
+                if part in line.parts and part not in present and not (isinstance(thing, Location) and part is thing.part):
+                    yield f"{_designation(thing)}: {_absence(part, joined, station)}"
+    yield from _join_faults(line, station, present)
+
+
+def _location_faults(location: Location, joined: dict[Part, Joint], station: Station) -> Iterator[str]:
+    joint = joined.get(location.part)
+    if joint is not None and location.joint != joint.name:
+        body = f'joint "{location.joint}"' if location.joint else f'part "{location.part.name}"'
+        yield (
+            f'station "{station.name}" locates {body}, which is in joint "{joint.name}" since station "{joint.station}"; '
+            "locate that joint"
+        )
+    elif joint is None and location.joint:
+        yield f'station "{station.name}" locates joint "{location.joint}", which no earlier station joins'
+    elif joint is not None:
+        for locator in location.scheme if isinstance(location.scheme, tuple) else ():
+            if locator.part is not None and locator.part not in joint.members:
+                names = ", ".join(part.name for part in joint.members)
+                place = f'locator "{locator.name}" is at a point of part "{locator.part.name}"'
+                yield f"{place}; the parts of the joint are: {names}"
+    if joint is not None and location.parent in joint.members:
+        yield f'joint "{joint.name}" is located on its own part "{location.parent.name if location.parent else ""}"'
+
+
+def _join_faults(line: Line, station: Station, present: Sequence[Part]) -> Iterator[str]:
+    before = joined_before(line, station)
+    joints: dict[Part, Joint] = {}
+    for joint in line.joints:
+        if joint.station != station.name:
+            continue
+        for part in dict.fromkeys(joint.members):
+            if part in joints:
+                yield (
+                    f'{_designation(joint)}: station "{station.name}" joins part "{part.name}" twice, first in joint '
+                    f'"{joints[part].name}" ({joints[part].declared_at}); join all in one joint'
+                )
+            elif part not in present:
+                yield f"{_designation(joint)}: {_absence(part, before, station)}"
+            elif part in before and not set(before[part].members) <= set(joint.members):
+                yield (
+                    f'{_designation(joint)}: station "{station.name}" joins part "{part.name}", which is in joint '
+                    f'"{before[part].name}" since station "{before[part].station}"; join that joint'
+                )
+            joints.setdefault(part, joint)
+
+
+def _absence(part: Part, joined: dict[Part, Joint], station: Station) -> str:
+    """Return the fault of a part that a station needs and does not hold."""
+    body = f'joint "{joined[part].name}" with part "{part.name}"' if part in joined else f'part "{part.name}"'
+    return f'station "{station.name}" does not hold {body}; locate it there: {station.name}.locate(...)'
+
+
+def _designation(thing: Any) -> str:
+    """Return the kind, the name and the script line of a declaration."""
+    if isinstance(thing, Location):
+        noun, name = "joint" if thing.joint else "part", thing.joint or thing.part.name
+    else:
+        nouns = {"Station": "station", "Joint": "joint", "ContactPair": "contact pair", "Force": "force", "Measure": "measure"}
+        noun, name = nouns[type(thing).__name__], thing.name
+    return f'{noun} "{name}"' + (f" ({thing.declared_at})" if thing.declared_at else "")
