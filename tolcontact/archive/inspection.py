@@ -20,7 +20,7 @@ from tolcontact import vocabulary as terms
 from tolcontact.checksums import crc32
 from tolcontact.child import ChildDiedError, limit_resources, run_child
 from tolcontact.errors import ArchiveError, shown
-from tolcontact.vocabulary import ArchiveVariable, archive, form, variation
+from tolcontact.vocabulary import ArchiveVariable, archive, form, stations, variation
 
 MAX_SECONDS, SECONDS_PER_GB = 20.0, 20.0  # of processor time
 MEMORY = 1 << 30  # beside four times the file's own size
@@ -46,10 +46,10 @@ OF_CONTACT = (terms.MOVING_PART, terms.REFERENCE_PART)
 OF_SAMPLE = (terms.LOCATOR_LABEL, terms.TOLERANCE_RANGE)
 BEFORE_CONTRIBUTORS = 3  # format of archives in which locators alone varied
 OF_MESH = (terms.MESH_VERTICES, terms.MESH_FACES)
-CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field")
+CHECKED_GROUPS = ("", "model", "contact", "sample", "surface", "field", terms.STATIONS_GROUP)
 VARIABLES = {  # by name; no two variables of an archive differ that have one name
     variable.name: variable
-    for module in (archive, variation, form)
+    for module in (archive, variation, form, stations)
     for item in vars(module).values()
     for variable in (item if isinstance(item, tuple) else (item,))
     if isinstance(variable, ArchiveVariable)
@@ -106,9 +106,9 @@ def _check_format(file: netCDF4.Dataset) -> None:
     number = file.getncattr("format") if "format" in file.ncattrs() else 1
     if not isinstance(number, int | np.integer) or number < 1:
         raise DamagedError(f"is damaged: its format is {number!r}")
-    if number > terms.FORMAT:
+    if number > terms.STATIONS_FORMAT:
         raise DamagedError(
-            f"has format {number}; this version of tolcontact reads formats up to {terms.FORMAT}; use a newer one"
+            f"has format {number}; this version of tolcontact reads formats up to {terms.STATIONS_FORMAT}; use a newer one"
         )
 
 

@@ -84,7 +84,11 @@ class Program(Pictured):
     def __str__(self) -> str:
         nominal, method = self.nominal, self.method
         rows = [f"program of {nominal.assembly.name}: {self.plugin.name}, {method.resolution}, {method.objective}"]
-        rows += [f"  part {part.name}: {len(part.locators)} locators{', free' * part.free}" for part in nominal.parts]
+        rows += [
+            f"  part {part.name}{f' in station {part.station}' * bool(part.station)}: "
+            f"{'joined' if part.carried else f'{len(part.locators)} locators'}{', free' * part.free}"
+            for part in nominal.parts
+        ]
         rows += [f"  contact {pair.name}: {self.contact_in_words(k)}" for k, pair in enumerate(nominal.pairs)]
         rows += [
             f"  measure {measure.name}: nominally {value:.6g} {measure.units}"

@@ -75,7 +75,7 @@ class ContactResolver:
 
     def raw_contact(
         self, relative: Float[Array, "realization pair 12"], deviations: Float[Array, "realization contributor"]
-    ) -> tuple[Float[Array, "realization pair"], Int[Array, "realization pair"]]:
+    ) -> tuple[Float[Array, "realization pair_of_group"], Int[Array, "realization pair_of_group"]]:
         """Return the least gap [mm] and the number of active points of each pair of the group at raw X_RM."""
         survey = self._candidates.survey(relative[:, self.pairs], deviations)
         return survey.min_gap, survey.active

@@ -34,7 +34,7 @@ T = TypeVar("T")
 CONSTANT_SHARE = 1e-3  # of the widest zone: a narrower one counts as a constant
 MAX_COUNTS = {  # of what an assembly declares
     "parts": 1000, "locations": 1000, "pairs": 5000, "measures": 2000, "forces": 5000, "variables": 5000, "correlations": 5000,
-    "populations": 1000, "stations": 100, "joints": 1000,
+    "populations": 1000, "stations": 60, "joints": 1000,
 }  # fmt: skip
 
 

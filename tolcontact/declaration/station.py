@@ -19,6 +19,9 @@ class Station(Declarations, Readable):
     they deviate alike in all stations. A locator is a contributor of its own in each station, "weld.panel.A1".
     """
 
+    name: str
+    declared_at: str
+
     def __init__(self, name: str, declared_at: str = "", assembly: Declarations | None = None) -> None:
         self.name, self._station, self.declared_at = name, name, declared_at
         self._assembly = assembly

@@ -103,17 +103,26 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
         raise ModelError(assembly.name, list(dict.fromkeys(faults)))
     warn_of_units(assembly, shapes)
     warn_of_partial_surfaces(assembly, meshes)
-    all_pairs = (*pairs, *_support_pairs(nominal_parts, scenes))
+    return _nominal(assembly, scenes, nominal_parts, (*pairs, *_support_pairs(nominal_parts, scenes)), features)
+
+
+def _nominal(
+    assembly: Assembly,
+    scenes: Sequence[Scene],
+    parts: tuple[NominalPart, ...],
+    pairs: tuple[ContactPoints, ...],
+    features: Features,
+) -> Nominal:
+    """Return the nominal model with its measurements; with stations those of all of them, station by station."""
     models = [
-        Nominal(scene.assembly, nominal_parts, all_pairs, scene.assembly.measures, features, station=scene.station)
-        for scene in scenes
+        Nominal(scene.assembly, parts, pairs, scene.assembly.measures, features, station=scene.station) for scene in scenes
     ]
     models = [replace(model, measurements=nominal_measurements(model)) for model in models]
     if not assembly.stations:
         return models[0]
     measures = tuple(measure for model in models for measure in model.measures)
     measurements = tuple(measurement for model in models for measurement in model.measurements)
-    return Nominal(assembly, nominal_parts, all_pairs, measures, features, measurements, tuple(models))
+    return Nominal(assembly, parts, pairs, measures, features, measurements, tuple(models))
 
 
 def _placed(parts: Sequence[NominalPart], scene: Scene) -> dict[Part, NominalPart]:

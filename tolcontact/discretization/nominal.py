@@ -271,6 +271,10 @@ class Nominal:
         """The index (part,) of each part of the assembly in the last station that holds it."""
         return np.array([self._indices[part, ""] for part in self.assembly.parts], dtype=int)
 
+    def number(self, index: int) -> int:
+        """Return the number of a part of a station among the parts of the assembly."""
+        return self.assembly.parts.index(self.parts[index].part)
+
     def may_differ(self, index: int) -> bool:
         """Return whether contact may move a part: in its own station, or in an earlier one, which a joint hands on."""
         part = self.parts[index]

@@ -1,0 +1,92 @@
+"""Stations: closed forms, hand-over of poses, archives, and what is refused."""
+
+import numpy as np
+import pytest
+
+import tolcontact as tc
+from tests.cases import stations as cases
+
+HALF_NORMAL_MEAN, HALF_NORMAL_VARIANCE = np.sqrt(0.5 / np.pi), (1 - 1 / np.pi) / 2  # of max(0, z), z standard normal
+
+
+def measured(model, samples=400, seed=1, **options):
+    program = tc.build(model, solver="daqp", **options)
+    values = np.concatenate([block.measured for block in tc.simulate_blocks(program, samples=samples, seed=seed, threads=1)])
+    return {measure.name: values[:, :, k] for k, measure in enumerate(program.nominal.measures)}
+
+
+def rotation(theta):
+    """exp([theta]x) (n, 3, 3) by Rodrigues' formula."""
+    angle = np.linalg.norm(theta, axis=1)[:, None, None]
+    K = np.zeros((len(theta), 3, 3))
+    K[:, 0, 1], K[:, 0, 2], K[:, 1, 2] = -theta[:, 2], theta[:, 1], -theta[:, 0]
+    K -= K.transpose(0, 2, 1)
+    return np.eye(3) + np.sinc(angle / np.pi) * K + np.sinc(angle / 2 / np.pi) ** 2 / 2 * K @ K
+
+
+def placed(points, directions, d):
+    """R (n, 3, 3) and t (n, 3) of six locators (6, 3) with deviations (n, 6): a small displacement of their centroid."""
+    c = points.mean(axis=0)
+    q = d @ np.linalg.inv(np.hstack([directions, np.cross(points - c, directions)])).T
+    R = rotation(q[:, 3:])
+    return R, q[:, :3] + c - R @ c
+
+
+def test_three_parts_in_two_stations():
+    values, count = measured(cases.rail(), samples=40_000), 40_000
+    h, s = np.sqrt(2) * cases.SIGMA, cases.SIGMA
+    fixture = s**2 * ((1 / 14) ** 2 + (15 / 14) ** 2 + 1)
+    step, flush = values["step"][:, 1], values["flush"]
+    expected = {
+        "step": (step, -HALF_NORMAL_MEAN * h, HALF_NORMAL_VARIANCE * h**2),
+        "raw": (flush[:, 0], 0.0, fixture + h**2 / 196),
+        "corrected": (flush[:, 1], HALF_NORMAL_MEAN * h / 14, fixture + HALF_NORMAL_VARIANCE * h**2 / 196),
+    }
+    for name, (sample, mean, variance) in expected.items():
+        errors = sample - sample.mean()
+        assert abs(sample.mean() - mean) < 4 * np.sqrt(variance / count), name
+        spread = np.sqrt(((errors**4).mean() - errors.var() ** 2) / count)
+        assert abs(sample.var() - variance) < 4 * spread, name
+
+
+@pytest.mark.parametrize("width", [0.5, 2.0, 10.0])
+def test_poses_are_handed_over_as_a_computation_outside_the_package_composes_them(width):
+    program = tc.build(cases.three_stations(width, contact=False), solver="daqp")
+    block = next(iter(tc.simulate_blocks(program, samples=500, seed=3)))
+    nominal, poses = program.nominal, block.poses[:, 0].reshape(500, -1, 12)
+    R, t = {}, {}
+
+    def relative(carrier, member):
+        """The pose of a member of a joint in the frame of the part that carries it, where they were joined."""
+        return R[carrier].transpose(0, 2, 1) @ R[member], np.einsum("nji,nj->ni", R[carrier], t[member] - t[carrier])
+
+    for k, part in enumerate(nominal.parts):
+        station, joined_in = part.station, {"weld": "tack", "check": "weld"}.get(part.station)
+        if len(part.locators):
+            d = block.deviations[:, [nominal.contributors.index(label) for label in part.locators.labels]].copy()
+            for locator, owner in enumerate(part.owners):
+                p, n = part.locators.points[locator], part.locators.directions[locator]
+                R_within, t_within = relative(*(nominal.part_index(nominal.parts[m].part, joined_in) for m in (k, owner)))
+                d[:, locator] -= (R_within @ p + t_within - p) @ n
+            R[k], t[k] = placed(part.locators.points, part.locators.directions, d)
+        else:
+            carrier = nominal.part_index(nominal.assembly.parts[0], station)
+            source = [nominal.part_index(each, joined_in) for each in (nominal.assembly.parts[0], part.part)]
+            R_within, t_within = relative(*source)
+            R[k], t[k] = R[carrier] @ R_within, np.einsum("nij,nj->ni", R[carrier], t_within) + t[carrier]
+        corners = np.array([[0, 0, 0], [210, 50, 20], [100, 50, 0]])
+        expected = corners @ R[k].transpose(0, 2, 1) + t[k][:, None]
+        actual = corners @ poses[:, k, :9].reshape(-1, 3, 3).transpose(0, 2, 1) + poses[:, k, None, 9:]
+        assert np.abs(actual - expected).max() < 1e-11, part.name
+
+
+@pytest.mark.parametrize("method", [tc.Method(), tc.Method(resolution="linearized")], ids=lambda method: method.resolution)
+def test_measures_within_a_joint_are_those_of_the_station_that_joined_it(method):
+    values = measured(cases.three_stations(2.0), method=method)
+    for first, later in (("tack a to b", "weld a to b"), ("tack a to b", "check a to b"), ("weld b to c", "check b to c")):
+        change = np.abs(values[later] - values[first])
+        assert change[:, 0].max() < 1e-12
+        assert method.resolution == "linearized" or change.max() < 1e-12
+    moved = np.abs(values["tack a to b"][:, 1] - values["tack a to b"][:, 0]) > 1e-6
+    assert 100 < moved.sum() < 400
+    assert np.abs(values["check height"] - values["weld height"]).max() > 0.1
