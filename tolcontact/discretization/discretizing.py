@@ -288,6 +288,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),
         free=is_free(scene.assembly, part),
+        located=scene.label((location and location.joint) or part.name),
         movers=scene.movers(part),
         station=scene.station,
         owners=tuple(scene.index(locator.part or part) for locator in locators) if location and location.joint else (),

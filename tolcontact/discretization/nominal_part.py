@@ -17,6 +17,7 @@ class NominalPart:
     vertices, faces      its surface (vertex, 3) [mm], (face, 3), fine enough to show displacement fields
     locators             as `scheme` declares them; none if the part is fixed
     parent               index of the part that it is located on, or that carries it in a joint; None for the ground
+    located              name of what its locators locate: its own, or "station.part" or "station.joint"
     movers               indices of the free parts whose corrections move it: parts that it is located on come first
     station              name of the station; empty in an assembly without stations
     carried              indices of the part that carries it and of itself in the station that joined them; None if it is not
@@ -34,6 +35,7 @@ class NominalPart:
     scheme: ThreeTwoOne | tuple[Locator, ...] | None
     parent: int | None
     free: bool
+    located: str
     movers: tuple[int, ...] = ()
     station: str = ""
     carried: tuple[int, int] | None = None
