@@ -217,9 +217,9 @@ class Assembly(Declarations, Pictured):
                 yield from _located("part", part, self._location_faults(part))
             yield from self._feature_faults(part)
         for location in self.locations:
-            yield from _located("part", location.part, location.faults(), location.declared_at)
+            yield from _located(location.noun, location, location.faults())
             mentioned = location.part, location.parent, *location.mentioned
-            yield from self._unknown_parts(f'locators of "{location.part.name}"', location.declared_at, *mentioned)
+            yield from self._unknown_parts(f'locators of "{location.name}"', location.declared_at, *mentioned)
         references: list[tuple[str, Any, Iterable[Part]]] = [
             *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
             *(("force", force, (force.at.part,)) for force in self.forces),
@@ -303,7 +303,7 @@ class Assembly(Declarations, Pictured):
         return "\n".join([f"assembly {self.name}", *(f"  {row}" for row in rows)])
 
 
-def _located(kind: str, thing: Any, faults: Iterator[str], line: str = "") -> Iterator[str]:
+def _located(kind: str, thing: Any, faults: Iterator[str]) -> Iterator[str]:
     """Return faults that begin with the name and the script line of a declaration."""
-    line = line or thing.declared_at
+    line = thing.declared_at
     return (f'{kind} "{thing.name}"{f" ({line})" if line else ""}: {fault}' for fault in faults)

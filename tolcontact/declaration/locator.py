@@ -141,6 +141,16 @@ class Location(Readable):
     joint: str = ""
 
     @property
+    def noun(self) -> str:
+        """The kind of the located body: a part, or a joint."""
+        return "joint" if self.joint else "part"
+
+    @property
+    def name(self) -> str:
+        """The name of the located body."""
+        return self.joint or self.part.name
+
+    @property
     def parent(self) -> Part | None:
         """The part that the locators are on; None for the ground."""
         return self.on.part if isinstance(self.on, Feature) else self.on
@@ -210,9 +220,7 @@ class Location(Readable):
         feature = f"{self.on.name} of " if isinstance(self.on, Feature) else ""
         ground = f"{feature}{self.parent.name}" if self.parent else "the ground"
         floating = ", floating" if self.floating else ""
-        return f"location of {self.joint or self.part.name} on {ground}: {scheme}{floating}" + (
-            f"; {self.tolerance}" if self.tolerance else ""
-        )
+        return f"location of {self.name} on {ground}: {scheme}{floating}" + (f"; {self.tolerance}" if self.tolerance else "")
 
 
 def _repeating(locators: list[Locator]) -> list[Locator]:

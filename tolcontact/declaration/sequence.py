@@ -12,6 +12,7 @@ from tolcontact.declaration.locator import Location
 from tolcontact.declaration.part import Part
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.values import key_faults, repetitions
+from tolcontact.errors import designation
 
 SETTINGS = {"locations": "locate", "pairs": "contact", "measures": "measure", "forces": "force"}  # lists, and their methods
 
@@ -31,7 +32,9 @@ class Line(Protocol):
 def joined_before(line: Line, station: Station) -> dict[Part, Joint]:
     """Return the joint of each part that is joined when a station begins: the latest one."""
     names = [earlier.name for earlier in line.stations[: line.stations.index(station)]]
-    return {part: joint for name in names for joint in line.joints if joint.station == name for part in joint.members}
+    # Of two joints of one station, which is a fault, the first one counts.
+    joints = [joint for name in names for joint in reversed(line.joints) if joint.station == name]
+    return {part: joint for joint in joints for part in joint.members}
 
 
 def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
@@ -134,6 +137,7 @@ def _join_faults(line: Line, station: Station, present: Sequence[Part]) -> Itera
                     f'{_designation(joint)}: station "{station.name}" joins part "{part.name}" twice, first in joint '
                     f'"{joints[part].name}" ({joints[part].declared_at}); join all in one joint'
                 )
+                break
             elif part not in present:
                 yield f"{_designation(joint)}: {_absence(part, before, station)}"
             elif part in before and not set(before[part].members) <= set(joint.members):
@@ -152,9 +156,5 @@ def _absence(part: Part, joined: dict[Part, Joint], station: Station) -> str:
 
 def _designation(thing: Any) -> str:
     """Return the kind, the name and the script line of a declaration."""
-    if isinstance(thing, Location):
-        noun, name = "joint" if thing.joint else "part", thing.joint or thing.part.name
-    else:
-        nouns = {"Station": "station", "Joint": "joint", "ContactPair": "contact pair", "Force": "force", "Measure": "measure"}
-        noun, name = nouns[type(thing).__name__], thing.name
-    return f'{noun} "{name}"' + (f" ({thing.declared_at})" if thing.declared_at else "")
+    nouns = {"Station": "station", "Joint": "joint", "ContactPair": "contact pair", "Force": "force", "Measure": "measure"}
+    return designation(thing.noun if isinstance(thing, Location) else nouns[type(thing).__name__], thing)

@@ -276,7 +276,8 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
     if location is not None and location.floating:
         nominal = replace(nominal, floating=(_middle(mesh) @ R_WP.T + t_WP, float(mesh.scale)))
     if len(nominal):
-        faults.attempt(designation("part", part), nominal.check_independent)
+        place = designation("joint", location) if location and location.joint else designation("part", part)
+        faults.attempt(place, nominal.check_independent)
     return NominalPart(
         name=part.name,
         part=part,
@@ -288,7 +289,7 @@ def _nominal_part(scene: Scene, part: Part, meshes: Meshes, faults: _Faults) -> 
         scheme=location.scheme if len(nominal) and location is not None else None,
         parent=scene.parent(part),
         free=is_free(scene.assembly, part),
-        located=scene.label((location and location.joint) or part.name),
+        located=scene.label(location.name if location else part.name),
         movers=scene.movers(part),
         station=scene.station,
         owners=tuple(scene.index(locator.part or part) for locator in locators) if location and location.joint else (),
@@ -308,7 +309,6 @@ def placement_of(part: Part) -> Placement:
 def _locators(
     scene: Scene, location: Location | None, declared: Sequence[Locator], common: Tolerance | None, part: Part
 ) -> Locators:
-    body = location.joint if location and location.joint else part.name
     points = np.array([locator.point for locator in declared]).reshape(-1, 3)
     directions = np.array([locator.direction for locator in declared]).reshape(-1, 3)
     owners = [locator.part or part for locator in declared]
@@ -317,7 +317,7 @@ def _locators(
         R_WP, t_WP = placement_of(owner)
         points[rows], directions[rows] = points[rows] @ R_WP.T + t_WP, directions[rows] @ R_WP.T
     return Locators(
-        labels=tuple(scene.label(f"{body}.{locator.name}") for locator in declared),
+        labels=tuple(scene.label(f"{location.name if location else part.name}.{locator.name}") for locator in declared),
         points=points,
         directions=directions,
         tolerances=tuple(locator.tolerance or common or Tolerance(0.0) for locator in declared),
