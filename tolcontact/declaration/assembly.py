@@ -113,7 +113,7 @@ class Assembly(Declarations, Pictured):
 
     def station(self, name: str) -> Station:
         """Declare the next station of an assembly that is built in steps, and return it (see Station)."""
-        return self._add("stations", Station(name, script_line(), self))
+        return self._add("stations", Station(name, script_line()).of(self))
 
     def fasten(
         self,

@@ -22,9 +22,14 @@ class Station(Declarations, Readable):
     name: str
     declared_at: str
 
-    def __init__(self, name: str, declared_at: str = "", assembly: Declarations | None = None) -> None:
+    def __init__(self, name: str, declared_at: str = "") -> None:
         self.name, self._station, self.declared_at = name, name, declared_at
+        self._assembly: Declarations | None = None
+
+    def of(self, assembly: Declarations) -> "Station":
+        """Let the station declare into the lists of an assembly, and return it."""
         self._assembly = assembly
+        return self
 
     def join(self, name: str, *bodies: Part | Joint) -> Joint:
         """Declare that parts, or joints of earlier stations, are joined at the end of this station, and return the joint.
