@@ -90,3 +90,70 @@ def test_measures_within_a_joint_are_those_of_the_station_that_joined_it(method)
     moved = np.abs(values["tack a to b"][:, 1] - values["tack a to b"][:, 0]) > 1e-6
     assert 100 < moved.sum() < 400
     assert np.abs(values["check height"] - values["weld height"]).max() > 0.1
+
+
+def settled(again):
+    """A rail whose joint is located again by the locators of its first part, which deviate as they did before."""
+    line = tc.Assembly("settled")
+    a, b = line.part("a", tc.Box(100, 50, 10)), line.part("b", tc.Box(60, 50, 10), at=(20, 0, 10))
+    weld, check = line.station("weld"), line.station("check")
+    names = ["A1", "A2", "A3", "B1", "B2", "C1"]
+    places = [(5, 5, 0), (5, 45, 0), (95, 25, 0), (5, 0, 5), (95, 0, 5), (0, 25, 5)]
+    pins = [tc.Locator(n, a.point(*p), along) for n, p, along in zip(names, places, "zzzyyx", strict=True)]
+    weld.locate(a, pins, tolerance=0)
+    weld.locate(b, cases.box_scheme(b), tolerance=1)
+    weld.contact("lap", moving=b.face("-z"), reference=a.face("+z"))
+    joint = weld.join("ab", a, b)
+    check.locate(joint if again else a, pins, tolerance=0)
+    for name in names:
+        drives = {f"weld.a.{name}": 1.0, f"check.ab.{name}": 1.0}
+        line.variable(f"cause {name}", 1.0, drives=drives)
+    for station in (weld, check):
+        station.measure(f"{station.name} corner", b.point(60, 50, 10), along="z")
+    return line
+
+
+def test_two_identical_stations_change_nothing():
+    values = measured(settled(again=True))
+    assert np.abs(values["check corner"] - values["weld corner"]).max() < 1e-12
+    assert np.ptp(values["weld corner"]) > 0.5
+
+
+def independent(names):
+    line = tc.Assembly("independent")
+    parts = {name: line.part(name, tc.Box(100, 50, 10), at=(0, 0, 20 * k)) for k, name in enumerate(("left", "right"))}
+    base = line.part("base", tc.Box(100, 50, 10), at=(0, 0, -10), fixed=True)
+    for name in names:
+        station = line.station(f"for {name}")
+        station.locate(parts[name], cases.box_scheme(parts[name]), tolerance=1)
+        if name == "left":
+            station.contact("rest", moving=parts[name].face("-z"), reference=base.face("+z"))
+        station.measure(name, parts[name].point(100, 50, 0), along="z")
+    return line
+
+
+def test_the_order_of_independent_stations_does_not_matter():
+    forth, back = (measured(independent(names)) for names in (("left", "right"), ("right", "left")))
+    assert all((forth[name] == back[name]).all() for name in ("left", "right"))
+
+
+def test_a_fixture_is_a_part_with_locators_and_features_of_its_own():
+    line = tc.Assembly("inspection")
+    a, b = line.part("a", tc.Box(100, 20, 10)), line.part("b", tc.Box(100, 20, 10), at=(60, 0, 10))
+    table = line.part("table", tc.Box(200, 20, 10), at=(0, 0, -10))
+    table.feature("bottom", table.face("-z"), datum="A")
+    top = table.feature("top", table.face("+z"), tc.Profile(0.3, "A"))
+    weld, check = line.station("weld"), line.station("check")
+    for part in (a, b):
+        weld.locate(part, cases.supported(part, 10, 90), tolerance=0.6)
+    ab = weld.join("ab", a, b)
+    check.locate(table, cases.supported(table, 10, 190), tolerance=0.6)
+    pins = [tc.Locator(f"A{k}", p, "z") for k, p in enumerate([a.point(10, 5, 0), a.point(10, 15, 0), b.point(90, 10, 0)], 1)]
+    check.locate(ab, [*pins, *cases.held(a)], tolerance=0.6, on=top)
+    check.measure("end", b.point(90, 10, 10), along="z")
+    check.measure("top", top.point(150, 10, 10), along="z")
+    program = tc.build(line, solver="daqp")
+    block = next(iter(tc.simulate_blocks(program, samples=500, seed=1)))
+    end, under = block.measured[:, 0].T
+    pin = block.deviations[:, program.nominal.contributors.index("check.ab.A3")]
+    assert np.abs(end - under - pin).max() < 2e-3 and end.std() > 0.12 and under.std() > 0.05

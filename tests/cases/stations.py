@@ -48,7 +48,7 @@ def rail() -> tc.Assembly:
     return line
 
 
-def three_stations(tolerance: float, *, contact: bool = True) -> tc.Assembly:
+def three_stations(tolerance: float, *, contact: bool = True, placing: str = "first order") -> tc.Assembly:
     """Boxes that are placed with six locators each, joined, located by points of both, and joined with a third one."""
     line = tc.Assembly("three stations")
     a = line.part("a", tc.Box(100, 50, 10))
@@ -56,12 +56,12 @@ def three_stations(tolerance: float, *, contact: bool = True) -> tc.Assembly:
     c = line.part("c", tc.Box(40, 50, 10), at=(160, 0, 10))
     tack, weld, check = (line.station(name) for name in ("tack", "weld", "check"))
     for part in (a, b):
-        tack.locate(part, box_scheme(part), tolerance=tolerance)
+        tack.locate(part, box_scheme(part), tolerance=tolerance, placing=placing)
     ab = tack.join("ab", a, b)
-    weld.locate(ab, pins(a, b), tolerance=tolerance)
-    weld.locate(c, box_scheme(c), tolerance=tolerance)
+    weld.locate(ab, pins(a, b), tolerance=tolerance, placing=placing)
+    weld.locate(c, box_scheme(c), tolerance=tolerance, placing=placing)
     abc = weld.join("abc", ab, c)
-    check.locate(abc, pins(a, c), tolerance=tolerance)
+    check.locate(abc, pins(a, c), tolerance=tolerance, placing=placing)
     if contact:
         tack.contact("lap", moving=b.face("-z"), reference=a.face("+z"))
         weld.contact("butt", moving=c.face("-x"), reference=b.face("+x"))

@@ -17,6 +17,7 @@ from tolcontact.compilation.functions import NamedFunction
 from tolcontact.compilation.measure_accuracy import measure_accuracies
 from tolcontact.compilation.plugins import Plugin, plugin
 from tolcontact.compilation.station_program import StationProgram, station_programs
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.declaration.measure import Tape
 from tolcontact.discretization import ContactPoints, Nominal, RoundPoints
 from tolcontact.errors import ModelError
@@ -118,6 +119,7 @@ def compile_program(nominal: Nominal, solver: str, method: Method) -> Program:
     is seating, for forces that are missing or move nothing.
     """
     _check_forms(nominal, method)
+    _check_placing(nominal, method)
     draws = Draws(nominal)
     with CONSTRUCTION_LOCK:  # users' functions run here, too, and may print
         with quiet():
@@ -226,6 +228,20 @@ def _check_forms(nominal: Nominal, method: Method) -> None:
         'form; choose the search "bounded" or "fixed"'
         for pair in nominal.pairs
         if method.is_iterated and pair.deviating[1] is not None and pair.deviating[1].form is not None
+    ]
+    if faults:
+        raise ModelError(nominal.assembly.name, faults)
+
+
+def _check_placing(nominal: Nominal, method: Method) -> None:
+    """Raise ModelError for an objective that holds locators to first order, where contact moves a part placed otherwise."""
+    if method.minimizes.counts_points:
+        return
+    faults = [
+        f'part "{part.name}": its locators are placed by "{part.locators.placing}", and the objective "{method.objective}" '
+        'holds them to first order; leave placing out, or choose the objective "all points"'
+        for index, part in enumerate(nominal.parts)
+        if index in part.movers and part.locators.placing != FIRST_ORDER
     ]
     if faults:
         raise ModelError(nominal.assembly.name, faults)

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 from tolcontact.declaration.contact_pair import ContactPair
 from tolcontact.declaration.force import Force
 from tolcontact.declaration.joint import Joint
-from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
+from tolcontact.declaration.locator import FIRST_ORDER, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Face, Feature, Part, Point, face_of
@@ -38,12 +38,14 @@ class Declarations:
         tolerance: Any = None,
         on: Part | Feature | Joint | None = None,
         floating: bool = False,
+        placing: str = FIRST_ORDER,
     ) -> Location:
         """Locate a part by six locators, or by fewer if it is `floating`, on the ground or `on` another part (see Location).
 
         On a feature of another part, it also follows the deviations of that feature. A joint is located by points of its parts.
         `tolerance` applies to each locator without a tolerance: the full width of its zone [mm], limit deviations ("±0.1",
         "+0.1/-0.05"), a Tolerance, or a frozen scipy.stats distribution.
+        `placing` is "first order", "exact" or "best fit".
         """
         expect("locate: the first argument", part, Part | Joint, "a part")
         expect(
@@ -56,7 +58,7 @@ class Declarations:
         expect(f'locate "{part.name}": floating', floating, bool, "True or False")
         joint, part = (part.name, part.first) if isinstance(part, Joint) else ("", part)
         ground = on.first if isinstance(on, Joint) else on
-        location = Location(part, scheme, zone, ground, script_line(), floating, self._station, joint)
+        location = Location(part, scheme, zone, ground, script_line(), floating, self._station, joint, placing)
         return self._add("locations", location)
 
     def contact(

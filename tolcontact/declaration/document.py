@@ -35,7 +35,7 @@ from tolcontact.declaration.force import Force
 from tolcontact.declaration.form import COVARIANCES, Form
 from tolcontact.declaration.geometry import UNITS, Box, Mesh, Pin
 from tolcontact.declaration.joint import Joint
-from tolcontact.declaration.locator import Location, Locator, ThreeTwoOne
+from tolcontact.declaration.locator import PLACINGS, Location, Locator, ThreeTwoOne
 from tolcontact.declaration.measure import Measure, Tape, tape_of
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.measurement_entry import MEASURED
@@ -216,7 +216,10 @@ FEATURES = Inline(
 )
 RECORDS = {
     "parts": Record(Part, "geometry name at rotation fixed declared_at features", geometry=SHAPE, features=FEATURES),
-    "locations": Record(Location, "part on tolerance scheme declared_at floating? station? joint?", scheme=SCHEME, on=GROUND),
+    "locations": Record(
+        Location, "part on tolerance scheme declared_at floating? station? joint? placing?",
+        scheme=SCHEME, on=GROUND, placing=Plain(text_type(PLACINGS)),
+    ),
     "pairs": Record(
         ContactPair, "moving reference name points spacing within declared_at station?",
         points=Plain(INDEX | text_type([VERTICES]) | None, read=indices_of),

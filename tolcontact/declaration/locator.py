@@ -19,6 +19,8 @@ from tolcontact.declaration.values import (
 )
 from tolcontact.readable import Readable
 
+FIRST_ORDER, EXACT, BEST_FIT = PLACINGS = ("first order", "exact", "best fit")
+
 
 @dataclass(frozen=True, repr=False)
 class Locator(Readable):
@@ -128,6 +130,9 @@ class Location(Readable):
     A `floating` part has fewer than six locators. The directions that they leave open are nominal in the raw state, and contact
     determines them.
 
+    `placing` states how the pose follows from the locators: to "first order" in the deviations, as in the paper; "exact", with
+    faces that slide over the locators; or as the "best fit" of any number of locators, as a measuring machine aligns a part.
+
     In a `station` the located body may be a `joint`, by its name; `part` is then its first part.
     """
 
@@ -139,6 +144,7 @@ class Location(Readable):
     floating: bool = False
     station: str = ""
     joint: str = ""
+    placing: str = FIRST_ORDER
 
     @property
     def noun(self) -> str:
@@ -163,6 +169,10 @@ class Location(Readable):
 
     def faults(self) -> Iterator[str]:
         yield from self._faces_faults() if isinstance(self.scheme, ThreeTwoOne) else self._locator_faults(self.scheme)
+        if self.placing not in PLACINGS:
+            yield f"placing is {self.placing!r}; expected one of: {', '.join(PLACINGS)}"
+        elif self.placing != FIRST_ORDER and (self.floating or self._has_supports):
+            yield f'placing="{self.placing}" needs locators that hold both ways; leave floating and one_sided out'
         if self.tolerance is not None:
             yield from (f"locators: {fault}" for fault in self.tolerance.faults())
         if isinstance(self.on, Feature) and self.on not in self.on.part.features:
@@ -202,7 +212,7 @@ class Location(Readable):
                 f"it has {count}; a rigid part needs six independent ones (3-2-1, for example), or locate(..., floating=True) "
                 "if contact holds it in the other directions"
             )
-        elif len(two_sided) > 6:
+        elif len(two_sided) > 6 and self.placing != BEST_FIT:
             idle = [locator.name for locator in _repeating(two_sided)]
             sufficient = ", ".join(locator.name for locator in two_sided if locator.name not in idle)
             verb = "is" if len(idle) == 1 else "are"
@@ -215,11 +225,16 @@ class Location(Readable):
         elif self.floating and len(two_sided) == 6:
             yield "it is floating, but six locators hold it both ways; leave floating out, or some of them"
 
+    @property
+    def _has_supports(self) -> bool:
+        return isinstance(self.scheme, tuple) and any(locator.one_sided for locator in self.scheme)
+
     def __str__(self) -> str:
         scheme = self.scheme if isinstance(self.scheme, ThreeTwoOne) else f"{len(self.scheme)} locators"
         feature = f"{self.on.name} of " if isinstance(self.on, Feature) else ""
         ground = f"{feature}{self.parent.name}" if self.parent else "the ground"
         floating = ", floating" if self.floating else ""
+        floating += f", {self.placing}" if self.placing != FIRST_ORDER else ""
         return f"location of {self.name} on {ground}: {scheme}{floating}" + (f"; {self.tolerance}" if self.tolerance else "")
 
 

@@ -22,6 +22,7 @@ from tolcontact.declaration import (
     is_free,
     movers,
 )
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization.contact_points import contact_points
 from tolcontact.discretization.locators import Locators, scheme_locators
 from tolcontact.discretization.measurements import nominal_measurements
@@ -325,6 +326,7 @@ def _locators(
         one_sided=np.array([locator.one_sided for locator in declared], dtype=bool),
         faces=(None,) * len(declared),
         grounds=(None,) * len(declared),
+        placing=location.placing if location else FIRST_ORDER,
     )
 
 

@@ -8,7 +8,9 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from tolcontact.declaration.locator import FIRST_ORDER
 from tolcontact.discretization import Nominal, NominalPart
+from tolcontact.mechanics.exact_placing import exact_pose
 from tolcontact.mechanics.pose import Pose, relative, rotation
 from tolcontact.mechanics.setting import Setting
 
@@ -30,7 +32,7 @@ def placed_poses(nominal: Nominal, station: str, deviations: ca.SX, earlier: Seq
         for part in nominal.parts[first : indices[-1] + 1]
     ]
     local = [
-        _locator_pose(nominal.parts[index], _joint_steps(nominal, index, deviations, carried)) if pose is None else pose
+        _located_pose(nominal, index, deviations, carried) if pose is None else pose
         for index, pose in zip(indices, carried, strict=True)
     ]
 
@@ -41,19 +43,23 @@ def placed_poses(nominal: Nominal, station: str, deviations: ca.SX, earlier: Seq
     return [placed_pose(index) for index in indices]
 
 
-def _joint_steps(nominal: Nominal, index: int, deviations: ca.SX, carried: Sequence[Pose | None]) -> ca.SX:
-    """Return the step (locator, 1) [mm] at each locator of a part, less the displacement of its point within the joint.
+def _located_pose(nominal: Nominal, index: int, deviations: ca.SX, carried: Sequence[Pose | None]) -> Pose:
+    """Return the pose that the locators of a part give it, or the joint that it carries.
 
     carried   pose relative to its carrier of each part of the station; None for a part that is not carried
     """
     steps, part = locator_steps(nominal, index, deviations), nominal.parts[index]
     first = next(k for k, other in enumerate(nominal.parts) if other.station == part.station)
-    for number, owner in enumerate(part.owners):
-        X = carried[owner - first]
-        if X is not None:
+    within = [carried[owner - first] for owner in part.owners] or [None] * len(part.locators)
+    to_first_order = ca.SX(steps)
+    for number, X in enumerate(within):
+        if X is not None:  # the point has moved within the joint
             p, n = ca.DM(part.locators.points[number]), ca.DM(part.locators.directions[number])
-            steps[number] -= ca.dot(n, X.apply(p) - p)
-    return steps
+            to_first_order[number] -= ca.dot(n, X.apply(p) - p)
+    pose = _locator_pose(part, to_first_order)
+    if part.locators.placing == FIRST_ORDER or not len(part.locators):
+        return pose
+    return exact_pose(part.locators, steps, pose, within, ca.DM(part.locators.placing_matrix[1]))
 
 
 def locator_steps(nominal: Nominal, part: int, deviations: ca.SX) -> ca.SX:
