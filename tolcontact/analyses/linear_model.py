@@ -151,7 +151,7 @@ def _motions(program: Program, sign: int) -> np.ndarray:
     deviations = np.zeros((len(freedoms), len(program.nominal.contributors)))
     for station in program.stations:
         if station.place is not None:  # a motion in an earlier station moves what it hands on
-            placed = station.place(poses=poses, deviations=deviations)["placed"]
+            placed = station.place(poses=poses[:, station.sources], deviations=deviations)["placed"]
             poses[:, station.parts] += placed.reshape(len(freedoms), -1, pose.ENTRIES) - pose.AT_REST
     return poses.reshape(len(freedoms), pose.ENTRIES * len(program.nominal.parts))
 

@@ -11,6 +11,7 @@ from tolcontact.discretization import Nominal
 from tolcontact.mechanics.groups import Group
 from tolcontact.mechanics.placement import placed_poses
 from tolcontact.mechanics.pose import ENTRIES, Pose, nearest_rotation, poses_of
+from tolcontact.mechanics.setting import face_poses, facing_pose
 from tolcontact.method import Method
 
 
@@ -19,30 +20,51 @@ class StationProgram:
     """A station: a stretch of the parts, and the contact groups among them.
 
     parts    (part,) indices of its parts, which follow each other
+    pairs    (pair,) indices of its pairs
     groups   numbers of its contact groups
-    place    poses (realization, 12 * part of all stations), deviations -> poses (realization, 12 * part of the station) before
-             contact in this station; None if it locates no joint, so that earlier stations do not change them
+    sources  (source,) indices of the parts, in earlier stations, whose poses decide where its joints are placed
+    place    poses (realization, 12 * source), deviations -> placed (realization, 12 * part) before contact in this station,
+             relative (realization, 12 * pair): X_RM of its pairs there; None if it locates no joint
     """
 
     name: str
     parts: np.ndarray
+    pairs: np.ndarray
     groups: tuple[int, ...]
+    sources: np.ndarray
     place: NamedFunction | None
 
 
 def station_programs(nominal: Nominal, groups: Sequence[Group], method: Method) -> Iterator[StationProgram]:
     """Yield the programs of the stations, in their order; none for an assembly without stations."""
-    entries = ca.SX.sym("poses", ENTRIES * len(nominal.parts))
-    deviations = ca.SX.sym("deviations", len(nominal.contributors))
-    poses = poses_of(entries)
     for scene in nominal.scenes:
         parts = np.array([index for index, part in enumerate(nominal.parts) if part.station == scene.station])
+        pairs = np.array([k for k, pair in enumerate(nominal.pairs) if pair.moving in parts], dtype=int)
         own_groups = tuple(number for number, group in enumerate(groups) if set(group.parts) <= set(parts.tolist()))
-        place = None
-        if any(nominal.parts[index].carried for index in parts):
-            # The published step stretches parts a little, and a joint keeps their shape.
-            earlier = poses if method.is_exact else [Pose(nearest_rotation(X.R), X.t) for X in poses]
-            placed = ca.vertcat(*(X.vector() for X in placed_poses(nominal, scene.station, deviations, earlier)))
-            names = ["poses", "deviations"], ["placed"]
-            place = NamedFunction.dense(ca.Function("station_place", [entries, deviations], [placed], *names))
-        yield StationProgram(scene.station, parts, own_groups, place)
+        carried = [part.carried for part in nominal.parts if part.station == scene.station and part.carried is not None]
+        sources = np.unique(np.array(carried, dtype=int))
+        place = _place(nominal, scene.station, pairs, sources, method) if carried else None
+        yield StationProgram(scene.station, parts, pairs, own_groups, sources, place)
+
+
+def _place(nominal: Nominal, station: str, pairs: np.ndarray, sources: np.ndarray, method: Method) -> NamedFunction:
+    """Return the function that places the parts of a station; see StationProgram."""
+    entries = ca.SX.sym("poses", ENTRIES * len(sources))
+    deviations = ca.SX.sym("deviations", len(nominal.contributors))
+    # The published step stretches parts a little, and a joint keeps their shape.
+    handed_over = poses_of(entries) if method.is_exact else [Pose(nearest_rotation(X.R), X.t) for X in poses_of(entries)]
+    earlier = dict(zip(sources.tolist(), handed_over, strict=True))
+    placed = placed_poses(nominal, station, deviations, earlier)
+    first = next(index for index, part in enumerate(nominal.parts) if part.station == station)
+    relative = [
+        facing_pose(
+            face_poses(pair, deviations),
+            placed[pair.moving - first],
+            None if pair.reference is None else placed[pair.reference - first],
+        ).vector()
+        for pair in (nominal.pairs[k] for k in pairs)
+    ]
+    results = [ca.vertcat(*(X.vector() for X in placed)), ca.vertcat(*relative) if relative else ca.SX(0, 1)]
+    return NamedFunction.dense(
+        ca.Function("station_place", [entries, deviations], results, ["poses", "deviations"], ["placed", "relative"])
+    )

@@ -3,7 +3,7 @@
 A part that a joint carries keeps the pose relative to its carrier that it had in the station that joined them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import casadi as ca
 import numpy as np
@@ -17,14 +17,15 @@ from tolcontact.mechanics.setting import Setting
 
 def raw_poses(nominal: Nominal, deviations: ca.SX) -> list[Pose]:
     """Return the raw pose of every part for deviations (contributor, 1) [mm] in the order of `nominal.contributors`."""
-    poses: list[Pose] = []
+    poses: dict[int, Pose] = {}
     for station in dict.fromkeys(part.station for part in nominal.parts):  # a station follows from the raw poses before it
-        poses += placed_poses(nominal, station, deviations, poses)
-    return poses
+        placed = placed_poses(nominal, station, deviations, poses)
+        poses |= zip(range(len(poses), len(poses) + len(placed)), placed, strict=True)
+    return list(poses.values())
 
 
-def placed_poses(nominal: Nominal, station: str, deviations: ca.SX, earlier: Sequence[Pose]) -> list[Pose]:
-    """Return the pose of each part of a station before contact, for poses of the parts of all earlier stations."""
+def placed_poses(nominal: Nominal, station: str, deviations: ca.SX, earlier: Mapping[int, Pose]) -> list[Pose]:
+    """Return the pose of each part of a station before contact, for poses of parts of earlier stations by their indices."""
     indices = [index for index, part in enumerate(nominal.parts) if part.station == station]
     first = indices[0]
     carried = [

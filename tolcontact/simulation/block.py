@@ -13,7 +13,7 @@ from tolcontact.contact import ContactResolver, Resolved
 from tolcontact.contact.record import Record, join_groups, untouched_numbers
 from tolcontact.mechanics import ENTRIES
 from tolcontact.readable import Readable
-from tolcontact.simulation.sequence import Placed, hand_over, stages
+from tolcontact.simulation.sequence import Beginning, hand_over, stages
 from tolcontact.vocabulary import CORRECTED, RAW, Status
 
 
@@ -124,19 +124,20 @@ def simulate_block(
     block = Block.untouched(start, deviations, raw, measured, len(program.nominal.pairs), len(program.stations))
     sequence = stages(program)
     outcomes_by_stage = np.zeros((len(block), len(sequence)), dtype=np.int8)
-    at_raw = Placed(np.zeros(0, dtype=int), raw, relative)
+    begin, is_unknown = Beginning(raw, relative), ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
+    raw_relative = relative.copy() if program.stations else relative
     for stage in sequence:
         worst = outcomes_by_stage[:, stage.number]
         changed = np.flatnonzero(outcomes_by_stage.any(axis=1))
-        begin = hand_over(program, stage, changed, at_raw, block.poses[:, CORRECTED], deviations)
+        is_placed_again = hand_over(program, stage, changed, begin, block.poses[:, CORRECTED], deviations)
         for resolver in (resolvers[number] for number in stage.groups):
             resolved = resolver.resolve(begin.poses, begin.relative, deviations)
             _put(block, resolver, resolved)
-            if begin.rows.size:
-                _put_raw(block, resolver, begin.rows, relative)
+            if is_placed_again:
+                _put_raw(block, resolver, changed, raw_relative)
             worst[resolved.touched] = np.maximum(worst[resolved.touched], _outcome(resolved))
-    unknown = ~np.isfinite(raw).all(axis=(1, 2))  # gaps that are not numbers touch nothing
-    outcomes_by_stage[unknown], block.kkt_residual[unknown] = Outcome.UNSOLVED, np.inf
+    is_unknown |= ~np.isfinite(begin.poses).all(axis=(1, 2))
+    outcomes_by_stage[is_unknown], block.kkt_residual[is_unknown] = Outcome.UNSOLVED, np.inf
     worst = outcomes_by_stage.max(axis=1)
     touched = worst > Outcome.UNTOUCHED
     block.measured[touched, CORRECTED], _ = _observe(program, block.poses[touched, CORRECTED], deviations[touched])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tolcontact.arrays import Array, Float, Int
+from tolcontact.arrays import Array, Float
 from tolcontact.compilation import Program
 from tolcontact.mechanics import ENTRIES
 
@@ -20,15 +20,13 @@ class Stage(NamedTuple):
     groups: tuple[int, ...]
 
 
-class Placed(NamedTuple):
-    """The states in which contact of a station begins.
+class Beginning(NamedTuple):
+    """The states in which contact of stations begins.
 
-    rows      (row,) realizations that contact in earlier stations has changed
     poses     (realization, part, 12)
     relative  (realization, pair, 12): X_RM of the pairs
     """
 
-    rows: Int[Array, " row"]
     poses: Float[Array, "realization part 12"]
     relative: Float[Array, "realization pair 12"]
 
@@ -41,23 +39,24 @@ def stages(program: Program) -> list[Stage]:
 
 
 def hand_over(
-    program: Program, stage: Stage, changed: np.ndarray, raw: Placed, corrected: np.ndarray, deviations: np.ndarray
-) -> Placed:
-    """Return the states in which contact of a station begins, and put their poses into the corrected state.
+    program: Program,
+    stage: Stage,
+    rows: np.ndarray,
+    beginning: Beginning,
+    corrected: Float[Array, "realization part 12"],
+    deviations: Float[Array, "realization contributor"],
+) -> bool:
+    """Place the joints of a station again where contact in earlier stations has changed them, and return whether it did.
 
-    changed     (row,) realizations that contact in earlier stations has changed
-    raw         raw states
-    corrected   (realization, part, 12): corrected poses of earlier stations, raw ones of this station
-    deviations  (realization, contributor)
+    rows        (row,) realizations that contact in earlier stations has changed
+    beginning   raw states, of which those of this station are replaced
+    corrected   corrected poses of earlier stations, raw ones of this station, which are replaced as well
     """
-    place = program.stations[stage.number].place if program.stations else None
-    if place is None or not changed.size:
-        return raw
-    rows, parts = changed, program.stations[stage.number].parts
-    placed = place(poses=corrected[rows], deviations=deviations[rows])["placed"].reshape(len(rows), len(parts), ENTRIES)
-    corrected[rows[:, None], parts] = placed
-    poses, relative = raw.poses.copy(), raw.relative.copy()
-    poses[rows[:, None], parts] = placed
-    observed = program.observe(poses=poses[rows], deviations=deviations[rows])["relative"]
-    relative[rows] = observed.reshape(len(rows), *relative.shape[1:])
-    return Placed(rows, poses, relative)
+    station = program.stations[stage.number] if program.stations else None
+    if station is None or station.place is None or not rows.size:
+        return False
+    placed = station.place(poses=corrected[rows[:, None], station.sources], deviations=deviations[rows])
+    poses = placed["placed"].reshape(len(rows), len(station.parts), ENTRIES)
+    corrected[rows[:, None], station.parts] = beginning.poses[rows[:, None], station.parts] = poses
+    beginning.relative[rows[:, None], station.pairs] = placed["relative"].reshape(len(rows), len(station.pairs), ENTRIES)
+    return True
