@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import tolcontact as tc
-from tests.cases import stations as cases
+from tests.cases import MODELS, stations as cases
+from tolcontact.declaration.script import load_model
 
 HALF_NORMAL_MEAN, HALF_NORMAL_VARIANCE = np.sqrt(0.5 / np.pi), (1 - 1 / np.pi) / 2  # of max(0, z), z standard normal
 
@@ -159,3 +160,26 @@ def test_a_fixture_is_a_part_with_locators_and_features_of_its_own():
     assert (
         np.abs(end - under - pin).max() < 2e-5 and end.std() > 1.2e-3 and under.std() > 5e-4
     )  # what is left is of second order
+
+
+def levers(points, x, y):
+    """The heights of three points under a plane enter its height at (x, y) by these factors."""
+    return np.array([1, x, y]) @ np.linalg.inv([[1, *point] for point in points])
+
+
+def test_the_rail_has_the_spread_of_its_levers():
+    line = load_model(MODELS / "rail.py")
+    values = measured(line, samples=4000)
+    front, rear = [(20, 10), (20, 70), (480, 40)], [(520, 10), (520, 70), (920, 40)]
+    pins, bracket = [(20, 10), (20, 70), (840, 40)], [(955, 10), (1035, 10), (995, 70)]
+
+    def step(x):
+        return np.concatenate([-levers(front, x, 40), levers(rear, x, 40)])
+
+    held = levers(pins, 940, 40)
+    left = step(940) - held[2] * step(840)
+    flush = np.sqrt(0.4**2 * (left @ left) + 0.3**2 * (held @ held + levers(bracket, 945, 40) @ levers(bracket, 945, 40)))
+    for name, six_sigma in (("step", 0.4 * np.linalg.norm(step(440))), ("flush", flush)):
+        assert 6 * values[name][:, 0].std() == pytest.approx(six_sigma, rel=4 / np.sqrt(2 * 4000)), name
+    assert values["step"][:, 1].std() < 0.65 * values["step"][:, 0].std()
+    assert 0.95 < values["flush"][:, 1].std() / values["flush"][:, 0].std() < 1
