@@ -19,7 +19,7 @@ from tolcontact.declaration.joint import Joint
 from tolcontact.declaration.locator import Location
 from tolcontact.declaration.measure import Measure
 from tolcontact.declaration.part import Face, Feature, Part
-from tolcontact.declaration.sequence import joined_before, present_parts, sequence_faults, settings_of
+from tolcontact.declaration.sequence import in_order, joined_before, present_parts, sequence_faults, settings_of
 from tolcontact.declaration.size import Size
 from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
@@ -160,6 +160,11 @@ class Assembly(Declarations, Pictured):
     def scenes(self) -> "tuple[Assembly, ...]":
         """The models of the stations, in their order; an assembly without stations is its only scene."""
         return tuple(map(self._scene, self.stations)) or (self,)
+
+    @property
+    def in_station_order(self) -> "Assembly":
+        """The same assembly with its declarations station by station; an assembly without stations itself."""
+        return self.replaced(**in_order(self)) if self.stations else self
 
     def _scene(self, station: Station) -> "Assembly":
         """Return the model of a station: the parts that it holds, what it declares, and the joints that it locates."""

@@ -42,8 +42,25 @@ def settings_of(line: Line, station: Station) -> dict[str, list[Any]]:
     return {name: [thing for thing in getattr(line, name) if thing.station == station.name] for name in SETTINGS}
 
 
+def in_order(line: Line) -> dict[str, list[Any]]:
+    """Return the declarations of all stations by the name of their list, station by station."""
+    of_stations = [settings_of(line, station) for station in line.stations]
+    return {name: [thing for settings in of_stations for thing in settings[name]] for name in SETTINGS}
+
+
 def present_parts(line: Line, station: Station) -> tuple[Part, ...]:
-    """Return the parts in a station: those that it locates, with all parts of their joints, and fixed ones that it mentions."""
+    """Return the parts in a station: those that it locates, with all parts of their joints, and fixed ones that it mentions.
+
+    Parts that no station holds are in the first one.
+    """
+    present = _held_parts(line, station)
+    if station is line.stations[0]:
+        held = {part for other in line.stations for part in _held_parts(line, other)}
+        present |= {part for part in line.parts if part not in held}
+    return tuple(part for part in line.parts if part in present)
+
+
+def _held_parts(line: Line, station: Station) -> set[Part]:
     joined, settings = joined_before(line, station), settings_of(line, station)
     located = {
         part
@@ -51,7 +68,7 @@ def present_parts(line: Line, station: Station) -> tuple[Part, ...]:
         for part in (joined[location.part].members if location.part in joined else (location.part,))
     }
     mentioned = {part for things in settings.values() for thing in things for part in mentioned_parts(thing)}
-    return tuple(part for part in line.parts if part in located or (part.fixed is True and part in mentioned))
+    return {part for part in line.parts if part in located or (part.fixed is True and part in mentioned)}
 
 
 def mentioned_parts(thing: Any) -> tuple[Part, ...]:

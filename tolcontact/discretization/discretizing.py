@@ -63,6 +63,7 @@ def discretize(assembly: Assembly, *, incomplete: bool = False) -> Nominal:
     omissions = tuple(assembly.omissions()) if incomplete else ()
     faults = _Faults(fault for fault in assembly.faults() if fault not in omissions)
     is_sound = not faults
+    assembly = assembly.in_station_order if is_sound else assembly
     shapes = _shapes(assembly, faults)
     meshes = {part: read.mesh for part, read in shapes.items()}
     scenes = scenes_of(assembly) if is_sound or not assembly.stations else ()
