@@ -1,5 +1,8 @@
 """Runs of assemblies with stations: archives, resumed runs, workers, lazy datasets, JSON, and what is refused."""
 
+import gzip
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -187,3 +190,22 @@ def test_declarations_of_stations_may_stand_in_any_order():
     assert [(row[0], row[3]) for row in tables["Contact pairs"]] == list(zip(results.pair.values, points, strict=True))
     assert [(row[0], row[-1]) for row in tables["Measurements"]] == [("step", None), ("late", 0.125), ("flush", None)]
     assert [part.name for part in tc.build(line).nominal.scenes[0].assembly.parts] == ["a", "b", "spare"]
+
+
+def test_an_archive_of_the_first_format_with_stations_is_read(tmp_path):
+    path = tmp_path / "rail.nc"
+    path.write_bytes(gzip.decompress((Path(__file__).parent / "archives/stations_6.nc.gz").read_bytes()))
+    with tc.open_archive(path) as then:
+        mean = then.measured.mean("realization").values
+        assert mean.ravel() == pytest.approx([0.0143260891941, -0.0579433478320, -0.0613931819334, -0.0525346061268], abs=1e-12)
+        assert then.status.values.tolist() == [0, 1, 0, 0, 0, 1, 1, 1]
+        now = tc.run(tc.model_of(then), samples=8, seed=1, solver="daqp", surfaces=4)
+        assert np.abs(now.measured - then.measured).max() < 1e-9
+    assert_gaps_recompute(path)
+
+
+def test_stations_take_no_fasteners():
+    line = cases.rail()
+    a, b, _ = line.parts
+    with pytest.raises(ModelError, match=r'fastener "bolt" \(test_station_runs.py:\d+\): stations take no fasteners yet'):
+        line.fasten("bolt", 5, through=[a.face("+z"), b.face("+z")])

@@ -25,6 +25,7 @@ from tolcontact.declaration.station import Station
 from tolcontact.declaration.title_block import TitleBlock
 from tolcontact.declaration.tolerance import tolerance as _tolerance
 from tolcontact.declaration.values import key_faults, repetitions, script_line, text_faults, vector as _vector
+from tolcontact.errors import ModelError
 from tolcontact.later import FASTENER, LATER
 from tolcontact.method import Method
 from tolcontact.readable import Pictured
@@ -137,6 +138,9 @@ class Assembly(Declarations, Pictured):
 
         Raises ModelError if the fastener does not fit into the nominal assembly.
         """
+        if self.stations:
+            advice = "declare its part, its location and its contacts in a station"
+            raise ModelError(self.name, [f'fastener "{name}" ({script_line()}): stations take no fasteners yet; {advice}'])
         part: Part = LATER[FASTENER](self, name, fastener, through=through, into=into, seat=seat, pushed=pushed, drift=drift)
         return part
 
@@ -219,6 +223,7 @@ class Assembly(Declarations, Pictured):
         for part in self.parts:
             yield from _located("part", part, part.faults())
             if not self.stations:
+                yield from _located("part", part, self._repetition_faults(part))
                 yield from _located("part", part, self._location_faults(part))
             yield from self._feature_faults(part)
         for location in self.locations:
@@ -271,6 +276,11 @@ class Assembly(Declarations, Pictured):
                             f'declare it with part.feature(..., datum="{letter}")'
                         )
 
+    def _repetition_faults(self, part: Part) -> Iterator[str]:
+        count = sum(location.part is part for location in self.locations)
+        if count > 1:
+            yield f"it is located {count} times; locate it once"
+
     def _location_faults(self, part: Part) -> Iterator[str]:
         location = self.location_of(part)
         if location is not None and location.floating:
@@ -278,9 +288,6 @@ class Assembly(Declarations, Pictured):
                 yield "it is floating, and in no contact pair, so nothing decides its place; declare its contacts"
             if part.fixed is True:
                 yield "it is floating, so contact has to move it; leave fixed out"
-        count = sum(location.part is part for location in self.locations)
-        if count > 1:
-            yield f"it is located {count} times; locate it once"
         chain: list[Part] = []
         support: Part | None = part
         while support is not None:
