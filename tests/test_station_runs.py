@@ -209,3 +209,16 @@ def test_stations_take_no_fasteners():
     a, b, _ = line.parts
     with pytest.raises(ModelError, match=r'fastener "bolt" \(test_station_runs.py:\d+\): stations take no fasteners yet'):
         line.fasten("bolt", 5, through=[a.face("+z"), b.face("+z")])
+
+
+def test_raw_states_follow_raw_states_and_gaps_are_those_of_each_station():
+    linear = tc.Method(resolution="linearized", objective="all points")
+    with_contact, without = (
+        tc.run(cases.three_stations(1.0, contact=contact), samples=60, solver="daqp", method=linear, surfaces=0)
+        for contact in (True, False)
+    )
+    raw = [results.measured.sel(state="raw").values for results in (with_contact, without)]
+    assert np.abs(raw[0] - raw[1]).max() < 1e-12
+    moved = with_contact["station/weld"].station_status.values > 0
+    assert moved.sum() > 10 and (with_contact.gap_min.sel(state="raw", pair="butt").values[moved] < 0).any()
+    assert_gaps_recompute(with_contact)
