@@ -114,7 +114,7 @@ class Assembly(Declarations, Pictured):
 
     def station(self, name: str) -> Station:
         """Declare the next station of an assembly that is built in steps, and return it (see Station)."""
-        return self._add("stations", Station(name, script_line()).of(self))
+        return self._add("stations", Station(name, script_line()).belonging_to(self))
 
     def fasten(
         self,
@@ -228,11 +228,10 @@ class Assembly(Declarations, Pictured):
             yield from self._feature_faults(part)
         for location in self.locations:
             yield from _located(location.noun, location, location.faults())
-            mentioned = location.part, location.parent, *location.mentioned
-            yield from self._unknown_parts(f'locators of "{location.name}"', location.declared_at, *mentioned)
+            yield from self._unknown_parts(f'locators of "{location.name}"', location.declared_at, *location.parts)
         references: list[tuple[str, Any, Iterable[Part]]] = [
-            *(("contact pair", pair, (*pair.moving.parts, *pair.reference.parts)) for pair in self.pairs),
-            *(("force", force, (force.at.part,)) for force in self.forces),
+            *(("contact pair", pair, pair.parts) for pair in self.pairs),
+            *(("force", force, force.parts) for force in self.forces),
             *(("measure", measure, measure.parts) for measure in self.measures),
             *(("variable", variable, ()) for variable in self.variables),
             *(("correlation", correlation, ()) for correlation in self.correlations),

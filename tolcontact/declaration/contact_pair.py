@@ -3,8 +3,9 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import ClassVar
 
-from tolcontact.declaration.part import Face
+from tolcontact.declaration.part import Face, Part
 from tolcontact.readable import Readable
 
 VERTICES = "vertices"
@@ -31,6 +32,12 @@ class ContactPair(Readable):
     within: float | None = None
     declared_at: str = ""
     station: str = ""
+    noun: ClassVar[str] = "contact pair"
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        """The parts to which its faces refer."""
+        return (*self.moving.parts, *self.reference.parts)
 
     def faults(self) -> Iterator[str]:
         yield from self.moving.faults()

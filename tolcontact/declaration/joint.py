@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from tolcontact.declaration.part import Part
 from tolcontact.readable import Readable
@@ -21,6 +22,7 @@ class Joint(Readable):
     members: tuple[Part, ...]
     station: str
     declared_at: str = ""
+    noun: ClassVar[str] = "joint"
 
     @property
     def first(self) -> Part:

@@ -162,6 +162,11 @@ class Location(Readable):
         return self.on.part if isinstance(self.on, Feature) else self.on
 
     @property
+    def parts(self) -> tuple[Part, ...]:
+        """The located part, the part that it is on, and those to which the faces of the scheme refer."""
+        return (self.part, *([] if self.parent is None else [self.parent]), *self.mentioned)
+
+    @property
     def mentioned(self) -> tuple[Part, ...]:
         """The parts to which the faces of the scheme refer."""
         faces = self.scheme.faces if isinstance(self.scheme, ThreeTwoOne) else ()

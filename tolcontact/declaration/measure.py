@@ -9,7 +9,7 @@ import contextlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from tolcontact.declaration.measurement import Measurement
 from tolcontact.declaration.part import Part, Point
@@ -43,6 +43,7 @@ class Measure(Readable):
     limits: tuple[float | None, float | None] | None = None
     absolute: bool | None = None
     station: str = ""
+    noun: ClassVar[str] = "measure"
 
     def __post_init__(self) -> None:
         with contextlib.suppress(TextFault):  # faults() reports it

@@ -67,17 +67,8 @@ def _held_parts(line: Line, station: Station) -> set[Part]:
         for location in settings["locations"]
         for part in (joined[location.part].members if location.part in joined else (location.part,))
     }
-    mentioned = {part for things in settings.values() for thing in things for part in mentioned_parts(thing)}
+    mentioned = {part for things in settings.values() for thing in things for part in thing.parts}
     return {part for part in line.parts if part in located or (part.fixed is True and part in mentioned)}
-
-
-def mentioned_parts(thing: Any) -> tuple[Part, ...]:
-    """Return the parts to which a location, contact pair, measure or force refers."""
-    if isinstance(thing, Location):
-        return (thing.part, *([thing.parent] if thing.parent else []), *thing.mentioned)
-    if hasattr(thing, "moving"):
-        return (*thing.moving.parts, *thing.reference.parts)
-    return (thing.at.part,) if hasattr(thing, "at") else tuple(thing.parts)
 
 
 def sequence_faults(line: Line) -> Iterator[str]:
@@ -89,11 +80,11 @@ def sequence_faults(line: Line) -> Iterator[str]:
     for list_name, method in SETTINGS.items():
         for thing in getattr(line, list_name):
             if thing.station not in names:
-                yield f"{_designation(thing)} belongs to no station; declare it in one: station.{method}(...)"
+                yield f"{designation(thing.noun, thing)} belongs to no station; declare it in one: station.{method}(...)"
     for joint in line.joints:
-        yield from (f"{_designation(joint)}: {fault}" for fault in joint.faults())
+        yield from (f"{designation(joint.noun, joint)}: {fault}" for fault in joint.faults())
         if joint.station not in names:
-            yield f'{_designation(joint)} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
+            yield f'{designation(joint.noun, joint)} refers to station "{joint.station}"; the stations are: {", ".join(names)}'
     for station in line.stations:
         yield from _station_faults(line, station)
 
@@ -101,24 +92,22 @@ def sequence_faults(line: Line) -> Iterator[str]:
 def _station_faults(line: Line, station: Station) -> Iterator[str]:
     joined, settings = joined_before(line, station), settings_of(line, station)
     if not settings["locations"]:
-        yield f"{_designation(station)}: it locates nothing; call {station.name}.locate(...)"
+        yield f"{designation(station.noun, station)}: it locates nothing; call {station.name}.locate(...)"
     bodies: dict[Joint | Part, Location] = {}
     for location in settings["locations"]:
-        yield from (f"{_designation(location)}: {fault}" for fault in _location_faults(location, joined, station))
+        yield from (f"{designation(location.noun, location)}: {fault}" for fault in _location_faults(location, joined, station))
         body = joined.get(location.part, location.part)
         if body in bodies:
-            noun = "joint" if isinstance(body, Joint) else "part"
-            yield (
-                f'{_designation(location)}: station "{station.name}" locates {noun} "{body.name}" twice, first in '
-                f"{bodies[body].declared_at or 'an earlier location'}; locate it once"
-            )
+            earlier = bodies[body].declared_at or "an earlier location"
+            place = designation(location.noun, location)
+            yield f'{place}: station "{station.name}" locates it twice, first in {earlier}; locate it once'
         bodies.setdefault(body, location)
     present = present_parts(line, station)
     for things in settings.values():
         for thing in things:
-            for part in dict.fromkeys(mentioned_parts(thing)):
+            for part in dict.fromkeys(thing.parts):
                 if part in line.parts and part not in present and not (isinstance(thing, Location) and part is thing.part):
-                    yield f"{_designation(thing)}: {_absence(part, joined, station)}"
+                    yield f"{designation(thing.noun, thing)}: {_absence(part, joined, station)}"
     yield from _join_faults(line, station, present)
 
 
@@ -148,19 +137,20 @@ def _join_faults(line: Line, station: Station, present: Sequence[Part]) -> Itera
     for joint in line.joints:
         if joint.station != station.name:
             continue
+        place = designation(joint.noun, joint)
         for part in dict.fromkeys(joint.members):
             if part in joints:
                 yield (
-                    f'{_designation(joint)}: station "{station.name}" joins part "{part.name}" twice, first in joint '
-                    f'"{joints[part].name}" ({joints[part].declared_at}); join all in one joint'
+                    f'{place}: station "{station.name}" joins part "{part.name}" twice, first in joint "{joints[part].name}" '
+                    f"({joints[part].declared_at}); join all in one joint"
                 )
                 break
             elif part not in present:
-                yield f"{_designation(joint)}: {_absence(part, before, station)}"
+                yield f"{place}: {_absence(part, before, station)}"
             elif part in before and not set(before[part].members) <= set(joint.members):
                 yield (
-                    f'{_designation(joint)}: station "{station.name}" joins part "{part.name}", which is in joint '
-                    f'"{before[part].name}" since station "{before[part].station}"; join that joint'
+                    f'{place}: station "{station.name}" joins part "{part.name}", which is in joint "{before[part].name}" '
+                    f'since station "{before[part].station}"; join that joint'
                 )
             joints.setdefault(part, joint)
 
@@ -169,9 +159,3 @@ def _absence(part: Part, joined: dict[Part, Joint], station: Station) -> str:
     """Return the fault of a part that a station needs and does not hold."""
     body = f'joint "{joined[part].name}" with part "{part.name}"' if part in joined else f'part "{part.name}"'
     return f'station "{station.name}" does not hold {body}; locate it there: {station.name}.locate(...)'
-
-
-def _designation(thing: Any) -> str:
-    """Return the kind, the name and the script line of a declaration."""
-    nouns = {"Station": "station", "Joint": "joint", "ContactPair": "contact pair", "Force": "force", "Measure": "measure"}
-    return designation(thing.noun if isinstance(thing, Location) else nouns[type(thing).__name__], thing)

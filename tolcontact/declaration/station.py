@@ -1,7 +1,7 @@
 """Stations: an assembly that is built in steps has one set of locations, contact pairs, measures and joints for each."""
 
 from collections.abc import Iterator
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 from tolcontact.declaration.declarations import Declarations, expect
 from tolcontact.declaration.joint import Joint, parts_of
@@ -21,12 +21,13 @@ class Station(Declarations, Readable):
 
     name: str
     declared_at: str
+    noun: ClassVar[str] = "station"
 
     def __init__(self, name: str, declared_at: str = "") -> None:
         self.name, self._station, self.declared_at = name, name, declared_at
         self._assembly: Declarations | None = None
 
-    def of(self, assembly: Declarations) -> "Station":
+    def belonging_to(self, assembly: Declarations) -> "Station":
         """Let the station declare into the lists of an assembly, and return it."""
         self._assembly = assembly
         return self
