@@ -89,3 +89,27 @@ def test_placing_is_checked(change, message):
     model.measure("corner", part.point(100, 50, 10), along="z")
     with pytest.raises(ModelError, match=message.replace("(", r"\(")):
         tc.build(model)
+
+
+def test_an_inspection_reports_deviations_from_the_best_fit_of_a_joint():
+    """One part stands off the other by a step; points along both are fitted by a line, and the step remains beside it."""
+    line = tc.Assembly("inspection")
+    a, b = line.part("a", tc.Box(100, 20, 10)), line.part("b", tc.Box(100, 20, 10), at=(100, 0, 0))
+    weld, check = line.station("weld"), line.station("check")
+    weld.locate(a, cases.supported(a, 10, 90), tolerance=0)
+    weld.locate(b, cases.supported(b, 10, 90), tolerance=0)
+    line.variable("step", 0.06, drives={f"weld.b.A{k}": 1.0 for k in (1, 2, 3)})
+    ab = weld.join("ab", a, b)
+    places = [(part, x, y) for part in (a, b) for x in (10, 50, 90) for y in (5, 15)]
+    points = [tc.Locator(f"P{k}", part.point(x, y, 0), "z") for k, (part, x, y) in enumerate(places)]
+    check.locate(ab, [*points, *cases.held(a)], tolerance=0, placing="best fit")
+    check.measure("end of a", a.point(0, 10, 0), along="z")
+    check.measure("end of b", b.point(100, 10, 0), along="z")
+    program = tc.build(line, solver="daqp")
+    block = next(iter(tc.simulate_blocks(program, samples=50, seed=1)))
+    x = np.array([px + (100 if part is b else 0) for part, px, _ in places])
+    off = np.array([float(part is b) for part, _, _ in places])
+    slope, height = np.polyfit(x, off, 1)
+    step = block.deviations[:, program.nominal.contributors.index("step")]
+    expected = np.column_stack([-height * step, (1 - height - 200 * slope) * step])
+    assert np.abs(block.measured[:, 0] - expected).max() < 2e-6 and step.std() > 0.005
