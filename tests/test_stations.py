@@ -183,3 +183,11 @@ def test_the_rail_has_the_spread_of_its_levers():
         assert 6 * values[name][:, 0].std() == pytest.approx(six_sigma, rel=4 / np.sqrt(2 * 4000)), name
     assert values["step"][:, 1].std() < 0.65 * values["step"][:, 0].std()
     assert 0.95 < values["flush"][:, 1].std() / values["flush"][:, 0].std() < 1
+
+
+def test_a_hood_is_hung_and_inspected_as_its_model_says():
+    values = measured(load_model(MODELS / "hood.py"), samples=500)
+    spread = {name: x.std(axis=0) for name, x in values.items()}
+    assert np.abs(values["flush as inspected"] - values["flush as hung"]).max() < 1e-3
+    assert 0.6 < spread["flush as hung"][1] / spread["flush as hung"][0] < 0.75
+    assert 0.7 < spread["corner as inspected"][1] / spread["corner as hung"][1] < 0.85
