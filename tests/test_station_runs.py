@@ -3,6 +3,7 @@
 import gzip
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
@@ -11,7 +12,7 @@ import tolcontact as tc
 from tests.cases import stations as cases
 from tests.helpers import contents, run, script
 from tolcontact.archive import bytes_of_rows
-from tolcontact.errors import ModelError
+from tolcontact.errors import ArchiveError, ModelError
 from tolcontact.report.model_tables import model_tables
 from tolcontact.testing import assert_gaps_recompute, assert_resolved, assert_same_run
 
@@ -222,3 +223,20 @@ def test_raw_states_follow_raw_states_and_gaps_are_those_of_each_station():
     moved = with_contact["station/weld"].station_status.values > 0
     assert moved.sum() > 10 and (with_contact.gap_min.sel(state="raw", pair="butt").values[moved] < 0).any()
     assert_gaps_recompute(with_contact)
+
+
+@pytest.mark.parametrize("damage", ["parts", "measures", "group"])
+def test_stations_that_do_not_fit_the_archive_are_damage(archive, damage, tmp_path):
+    path = tmp_path / "damaged.nc"
+    path.write_bytes(archive.read_bytes())
+    with netCDF4.Dataset(path, "r+") as file:
+        file.set_auto_mask(False)
+        if damage == "group":
+            file["station/weld"].station = "other"
+        else:
+            stored = file["station/weld/station_part"] if damage == "parts" else file["measure_station"]
+            stored.set_auto_chartostring(False)
+            stored[0, 0] = b"x"
+            stored.delncattr("crc32")
+    with pytest.raises(ArchiveError, match=r"is damaged: .* does not have"):
+        tc.open_archive(path)

@@ -230,11 +230,27 @@ def _check_needed(file: netCDF4.Dataset) -> None:
             raise DamagedError("is damaged: its checkpoints cover more realizations than it has")
     if tuple(_texts(file[terms.STATE])) != terms.STATES:
         raise DamagedError("is damaged: its states are not raw and corrected")
+    _check_stations(file)
     for part in _texts(file[terms.PART]):
         name = terms.group_of(part)
         if name not in file["field"].groups:
             raise DamagedError(f'is damaged: it has no field for part "{part}"')
         _need(file["field"][name], OF_FIELD)
+
+
+def _check_stations(file: netCDF4.Dataset) -> None:
+    """Check that the groups of stations name their parts, and that measures, pairs and parts belong to them."""
+    if terms.STATIONS_GROUP not in file.groups:
+        return
+    _need(file, terms.OF_STATIONS)
+    parts, names = set(_texts(file[terms.PART])), set[str]()
+    for group in file[terms.STATIONS_GROUP].groups.values():
+        _need(group, (terms.STATION_PART_LABEL, terms.STATION_STATUS))
+        names.add(str(getattr(group, "station", "")))
+        if not set(_texts(group[terms.STATION_PART])) <= parts:
+            raise DamagedError(f"is damaged: group {group.path} has parts that the archive does not have")
+    if any(not set(_texts(file[variable.name])) <= names for variable in terms.OF_STATIONS):
+        raise DamagedError("is damaged: a measure, pair or part belongs to a station that the archive does not have")
 
 
 def _need(group: netCDF4.Dataset, needed: tuple[ArchiveVariable, ...]) -> None:

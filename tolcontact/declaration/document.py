@@ -311,6 +311,8 @@ def assembly_of(document: Any, sources: Sources) -> Assembly:
     method = Optional(METHOD).decode(struct.method, place["method"])
     title_block = Optional(TITLE_BLOCK).decode(struct.title_block, place["title_block"])
     assembly = Assembly(struct.name, method=method, title_block=title_block).replaced(**things)
+    for station in assembly.stations:
+        station.belonging_to(assembly)
     for fault in assembly.faults():  # a model with faults is never archived
         raise place.error(fault)
     return assembly
