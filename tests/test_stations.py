@@ -7,6 +7,7 @@ import tolcontact as tc
 from tests.cases import MODELS, stations as cases
 from tolcontact.declaration.script import load_model
 
+LINEARIZED = tc.Method(resolution="linearized")
 HALF_NORMAL_MEAN, HALF_NORMAL_VARIANCE = np.sqrt(0.5 / np.pi), (1 - 1 / np.pi) / 2  # of max(0, z), z standard normal
 
 
@@ -81,13 +82,13 @@ def test_poses_are_handed_over_as_a_computation_outside_the_package_composes_the
         assert np.abs(actual - expected).max() < 1e-11, part.name
 
 
-@pytest.mark.parametrize("method", [tc.Method(), tc.Method(resolution="linearized")], ids=lambda method: method.resolution)
+@pytest.mark.parametrize("method", [tc.Method(), LINEARIZED], ids=lambda method: method.resolution)
 def test_measures_within_a_joint_are_those_of_the_station_that_joined_it(method):
     values = measured(cases.three_stations(2.0), method=method)
     for first, later in (("tack a to b", "weld a to b"), ("tack a to b", "check a to b"), ("weld b to c", "check b to c")):
         change = np.abs(values[later] - values[first])
         assert change[:, 0].max() < 1e-12
-        assert method.resolution == "linearized" or change.max() < 1e-12
+        assert change.max() < (0.1 if method.resolution == "linearized" else 1e-12)  # the published step stretches parts
     moved = np.abs(values["tack a to b"][:, 1] - values["tack a to b"][:, 0]) > 1e-6
     assert 100 < moved.sum() < 400
     assert np.abs(values["check height"] - values["weld height"]).max() > 0.1
@@ -191,3 +192,9 @@ def test_a_hood_is_hung_and_inspected_as_its_model_says():
     assert np.abs(values["flush as inspected"] - values["flush as hung"]).max() < 1e-3
     assert 0.6 < spread["flush as hung"][1] / spread["flush as hung"][0] < 0.75
     assert 0.7 < spread["corner as inspected"][1] / spread["corner as hung"][1] < 0.85
+
+
+def test_linearized_steps_are_handed_over_wherever_the_assembly_stands():
+    near, far = (measured(cases.three_stations(1.0, x=x), samples=100, method=LINEARIZED) for x in (0.0, 1000.0))
+    for name in ("check a to b", "check b to c", "check height"):
+        assert np.abs(near[name] - far[name]).max() < 1e-8, name

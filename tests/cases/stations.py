@@ -48,12 +48,12 @@ def rail() -> tc.Assembly:
     return line
 
 
-def three_stations(tolerance: float, *, contact: bool = True, placing: str = "first order") -> tc.Assembly:
+def three_stations(tolerance: float, *, contact: bool = True, placing: str = "first order", x: float = 0.0) -> tc.Assembly:
     """Boxes that are placed with six locators each, joined, located by points of both, and joined with a third one."""
     line = tc.Assembly("three stations")
-    a = line.part("a", tc.Box(100, 50, 10))
-    b = line.part("b", tc.Box(100, 50, 10), at=(60, 0, 10), rotation=(0, 0, 0.01))
-    c = line.part("c", tc.Box(40, 50, 10), at=(160, 0, 10))
+    a = line.part("a", tc.Box(100, 50, 10), at=(x, 0, 0))
+    b = line.part("b", tc.Box(100, 50, 10), at=(x + 60, 0, 10), rotation=(0, 0, 0.01))
+    c = line.part("c", tc.Box(40, 50, 10), at=(x + 160, 0, 10))
     tack, weld, check = (line.station(name) for name in ("tack", "weld", "check"))
     for part in (a, b):
         tack.locate(part, box_scheme(part), tolerance=tolerance, placing=placing)

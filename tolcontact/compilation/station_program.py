@@ -47,12 +47,20 @@ def station_programs(nominal: Nominal, groups: Sequence[Group], method: Method) 
         yield StationProgram(scene.station, parts, pairs, own_groups, sources, place)
 
 
+def _rigid(X: Pose, vertices: np.ndarray) -> Pose:
+    """Return the rigid pose nearest to a pose that stretches a part of these vertices (vertex, 3) [mm]: its middle stays."""
+    middle, R = ca.DM((vertices.min(axis=0) + vertices.max(axis=0)) / 2), nearest_rotation(X.R)
+    return Pose(R, X.t + (X.R - R) @ middle)
+
+
 def _place(nominal: Nominal, station: str, pairs: np.ndarray, sources: np.ndarray, method: Method) -> NamedFunction:
     """Return the function that places the parts of a station; see StationProgram."""
     entries = ca.SX.sym("poses", ENTRIES * len(sources))
     deviations = ca.SX.sym("deviations", len(nominal.contributors))
     # The published step stretches parts a little, and a joint keeps their shape.
-    handed_over = poses_of(entries) if method.is_exact else [Pose(nearest_rotation(X.R), X.t) for X in poses_of(entries)]
+    handed_over = poses_of(entries)
+    if not method.is_exact:
+        handed_over = [_rigid(X, nominal.parts[k].vertices) for X, k in zip(handed_over, sources.tolist(), strict=True)]
     earlier = dict(zip(sources.tolist(), handed_over, strict=True))
     placed = placed_poses(nominal, station, deviations, earlier)
     first = next(index for index, part in enumerate(nominal.parts) if part.station == station)
